@@ -1,0 +1,30 @@
+"""CARE-Sim: a closed-loop benchmark for adaptive LiDAR sensing.
+
+Importing the package registers the environments `CARE-Dartout-v0`, `CARE-Dense-v0` and `CARE-CutIn-v0`.
+"""
+
+from importlib.metadata import version
+
+from care_sim.allocation import allocate
+from care_sim.envs import register_all
+from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.grid import AngularGrid
+from care_sim.policies import make_policy, policy_names
+from care_sim.policies.base import Policy
+from care_sim.types import Belief, Demand, Rig
+
+__version__ = version("care-sim")
+__all__ = [
+    "AngularGrid",
+    "Belief",
+    "Demand",
+    "InvalidInput",
+    "MissingExtra",
+    "Policy",
+    "Rig",
+    "allocate",
+    "make_policy",
+    "policy_names",
+]
+
+register_all()

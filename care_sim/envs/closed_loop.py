@@ -1,0 +1,211 @@
+"""The closed-loop environments: thin Gymnasium adapters around `care_sim.loop`."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from care_sim.allocation import RESERVE_FRACTION, budget_cells, fired_cells
+from care_sim.envs.spaces import checked_scores, observation_space
+from care_sim.errors import InvalidInput, check_rate
+from care_sim.evaluation.metrics import outcome
+from care_sim.grid import AngularGrid, Cells
+from care_sim.loop import ClosedLoop, Sensing
+from care_sim.perception.detectors import MIN_RETURNS
+from care_sim import reward as rewards
+from care_sim.scenarios import make_scenario
+from care_sim.sensors.camera import FRONT_CAMERA, CameraFaults
+from care_sim.sensors.engines import check_engine
+from care_sim.sensors.lidar import LidarNoise
+from care_sim.types import Action, Keyframe, Rig
+from care_sim.world.world import whole_steps
+
+Observed = dict[str, NDArray[np.float32]]
+
+
+class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
+    """A scenario in which the agent chooses the LiDAR's cells and a fixed controller brakes.
+
+    ### Action
+    `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest strictly
+    positive scores fire, ties by ascending cell index; when there are fewer, the random floor shared by
+    all policies fills up (`floor=False` leaves them unspent). No action can overspend.
+
+    ### Observation
+    A `Dict` of float32 arrays, padded to fixed shapes, that `care_sim.Belief.from_observation` reads:
+
+    | key | shape | content |
+    |---|---|---|
+    | `ego` | (3,) | speed m/s, yaw rate rad/s, acceleration m/s^2 |
+    | `budget` | (1,) | B / N, the share of cells that may fire |
+    | `detections` | (64, 9) | camera: class, confidence, left, top, right, bottom (pixels), camera, age s, yaw change rad; class -1 pads |
+    | `tracks` | (64, 12) | forecasts in the sensor frame: id, class, x, y, z, length, width, height, yaw, vx, vy, keyframes since detected; id -1 pads |
+    | `ranges` | (E, A) | the last scan in metres, 0 not fired, maximum range without a return |
+
+    ### Reward
+    A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision,
+    needless braking. Every term is at most 0, so is the best return.
+
+    ### Episode end
+    Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes). `info` has
+    `fired` (cells), `detected` (the first-sighting actor, at this keyframe), `in_view`, `braking`,
+    `clearance_m`, `speed_mps`, `time_s`, `reward_terms`; at the end `info["outcome"]`, a dict of
+    `care_sim.types.Outcome`.
+
+    ### Arguments
+    `budget` beta in (0, 1]; `reserve_fraction` rho of the shared allocator; `false_negative_rate` and
+    `camera_latency` (whole keyframes) of the camera; `min_returns` of the proxy detector;
+    `lidar_range_sigma` (m) and `lidar_dropout`; `engine`; `floor`; `keyframe_s`; `reward_weights`, a
+    mapping of changes; `render_mode` None or "rgb_array"; any field of the scenario. A value that is not
+    allowed raises `care_sim.InvalidInput`.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    scenario_name: ClassVar[str]
+
+    def __init__(
+        self,
+        *,
+        budget: float = 0.10,
+        reserve_fraction: float = RESERVE_FRACTION,
+        false_negative_rate: float = 0.0,
+        camera_latency: int = 0,
+        min_returns: int = MIN_RETURNS,
+        lidar_range_sigma: float = 0.0,
+        lidar_dropout: float = 0.0,
+        engine: str = "bullet",
+        floor: bool = True,
+        keyframe_s: float = 0.1,
+        reward_weights: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        **scenario_parameters: Any,
+    ):
+        check_rate("reserve_fraction", reserve_fraction)
+        check_engine(engine)
+        whole_steps(keyframe_s)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
+        grid = AngularGrid()
+        self.rig = Rig(grid, (FRONT_CAMERA,), budget_cells(budget, grid.size), reserve_fraction, keyframe_s)
+        self.sensing = Sensing(
+            engine,
+            min_returns,
+            CameraFaults(false_negative_rate, camera_latency),
+            LidarNoise(lidar_range_sigma, lidar_dropout),
+        )
+        self.scenario = make_scenario(self.scenario_name, **scenario_parameters)
+        self.render_mode = render_mode
+        self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
+        self.observation_space = observation_space(self.rig)
+        self.keyframes: list[Keyframe] = []
+        self._weights = rewards.weights(reward_weights)
+        self._floor_on = floor
+        self._loop: ClosedLoop | None = None
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The running episode. Raises gymnasium.error.ResetNeeded before the first reset."""
+        if self._loop is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
+        return self._loop
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed."""
+        super().reset(seed=seed)
+        entropy = seed if seed is not None else int(self.np_random.integers(2**32))
+        scenario, camera, noise, self._floor_seed = np.random.SeedSequence(entropy).spawn(4)
+        self.close()
+        world = self.scenario.build(np.random.default_rng(scenario))
+        self._loop = ClosedLoop(world, self.rig, self.sensing, (camera, noise))
+        self.keyframes = []
+        return self._loop.belief.to_observation(), {"seed": entropy}
+
+    def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
+        """Fire the cells that `action` scores highest and go on to the next keyframe."""
+        loop = self.loop
+        scores = checked_scores(action, self.rig.grid.shape)
+        frame = loop.keyframe(fired_cells(scores, self.rig.budget, self._floor(loop.index)))
+        terms = rewards.terms(
+            frame, any(f.in_view for f in self.keyframes), any(f.detected for f in self.keyframes)
+        )
+        self.keyframes.append(frame)
+        terminated = frame.impact_speed_mps is not None
+        truncated = loop.world.time >= self.scenario.duration_s - 1e-9
+        info = _info(frame, terms)
+        if terminated or truncated:
+            info["outcome"] = asdict(outcome(self.keyframes))
+        reward = sum(self._weights[name] * value for name, value in terms.items())
+        return loop.belief.to_observation(), reward, terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
+        if self.render_mode is None:
+            return None
+        from care_sim.envs.picture import draw_keyframe
+
+        return draw_keyframe(self.loop, self.keyframes[-1] if self.keyframes else None)
+
+    def close(self) -> None:
+        """Free the simulator. The environment can be reset again."""
+        if self._loop is not None:
+            self._loop.world.close()
+            self._loop = None
+
+    def _floor(self, keyframe: int) -> Cells | None:
+        """The permutation of all cells shared by every policy at this keyframe."""
+        if not self._floor_on:
+            return None
+        state = self._floor_seed.generate_state(2)
+        return np.random.default_rng([*state.tolist(), keyframe]).permutation(self.rig.grid.size)
+
+
+def _info(frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
+    return {
+        "fired": frame.fired,
+        "detected": frame.detected,
+        "in_view": frame.in_view,
+        "braking": frame.braking,
+        "clearance_m": frame.clearance_m,
+        "speed_mps": frame.speed_mps,
+        "time_s": frame.time_s,
+        "reward_terms": terms,
+    }
+
+
+class DartoutEnv(ClosedLoopEnv):
+    """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty 30 km/h street.
+
+    The paper's first closed-loop scene. The seed draws the speeds, the place and the timing; see
+    `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources, all of which can be
+    passed as arguments. `occluder="truck"` parks a vehicle that perception reports instead.
+    """
+
+    __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"
+    scenario_name = "dartout"
+
+
+class DenseEnv(ClosedLoopEnv):
+    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (5) tracked vehicles.
+
+    At 3% of the cells a reserve for every camera box starves the person; `care_sim.scenarios.dense`
+    reckons why, cell by cell.
+    """
+
+    __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"
+    scenario_name = "dense"
+
+
+class CutInEnv(ClosedLoopEnv):
+    """`CARE-CutIn-v0`: a car pulls out into the ego's lane from in front of a standing bus.
+
+    A large vehicle returns enough points even when starved; the paper found no separation here.
+    """
+
+    __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"
+    scenario_name = "cutin"

@@ -1,0 +1,1 @@
+"""Scoring: pure functions of what an episode recorded."""

@@ -1,0 +1,31 @@
+"""Metrics of an episode, as pure functions of its keyframes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from care_sim.types import Keyframe, Outcome
+
+
+def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
+    """The result of an episode.
+
+    `detection_distance_m`: planar distance from the sensor to the centre of the first-sighting actor at
+    the first keyframe it is detected; None if it never is. `braked`: the brake was on at any keyframe.
+    `min_distance_m` (ego centre to actor centre) and `clearance_m` (hull to hull, negative for overlap):
+    the least from the first keyframe the camera has it in view, None if it never comes into view.
+    `impact_speed_mps`: the ego's speed at its first contact with any body, None without `collision`.
+    """
+    first = next((frame.distance_m for frame in keyframes if frame.detected), None)
+    appeared = next((n for n, frame in enumerate(keyframes) if frame.in_view), len(keyframes))
+    seen = keyframes[appeared:]
+    impact = next((f.impact_speed_mps for f in keyframes if f.impact_speed_mps is not None), None)
+    return Outcome(
+        detection_distance_m=first,
+        braked=any(frame.braking for frame in keyframes),
+        min_distance_m=min((frame.nearest_m for frame in seen), default=None),
+        clearance_m=min((frame.clearance_m for frame in seen), default=None),
+        collision=impact is not None,
+        impact_speed_mps=impact,
+        rays_fired=int(np.sum([len(frame.fired) for frame in keyframes])),
+    )

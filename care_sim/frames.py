@@ -1,0 +1,52 @@
+"""A frame of reference on the ground plane: where a car or a sensor is, and how it is turned."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Pose = tuple[float, float, float]
+"""x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
+
+
+def turned(vectors: Floats, yaw: float) -> Floats:
+    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    result = np.array(vectors, dtype=float)
+    x, y = vectors[..., 0], vectors[..., 1]
+    result[..., 0], result[..., 1] = cos * x - sin * y, sin * x + cos * y
+    return result
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Origin (world x, y, z in metres) and heading `yaw` (radians) of a frame whose z axis is up."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+    @classmethod
+    def mounted(cls, pose: Pose, at: tuple[float, float, float]) -> "Frame":
+        """The frame of a sensor mounted `at` (x, y, z) in the frame of a body at `pose`."""
+        x, y = turned(np.array(at[:2]), pose[2])
+        return cls(pose[0] + float(x), pose[1] + float(y), at[2], pose[2])
+
+    @property
+    def origin(self) -> Floats:
+        """(3,) world position."""
+        return np.array([self.x, self.y, self.z])
+
+    def boxes_to_local(self, boxes: Floats) -> Floats:
+        """World boxes (n, 7) seen in this frame."""
+        return _moved(boxes - [*self.origin, 0, 0, 0, self.yaw], -self.yaw)
+
+    def boxes_to_world(self, boxes: Floats) -> Floats:
+        """Boxes (n, 7) of this frame in the world."""
+        return _moved(boxes, self.yaw) + [*self.origin, 0, 0, 0, self.yaw]
+
+
+def _moved(boxes: Floats, yaw: float) -> Floats:
+    return np.concatenate([turned(boxes[:, :3], yaw), boxes[:, 3:]], axis=1)

@@ -1,0 +1,173 @@
+"""The angular grid of firing cells, and the cells that boxes and ray bundles cover.
+
+Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is
+`row * columns + column`; row 0 is the highest elevation and column c covers the azimuths
+[-pi + c * width, -pi + (c + 1) * width).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Cells = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+AZIMUTH_MARGIN = 2
+"""Dilation of hulls and wedges, in columns (paper, Remark 2)."""
+ELEVATION_MARGIN = 1
+"""Dilation of hulls and wedges, in rows (paper, Remark 2)."""
+
+
+@dataclass(frozen=True)
+class AngularGrid:
+    """`columns` x `rows` firing cells of a rotating LiDAR.
+
+    The defaults are the grid of the paper (Remark 1): 512 columns, and the 32 rings of the
+    nuScenes sensor from +10.67 to -30.67 degrees in equal steps. `range_m` is the reach of a ray.
+    """
+
+    columns: int = 512
+    rows: int = 32
+    top: float = np.deg2rad(10.67)
+    bottom: float = np.deg2rad(-30.67)
+    range_m: float = 50.0
+
+    @property
+    def size(self) -> int:
+        """Number of cells N = A * E."""
+        return self.columns * self.rows
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns), the shape of a picture of the grid."""
+        return self.rows, self.columns
+
+    @property
+    def column_width(self) -> float:
+        """Azimuth covered by a column, radians."""
+        return 2 * np.pi / self.columns
+
+    @property
+    def row_height(self) -> float:
+        """Elevation between two rows, radians."""
+        return (self.top - self.bottom) / (self.rows - 1)
+
+    @cached_property
+    def directions(self) -> Floats:
+        """(N, 3) unit vectors of the rays, one through the centre of every cell."""
+        azimuth = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
+        elevation = np.linspace(self.top, self.bottom, self.rows)
+        el, az = np.meshgrid(elevation, azimuth, indexing="ij")
+        directions = np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=-1)
+        directions = directions.reshape(-1, 3)
+        directions.flags.writeable = False
+        return directions
+
+    def cells_of(self, directions: ArrayLike) -> Cells:
+        """The cell each direction (n, 3) falls in; -1 above the top or below the bottom row."""
+        x, y, z = np.asarray(directions, dtype=float).reshape(-1, 3).T
+        column = np.floor((np.arctan2(y, x) + np.pi) / self.column_width).astype(np.int64)
+        row = self._row(np.arctan2(z, np.hypot(x, y)))
+        inside = (row >= 0) & (row < self.rows)
+        return np.where(inside, row * self.columns + column % self.columns, -1)
+
+    def hulls(
+        self,
+        boxes: ArrayLike,
+        azimuth_margin: ArrayLike = AZIMUTH_MARGIN,
+        elevation_margin: int = ELEVATION_MARGIN,
+    ) -> list[Cells]:
+        """The dilated angular rectangle of every box, as ascending cells.
+
+        `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
+        number or one a box. A box that surrounds the sensor covers every column.
+        """
+        boxes = np.asarray(boxes, dtype=float).reshape(-1, 7)
+        if not len(boxes):
+            return []
+        corners, nearest, farthest = _footprints(boxes)
+        heading = np.arctan2(boxes[:, 1], boxes[:, 0])
+        offset = _wrap(np.arctan2(corners[..., 1], corners[..., 0]) - heading[:, None])
+        surrounds = nearest <= 0.0
+        left = np.where(surrounds, -np.pi, offset.min(axis=1))
+        right = np.where(surrounds, np.pi, offset.max(axis=1))
+        top, bottom = boxes[:, 2] + boxes[:, 5] / 2, boxes[:, 2] - boxes[:, 5] / 2
+        highest = np.arctan2(top, np.where(top > 0, nearest, farthest))
+        lowest = np.arctan2(bottom, np.where(bottom < 0, nearest, farthest))
+        return self._sectors(heading + left, heading + right, lowest, highest, azimuth_margin, elevation_margin)
+
+    def wedges(
+        self,
+        bundles: ArrayLike,
+        azimuth_margin: int = AZIMUTH_MARGIN,
+        elevation_margin: int = ELEVATION_MARGIN,
+    ) -> list[Cells]:
+        """The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
+
+        The first ray of a bundle is its middle; the others lie within half a turn of it.
+        """
+        bundles = np.asarray(bundles, dtype=float)
+        if not len(bundles):
+            return []
+        x, y, z = np.moveaxis(bundles, -1, 0)
+        azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        offset = _wrap(azimuth - azimuth[:, :1])
+        return self._sectors(
+            azimuth[:, 0] + offset.min(axis=1),
+            azimuth[:, 0] + offset.max(axis=1),
+            elevation.min(axis=1),
+            elevation.max(axis=1),
+            azimuth_margin,
+            elevation_margin,
+        )
+
+    def _row(self, elevation: Floats) -> Cells:
+        return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
+
+    def _sectors(
+        self,
+        right: Floats,
+        left: Floats,
+        lowest: Floats,
+        highest: Floats,
+        azimuth_margin: ArrayLike,
+        elevation_margin: int,
+    ) -> list[Cells]:
+        first = np.floor((right + np.pi) / self.column_width).astype(np.int64) - azimuth_margin
+        last = np.floor((left + np.pi) / self.column_width).astype(np.int64) + azimuth_margin
+        last = np.minimum(last, first + self.columns - 1)
+        upper = np.clip(self._row(highest) - elevation_margin, 0, self.rows)
+        lower = np.clip(self._row(lowest) + elevation_margin, -1, self.rows - 1)
+        bounds = zip(first.tolist(), last.tolist(), upper.tolist(), lower.tolist(), strict=True)
+        return [self._rectangle(*bound) for bound in bounds]
+
+    def _rectangle(self, first: int, last: int, upper: int, lower: int) -> Cells:
+        columns = np.sort(np.arange(first, last + 1) % self.columns)
+        rows = np.arange(upper, lower + 1)
+        return (rows[:, None] * self.columns + columns).ravel()
+
+
+def _wrap(angle: Floats) -> Floats:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+_CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) / 2
+
+
+def _footprints(boxes: Floats) -> tuple[Floats, Floats, Floats]:
+    """Ground-plane corners (n, 4, 2), and the nearest and farthest distance of each footprint."""
+    cos, sin = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
+    to_world = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+    local = _CORNERS * boxes[:, None, 3:5]
+    corners = boxes[:, None, :2] + local @ np.swapaxes(to_world, 1, 2)
+    sensor = np.einsum("nij,nj->ni", np.swapaxes(to_world, 1, 2), -boxes[:, :2])
+    outside = np.maximum(np.abs(sensor) - boxes[:, 3:5] / 2, 0.0)
+    return corners, np.hypot(*outside.T), np.hypot(corners[..., 0], corners[..., 1]).max(axis=1)
+
+
+def cell_set(cells: Sequence[int] | Cells) -> Cells:
+    """`cells` as an ascending array without repeats."""
+    return np.unique(np.asarray(cells, dtype=np.int64))

@@ -1,0 +1,115 @@
+"""One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.control import BrakingController
+from care_sim.frames import Frame
+from care_sim.grid import Cells
+from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
+from care_sim.perception.memory import TrackMemory
+from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture
+from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.lidar import LIDAR_POSITION, Lidar, LidarNoise
+from care_sim.types import Belief, Keyframe, Rig, Scan
+from care_sim.world.world import World
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """How well the car senses: everything that degrades LiDAR and camera, off by default."""
+
+    engine: str = "bullet"
+    min_returns: int = MIN_RETURNS
+    camera: CameraFaults = CameraFaults()
+    lidar: LidarNoise = LidarNoise()
+
+
+class ClosedLoop:
+    """A world, the sensors and the car's software over the keyframes of one episode."""
+
+    def __init__(
+        self, world: World, rig: Rig, sensing: Sensing, seeds: tuple[np.random.SeedSequence, np.random.SeedSequence]
+    ):
+        self.world, self.rig = world, rig
+        labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
+        self._actors = {actor.body: actor for actor in world.actors}
+        camera_rng, noise_rng = (np.random.default_rng(seed) for seed in seeds)
+        engine = ENGINES[sensing.engine](world.bullet)
+        self._lidar = Lidar(rig.grid, engine, sensing.lidar, noise_rng)
+        self._camera = CameraDetector(labels, sensing.camera, rig.keyframe_s, camera_rng)
+        self._detector = ReturnsDetector(labels, sensing.min_returns)
+        self._memory = TrackMemory(rig.keyframe_s)
+        length, width, _ = world.ego_kind.size
+        self._controller = BrakingController(
+            world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
+        )
+        self.index = 0
+        self._look(np.zeros(rig.grid.shape, np.float32))
+
+    @property
+    def sensor(self) -> Frame:
+        """Where the LiDAR is now."""
+        return Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
+
+    def keyframe(self, fired: Cells) -> Keyframe:
+        """Fire `fired`, act on what came back, and move on to the next keyframe."""
+        world, sensor, in_view = self.world, self.sensor, self._in_view()
+        index, time, speed = self.index, world.time, world.ego_motion.speed
+
+        scan, bodies = self._lidar.fire(fired, sensor)
+        detections, detected = self._detector.detect(bodies, self._local_box)
+        self._memory.update(detections, sensor)
+        command = self._controller.command(self._memory.tracks(sensor), world.ego_motion)
+
+        distance = self._distance_to_first_sighting(sensor)
+        passage = world.advance(command.acceleration, self.rig.keyframe_s)
+        self.index += 1
+        self._memory.predict()
+        self._look(self._picture_of(scan))
+
+        target = world.first_sighting
+        return Keyframe(
+            index=index,
+            time_s=time,
+            fired=fired,
+            in_view=in_view,
+            detected=target is not None and target.body in detected,
+            braking=command.braking,
+            speed_mps=speed,
+            distance_m=distance,
+            nearest_m=passage.nearest_m,
+            clearance_m=passage.clearance_m,
+            impact_speed_mps=passage.impact_speed_mps,
+        )
+
+    def _look(self, ranges: np.ndarray) -> None:
+        """Take the camera's picture and form the belief on which the next cells are chosen."""
+        sensor = self.sensor
+        self.picture = Picture.of(self.world.bullet.body_ids(self.rig.cameras[0], sensor))
+        self.belief = Belief(
+            self.world.ego_motion,
+            self.rig.budget,
+            self._camera.detect(self.picture, sensor.yaw),
+            self._memory.tracks(sensor),
+            ranges,
+        )
+
+    def _picture_of(self, scan: Scan) -> np.ndarray:
+        ranges = np.zeros(self.rig.grid.size, np.float32)
+        ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
+        return ranges.reshape(self.rig.grid.shape)
+
+    def _local_box(self, body: int) -> np.ndarray:
+        return self.sensor.boxes_to_local(self.world.box(self._actors[body])[None])[0]
+
+    def _in_view(self) -> bool:
+        target = self.world.first_sighting
+        return target is not None and self.picture.shows(target.body)
+
+    def _distance_to_first_sighting(self, sensor: Frame) -> float:
+        if self.world.first_sighting is None:
+            return float("inf")
+        x, y, _ = self.world.first_sighting.pose_at(self.world.time)
+        return float(np.hypot(x - sensor.x, y - sensor.y))

@@ -1,0 +1,104 @@
+"""Track memory: assignment by position, velocity from two frames, coasting, death, forecasts."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from care_sim.frames import Frame, turned
+from care_sim.grid import Floats
+from care_sim.types import MAX_TRACKS, Detections, Tracks
+
+_EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
+
+
+@dataclass(frozen=True)
+class MemoryRules:
+    """Association and life of a track."""
+
+    gate_m: float = 2.0
+    """Detections further than this from a forecast are another object (the paper's match distance)."""
+    first_speed_mps: float = 15.0
+    """A track seen once has no velocity: its gate grows by this much a second (54 km/h)."""
+    coast_s: float = 1.5
+    """An undetected track is forecast this long, then dropped (CenterPoint's tracker: 3 frames at 2 Hz)."""
+
+
+class TrackMemory:
+    """Tracks in the world frame, so that ego motion is compensated; sensor frame at its doors."""
+
+    def __init__(self, keyframe_s: float, rules: MemoryRules = MemoryRules()):
+        self._keyframe_s = keyframe_s
+        self._rules = rules
+        self._tracks = _EMPTY
+        self._known_velocity = np.zeros(0, bool)
+        self._next_id = 0
+
+    def tracks(self, sensor: Frame) -> Tracks:
+        """Current tracks in the sensor frame at `sensor`, nearest first, at most MAX_TRACKS.
+
+        After `predict` they are the forecasts for the coming keyframe, after `update` its estimates.
+        """
+        local = replace(
+            self._tracks,
+            boxes=sensor.boxes_to_local(self._tracks.boxes),
+            velocities=turned(self._tracks.velocities, -sensor.yaw),
+        )
+        return local.take(np.argsort(local.ranges, kind="stable")[:MAX_TRACKS])
+
+    def predict(self) -> None:
+        """Move every track one keyframe ahead at constant velocity."""
+        boxes = self._tracks.boxes.copy()
+        boxes[:, :2] += self._tracks.velocities * self._keyframe_s
+        self._tracks = replace(self._tracks, boxes=boxes)
+
+    def update(self, detections: Detections, sensor: Frame) -> None:
+        """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones."""
+        seen = sensor.boxes_to_world(detections.boxes)
+        matched, found = self._assign(detections.classes, seen)
+        self._correct(matched, seen[found])
+        self._forget()
+        new = np.setdiff1d(np.arange(len(detections)), found)
+        self._start(detections.classes[new], seen[new])
+
+    def _assign(self, classes: np.ndarray, seen: Floats) -> tuple[np.ndarray, np.ndarray]:
+        tracks = self._tracks
+        offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
+        distance = np.hypot(offset[..., 0], offset[..., 1])
+        elapsed = (tracks.misses + 1) * self._keyframe_s
+        slack = np.where(self._known_velocity, 0.0, self._rules.first_speed_mps * elapsed)
+        gate = self._rules.gate_m + slack
+        possible = (distance <= gate[:, None]) & (tracks.classes[:, None] == classes[None, :])
+        rows, columns = linear_sum_assignment(np.where(possible, distance, 1e6))
+        kept = possible[rows, columns]
+        return rows[kept], columns[kept]
+
+    def _correct(self, rows: np.ndarray, seen: Floats) -> None:
+        tracks = self._tracks
+        boxes, velocities, misses = tracks.boxes.copy(), tracks.velocities.copy(), tracks.misses + 1
+        elapsed = (misses[rows] * self._keyframe_s)[:, None]
+        last_seen = boxes[rows, :2] - velocities[rows] * elapsed
+        velocities[rows] = (seen[:, :2] - last_seen) / elapsed
+        boxes[rows], misses[rows] = seen, 0
+        self._known_velocity[rows] = True
+        self._tracks = replace(tracks, boxes=boxes, velocities=velocities, misses=misses)
+
+    def _forget(self) -> None:
+        alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
+        self._tracks = self._tracks.take(alive)
+        self._known_velocity = self._known_velocity[alive]
+
+    def _start(self, classes: np.ndarray, boxes: Floats) -> None:
+        count = len(classes)
+        ids = np.arange(self._next_id, self._next_id + count)
+        self._next_id += count
+        old = self._tracks
+        self._tracks = Tracks(
+            np.concatenate([old.ids, ids]),
+            np.concatenate([old.classes, classes]),
+            np.concatenate([old.boxes, boxes]),
+            np.concatenate([old.velocities, np.zeros((count, 2))]),
+            np.concatenate([old.misses, np.zeros(count, np.int64)]),
+        )
+        self._known_velocity = np.concatenate([self._known_velocity, np.zeros(count, bool)])
+

@@ -1,0 +1,68 @@
+"""A pinhole camera fixed to the car: pixels to directions and back.
+
+Image frame: u right, v down, in pixels, (0, 0) the outer corner of the top-left pixel. Camera
+directions are expressed in the sensor frame (x forward, y left, z up) of the LiDAR.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PinholeCamera:
+    """Intrinsics and extrinsics of one camera.
+
+    `position` is the optical centre in the sensor frame (metres); `yaw` turns the optical axis
+    about z and `pitch` raises it (radians). `horizontal_fov` in radians.
+    """
+
+    width: int = 320
+    height: int = 180
+    horizontal_fov: float = np.pi / 2
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    @property
+    def focal(self) -> float:
+        """Focal length in pixels."""
+        return self.width / 2 / np.tan(self.horizontal_fov / 2)
+
+    @cached_property
+    def axes(self) -> Floats:
+        """(3, 3): rows are forward, left and up of the camera in the sensor frame."""
+        cy, sy, cp, sp = np.cos(self.yaw), np.sin(self.yaw), np.cos(self.pitch), np.sin(self.pitch)
+        return np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
+
+    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
+        """Pixels (n, 2) and depths (n,) of sensor-frame points (n, 3).
+
+        Points at or behind the image plane have depth <= 0 and NaN pixels.
+        """
+        depth, left, up = self.axes @ (np.asarray(points, dtype=float).reshape(-1, 3) - self.position).T
+        scale = self.focal / np.where(depth > 0, depth, np.nan)
+        return np.stack([self.width / 2 - left * scale, self.height / 2 - up * scale], axis=-1), depth
+
+    def rays(self, pixels: ArrayLike) -> Floats:
+        """Directions (..., 3), not normalised, through pixels (..., 2), in the sensor frame."""
+        u, v = np.moveaxis(np.asarray(pixels, dtype=float), -1, 0)
+        left, up = (self.width / 2 - u) / self.focal, (self.height / 2 - v) / self.focal
+        return np.stack([np.ones_like(left), left, up], axis=-1) @ self.axes
+
+    def box_rays(self, boxes: ArrayLike) -> Floats:
+        """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
+
+        Centre first, then the corners (paper, Algorithm 2), then the points of the edges nearest
+        to the principal point, where azimuth and elevation of a wide box are extreme.
+        """
+        left, top, right, bottom = np.asarray(boxes, dtype=float).reshape(-1, 4).T
+        u = np.clip(self.width / 2, left, right)
+        v = np.clip(self.height / 2, top, bottom)
+        columns = [(left + right) / 2, left, left, right, right, u, u, left, right]
+        rows = [(top + bottom) / 2, top, bottom, top, bottom, top, bottom, v, v]
+        return self.rays(np.stack([np.stack(columns, -1), np.stack(rows, -1)], axis=-1))

@@ -1,0 +1,41 @@
+"""What a policy is: a Belief in, a Demand out; the shared allocator does the rest."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from care_sim.allocation import allocate, scores_of
+from care_sim.errors import InvalidInput
+from care_sim.types import Action, Belief, Demand, Observation, Rig
+
+
+class Policy(ABC):
+    """A scripted policy. Subclasses state the idea and its source, and implement `demand`.
+
+    `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction, keyframe.
+    """
+
+    name: ClassVar[str] = ""
+
+    def __init__(self, rig: Rig):
+        self.rig = rig
+
+    def reset(self) -> None:
+        """Forget the episode; called before each one."""
+
+    @abstractmethod
+    def demand(self, belief: Belief) -> Demand:
+        """What to ask of the allocator at this keyframe."""
+
+    def __call__(self, observation: Observation) -> Action:
+        """The action (E, A) of the environments for an observation.
+
+        Raises InvalidInput when `demand` names a cell that the grid does not have.
+        """
+        belief = Belief.from_observation(observation)
+        cells = allocate(self.demand(belief), belief.budget, self.rig.reserve_fraction)
+        grid = self.rig.grid
+        if np.any((cells < 0) | (cells >= grid.size)):
+            raise InvalidInput(f"policy {self.name or type(self).__name__}: cells must lie in 0..{grid.size - 1}")
+        return scores_of(cells, grid.shape)

@@ -1,0 +1,17 @@
+"""CARE: the reserve goes to camera detections that no track explains."""
+
+from care_sim.policies.base import Policy
+from care_sim.residual import camera_layers
+from care_sim.types import Belief, Demand
+
+
+class Care(Policy):
+    """The camera-residual reserve of the paper (Sec. 4.2, Algorithm 2): history plus the layer U of
+    unexplained wedges. Without a camera detection it is the history policy, cell for cell."""
+
+    name = "care"
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then the wedges of the residual."""
+        unexplained, _ = camera_layers(belief, self.rig)
+        return Demand(self.rig.grid.hulls(belief.tracks.boxes), [unexplained])

@@ -1,0 +1,24 @@
+"""The full scan: every cell, the bound that no budgeted policy can exceed."""
+
+import numpy as np
+
+from care_sim.errors import InvalidInput
+from care_sim.policies.base import Policy
+from care_sim.types import Belief, Demand, Rig
+
+
+class Full(Policy):
+    """Fires every cell. Belongs in an environment made with `budget=1.0` and refuses another."""
+
+    name = "full"
+
+    def __init__(self, rig: Rig):
+        super().__init__(rig)
+        if rig.budget != rig.grid.size:
+            raise InvalidInput(
+                f"policy full needs an environment with budget=1.0, this one fires {rig.budget} of {rig.grid.size} cells"
+            )
+
+    def demand(self, belief: Belief) -> Demand:
+        """All cells, as one reserve layer."""
+        return Demand(layers=[[np.arange(self.rig.grid.size)]])

@@ -1,0 +1,15 @@
+"""History-driven scanning: dense on the forecasts of known tracks, sparse elsewhere."""
+
+from care_sim.policies.base import Policy
+from care_sim.types import Belief, Demand
+
+
+class History(Policy):
+    """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning: the
+    exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is empty."""
+
+    name = "history"
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls of all forecasts."""
+        return Demand(self.rig.grid.hulls(belief.tracks.boxes))

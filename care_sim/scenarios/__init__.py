@@ -1,0 +1,29 @@
+"""Seeded scenarios by name. A scenario is a frozen dataclass of its physics with a `build(rng)`."""
+
+from dataclasses import fields
+
+from care_sim.errors import InvalidInput, unknown
+from care_sim.scenarios.base import Scenario
+from care_sim.scenarios.cutin import CutIn
+from care_sim.scenarios.dartout import Dartout
+from care_sim.scenarios.dense import Dense
+
+SCENARIOS: dict[str, type[Scenario]] = {"dartout": Dartout, "dense": Dense, "cutin": CutIn}
+
+
+def make_scenario(name: str, **parameters: object) -> Scenario:
+    """A scenario by name, its physics overridden by `parameters`.
+
+    Raises InvalidInput for an unknown scenario or parameter, or a value out of its domain.
+    """
+    if name not in SCENARIOS:
+        raise unknown("scenario", name, SCENARIOS)
+    kind = SCENARIOS[name]
+    known = [field.name for field in fields(kind)]
+    for parameter in parameters:
+        if parameter not in known:
+            raise unknown(f"parameter of {name}", parameter, known)
+    try:
+        return kind(**parameters)  # type: ignore[arg-type]
+    except TypeError as error:
+        raise InvalidInput(f"{name}: {error}") from error

@@ -1,0 +1,46 @@
+"""What the scenarios share: the street, and ranges that a seed draws from."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.world import World
+
+Range = tuple[float, float]
+
+SPEED_LIMIT_MPS = 30 / 3.6
+"""All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
+EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
+"""30 km/h, give or take the 1 km/h by which a driver's speed varies."""
+LANE_WIDTH_M = 3.5
+PARKING_WIDTH_M = 2.5
+"""Traffic lanes, and parking lanes that lorries may use (German RASt 06)."""
+RIGHT_PARKING_Y = -(LANE_WIDTH_M + PARKING_WIDTH_M) / 2
+LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
+"""Middle of the parking lanes of a two-lane street, from the middle of the ego's lane."""
+
+
+@dataclass(frozen=True)
+class Scenario(ABC):
+    """The physics of a scenario; a seeded generator places and times what its ranges leave open."""
+
+    duration_s: float = 6.0
+
+    @abstractmethod
+    def build(self, rng: np.random.Generator) -> World:
+        """A fresh world at time zero. The caller closes it."""
+
+
+def draw(rng: np.random.Generator, values: Range) -> float:
+    """A uniform draw from a range (low, high)."""
+    return float(rng.uniform(*values))
+
+
+def line_with_buildings(world: World, right_y: float, left_y: float, starts: float, ends: float) -> None:
+    """Closed building fronts at y = `right_y` and y = `left_y`, from `starts` to `ends` along x."""
+    length, depth, _ = CATALOGUE["building"].size
+    for number, x in enumerate(np.arange(starts + length / 2, ends, length).tolist()):
+        world.add(f"building {number} right", "building", (x, right_y - depth / 2, 0.0))
+        world.add(f"building {number} left", "building", (x, left_y + depth / 2, 0.0))

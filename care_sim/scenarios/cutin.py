@@ -1,0 +1,62 @@
+"""Cut-in: a car pulls out into the ego's lane from in front of a standing bus."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.errors import unknown
+from care_sim.scenarios.base import (
+    EGO_SPEED_MPS,
+    LANE_WIDTH_M,
+    SPEED_LIMIT_MPS,
+    Range,
+    Scenario,
+    draw,
+    line_with_buildings,
+)
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.traffic import Traffic
+from care_sim.world.world import World
+
+OCCLUDERS = ("bus", "trailer")
+
+
+@dataclass(frozen=True)
+class CutIn(Scenario):
+    """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the right
+    lane; a car standing hidden before it pulls out (highway-env lane change, IDM) ahead of the ego.
+
+    The bus is one of the five reported classes; `occluder="trailer"` is not. Ranges are drawn uniformly
+    by the seed.
+    """
+
+    occluder: str = "bus"
+    ego_speed_mps: Range = EGO_SPEED_MPS
+    stop_m: Range = (42.0, 46.0)
+    """From the ego's first position to the front of the bus: far enough for the bus to hide the car."""
+    gap_m: Range = (2.0, 3.0)
+    """Between bus and car, as behind a bus that has closed up at its stop."""
+    pull_out_s: Range = (2.0, 2.5)
+    """Time gap of the ego to the car's rear when it pulls out. UN Regulation 157 (5.2.5.2) counts a
+    cut-in at this closing speed as avoidable down to about 1 s."""
+
+    def __post_init__(self) -> None:
+        if self.occluder not in OCCLUDERS:
+            raise unknown("occluder", self.occluder, OCCLUDERS)
+
+    def build(self, rng: np.random.Generator) -> World:
+        """A fresh world at time zero."""
+        ego_speed, stop_x = draw(rng, self.ego_speed_mps), draw(rng, self.stop_m)
+        traffic = Traffic((1, 1), ego_lane=1, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
+        world = World(traffic, ego_speed)
+        occluder, car = CATALOGUE[self.occluder], CATALOGUE["car"]
+        world.add("occluder", self.occluder, (stop_x - occluder.size[0] / 2, -LANE_WIDTH_M, 0.0))
+
+        rear_x = stop_x + draw(rng, self.gap_m)
+        driver = traffic.add_parked_driver(rear_x + car.size[0] / 2, -1, car, SPEED_LIMIT_MPS)
+        world.first_sighting = world.add("cutting-in car", "car", driver)
+        arrival = (rear_x - world.ego_kind.size[0] / 2) / ego_speed
+        world.at(arrival - draw(rng, self.pull_out_s), lambda: driver.pull_out(0))
+
+        line_with_buildings(world, -LANE_WIDTH_M - 6.0, LANE_WIDTH_M + 3.0, -20.0, 110.0)
+        return world

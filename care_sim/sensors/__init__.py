@@ -1,0 +1,1 @@
+"""LiDAR and camera: what of the world reaches perception."""

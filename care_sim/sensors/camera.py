@@ -1,0 +1,125 @@
+"""A ground-truth camera: boxes read off the visible pixels, with injectable misses and latency."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from care_sim.errors import InvalidInput, check_rate
+from care_sim.grid import Floats
+from care_sim.pinhole import PinholeCamera
+from care_sim.types import ImageDetections
+from care_sim.world.bullet import Integers
+
+CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
+"""Metres in the sensor frame: CAM_FRONT of nuScenes stands this far before and below LIDAR_TOP."""
+CAMERA_HEIGHT = 180
+CAMERA_WIDTH = 320
+FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
+"""90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
+
+MIN_PIXELS = 12
+"""Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360, and
+an unoccluded adult at about 45 m."""
+FULL_CONFIDENCE = 3 * MIN_PIXELS
+"""Visible pixels at which n / (n + FULL_CONFIDENCE) is one half; the least box then has confidence
+0.25, the detector threshold of the paper."""
+
+
+@dataclass(frozen=True)
+class CameraFaults:
+    """`false_negative_rate` per detection and frame, `latency` in whole keyframes."""
+
+    false_negative_rate: float = 0.0
+    latency: int = 0
+
+    def __post_init__(self) -> None:
+        check_rate("false_negative_rate", self.false_negative_rate)
+        if self.latency < 0 or self.latency != int(self.latency):
+            raise InvalidInput(f"camera_latency must be a whole number of keyframes >= 0, got {self.latency}")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What the unimpaired camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,) visible."""
+
+    bodies: Integers
+    boxes: Floats
+    pixels: Integers
+
+    @classmethod
+    def of(cls, ids: Integers) -> "Picture":
+        """Read the box of every body off a picture of ids (height, width)."""
+        found = ndimage.find_objects(ids + 1)
+        visible = np.bincount((ids + 1).ravel())
+        rows = [
+            (body, s[1].start, s[0].start, s[1].stop, s[0].stop, visible[body + 1])
+            for body, s in enumerate(found, start=0)
+            if s is not None
+        ]
+        table = np.array(rows, dtype=np.int64).reshape(-1, 6)
+        return cls(table[:, 0], table[:, 1:5].astype(float), table[:, 5])
+
+    def shows(self, body: int) -> bool:
+        """Whether enough of a body is visible for a box."""
+        return bool(np.any((self.bodies == body) & (self.pixels >= MIN_PIXELS)))
+
+
+class CameraDetector:
+    """Turns pictures into detections: knows the classes of the reported bodies, misses some, is late.
+
+    Misses are drawn for every body in every frame, seen or not, so that every policy meets the same
+    ones. `labels` maps body ids to classes; bodies that it does not hold are not detected.
+    """
+
+    def __init__(self, labels: Mapping[int, int], faults: CameraFaults, keyframe_s: float, rng: np.random.Generator):
+        self._labels = labels
+        self._faults = faults
+        self._keyframe_s = keyframe_s
+        self._rng = rng
+        self._frames: deque[tuple[ImageDetections, float]] = deque(maxlen=faults.latency + 1)
+
+    def detect(self, picture: Picture, heading: float) -> ImageDetections:
+        """The newest detections that are due, `picture` being the latest one taken at `heading`."""
+        self._frames.append((self._look(picture), heading))
+        if len(self._frames) <= self._faults.latency:
+            return _NOTHING_SEEN
+        detections, heading_then = self._frames[0]
+        age = self._faults.latency * self._keyframe_s
+        return replace(
+            detections,
+            ages=np.full(len(detections), age),
+            yaw_changes=np.full(len(detections), heading - heading_then),
+        )
+
+    def _look(self, picture: Picture) -> ImageDetections:
+        draws = self._rng.random(len(self._labels))
+        missed = {
+            body
+            for body, draw in zip(self._labels, draws, strict=True)
+            if draw < self._faults.false_negative_rate
+        }
+        seen = np.array(
+            [
+                pixels >= MIN_PIXELS and body in self._labels and body not in missed
+                for body, pixels in zip(picture.bodies.tolist(), picture.pixels.tolist(), strict=True)
+            ],
+            dtype=bool,
+        )
+        pixels, boxes = picture.pixels[seen], picture.boxes[seen]
+        order = np.argsort(boxes[:, 0], kind="stable")
+        classes = np.array([self._labels[body] for body in picture.bodies[seen].tolist()], dtype=np.int64)
+        zeros = np.zeros(len(classes))
+        return ImageDetections(
+            classes[order],
+            (pixels / (pixels + FULL_CONFIDENCE))[order],
+            boxes[order],
+            zeros.astype(np.int64),
+            zeros,
+            zeros,
+        )
+
+
+_NOTHING_SEEN = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))

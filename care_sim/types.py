@@ -1,0 +1,246 @@
+"""What the stages of a keyframe exchange.
+
+Frames: sensor frame x forward, y left, z up; metres, seconds, radians. A box is (7,): centre x, y,
+z, length, width, height, yaw. Velocities are over ground, in sensor axes. Nothing here carries a
+body id of the simulator: truth stays in the world and in the scoring.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.grid import AngularGrid, Cells, Floats
+from care_sim.pinhole import PinholeCamera
+
+CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
+"""The five driving classes shared by both detectors and the scoring (paper, Sec. 5.1)."""
+
+MAX_DETECTIONS = 64
+MAX_TRACKS = 64
+
+Observation = Mapping[str, NDArray[np.float32]]
+Action = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Ego:
+    """The car's own motion: speed m/s, yaw rate rad/s, acceleration m/s^2."""
+
+    speed: float = 0.0
+    yaw_rate: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True)
+class Detections:
+    """3D detections of one keyframe: `classes` (n,), `boxes` (n, 7), `returns` (n,) fired rays that hit."""
+
+    classes: Cells
+    boxes: Floats
+    returns: Cells
+
+    def __len__(self) -> int:
+        return len(self.classes)
+
+
+@dataclass(frozen=True)
+class ImageDetections:
+    """2D camera detections as columns of one table; `len()` is their number n.
+
+    `classes` (n,), `confidences` (n,), `boxes` (n, 4: left, top, right, bottom in pixels),
+    `cameras` (n,) index into `Rig.cameras`, `ages` (n,) seconds since the picture was taken and
+    `yaw_changes` (n,) how far the car has turned since.
+    """
+
+    classes: Cells
+    confidences: Floats
+    boxes: Floats
+    cameras: Cells
+    ages: Floats
+    yaw_changes: Floats
+
+    COLUMNS = ("class", "confidence", "left", "top", "right", "bottom", "camera", "age", "yaw_change")
+
+    def __len__(self) -> int:
+        return len(self.classes)
+
+    @classmethod
+    def from_rows(cls, rows: NDArray[np.floating]) -> "ImageDetections":
+        """Read rows in the order of `COLUMNS`; rows of class -1 are padding."""
+        rows = rows[rows[:, 0] >= 0].astype(float)
+        integers = rows[:, [0, 6]].astype(np.int64)
+        return cls(integers[:, 0], rows[:, 1], rows[:, 2:6], integers[:, 1], rows[:, 7], rows[:, 8])
+
+    def rows(self) -> Floats:
+        """(n, 9) table in the order of `COLUMNS`."""
+        return np.column_stack(
+            [self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes]
+        )
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Tracked objects as columns of one table; `len()` is their number n.
+
+    `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
+    `misses` (n,) keyframes since the object was last detected.
+    """
+
+    ids: Cells
+    classes: Cells
+    boxes: Floats
+    velocities: Floats
+    misses: Cells
+
+    COLUMNS = ("id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses")
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def ranges(self) -> Floats:
+        """(n,) planar distance of the centres from the sensor."""
+        return np.hypot(self.boxes[:, 0], self.boxes[:, 1])
+
+    @classmethod
+    def from_rows(cls, rows: NDArray[np.floating]) -> "Tracks":
+        """Read rows in the order of `COLUMNS`; rows of id -1 are padding."""
+        rows = rows[rows[:, 0] >= 0].astype(float)
+        integers = rows[:, [0, 1, 11]].astype(np.int64)
+        return cls(integers[:, 0], integers[:, 1], rows[:, 2:9], rows[:, 9:11], integers[:, 2])
+
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
+        """Some of the tracks, by index or mask."""
+        columns = (self.ids, self.classes, self.boxes, self.velocities, self.misses)
+        return Tracks(*(column[rows] for column in columns))
+
+    def rows(self) -> Floats:
+        """(n, 12) table in the order of `COLUMNS`."""
+        return np.column_stack([self.ids, self.classes, self.boxes, self.velocities, self.misses])
+
+
+@dataclass(frozen=True)
+class Belief:
+    """All a policy may know when it chooses: what Gymnasium shows, and nothing else.
+
+    `budget` is B, the number of cells that may fire; `detections` are the camera's, `tracks` the
+    forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return.
+    """
+
+    ego: Ego
+    budget: int
+    detections: ImageDetections
+    tracks: Tracks
+    ranges: NDArray[np.float32]
+
+    @classmethod
+    def from_observation(cls, observation: Observation) -> "Belief":
+        """Read an observation of the environments back, without loss."""
+        ranges = observation["ranges"]
+        speed, yaw_rate, acceleration = (float(value) for value in observation["ego"])
+        return cls(
+            Ego(speed, yaw_rate, acceleration),
+            round(float(observation["budget"][0]) * ranges.size),
+            ImageDetections.from_rows(observation["detections"]),
+            Tracks.from_rows(observation["tracks"]),
+            ranges,
+        )
+
+    def to_observation(self) -> dict[str, NDArray[np.float32]]:
+        """The fixed-shape float32 arrays of the environments' observation space."""
+        ego = np.array([self.ego.speed, self.ego.yaw_rate, self.ego.acceleration], np.float32)
+        return {
+            "ego": ego,
+            "budget": np.array([self.budget / self.ranges.size], np.float32),
+            "detections": _padded(self.detections.rows(), MAX_DETECTIONS),
+            "tracks": _padded(self.tracks.rows(), MAX_TRACKS),
+            "ranges": self.ranges,
+        }
+
+
+def _padded(rows: Floats, length: int) -> NDArray[np.float32]:
+    table = np.zeros((length, rows.shape[1]), np.float32)
+    table[:, 0] = -1
+    table[: len(rows)] = rows[:length]
+    return table
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a policy asks of the allocator (Algorithm 1).
+
+    `exploitation` are sets of cells, nearest object first; `layers` are the reserve layers in order
+    of priority, each a sequence of sets of cells.
+    """
+
+    exploitation: Sequence[Cells] = ()
+    layers: Sequence[Sequence[Cells]] = ()
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Returns of the fired cells: `cells` (n,) ascending and `ranges` (n,) in metres, inf without return."""
+
+    cells: Cells
+    ranges: Floats
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What is fixed about the sensing task and known to a policy in advance.
+
+    `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` the time between
+    two decisions.
+    """
+
+    grid: AngularGrid = field(default_factory=AngularGrid)
+    cameras: tuple[PinholeCamera, ...] = ()
+    budget: int = 1638
+    reserve_fraction: float = 0.3
+    keyframe_s: float = 0.1
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the controller asks of the car: acceleration in m/s^2 and whether the brake is on."""
+
+    acceleration: float
+    braking: bool
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """The record of one keyframe, from which every metric is computed. Scoring only: it holds truth.
+
+    `in_view`: the unimpaired camera shows the first-sighting actor; `detected`: the detector reported
+    it. `distance_m`: planar, sensor to its centre, at the scan. The rest holds for the time until the
+    next keyframe: `nearest_m` (centre to centre) and `clearance_m` (hull to hull) at their smallest,
+    `impact_speed_mps` the car's speed at its first contact with any body, else None.
+    """
+
+    index: int
+    time_s: float
+    fired: Cells
+    in_view: bool
+    detected: bool
+    braking: bool
+    speed_mps: float
+    distance_m: float
+    nearest_m: float
+    clearance_m: float
+    impact_speed_mps: float | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of an episode; see `care_sim.evaluation.metrics.outcome` for the definitions."""
+
+    detection_distance_m: float | None
+    braked: bool
+    min_distance_m: float | None
+    clearance_m: float | None
+    collision: bool
+    impact_speed_mps: float | None
+    rays_fired: int

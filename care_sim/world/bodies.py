@@ -1,0 +1,120 @@
+"""The catalogue of bodies: what each looks like, how large it is, and where the size comes from.
+
+Body frame: x forward, y left, z up, origin on the ground under the centre. Sizes are length, width,
+height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as
+published with the anchors of Zhu et al., "Class-balanced Grouping and Sampling" (arXiv:1908.09492).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One primitive of a compound: full extents `size` (for a cylinder or sphere its bounding box)."""
+
+    shape: Literal["box", "cylinder", "sphere"]
+    size: Triple
+    centre: Triple
+    colour: Triple
+
+
+@dataclass(frozen=True)
+class BodyKind:
+    """A kind of body. `label` is its class name, or None where the five classes do not hold it."""
+
+    name: str
+    label: str | None
+    size: Triple
+    parts: tuple[Part, ...]
+
+
+TYRE, GLASS = (0.08, 0.08, 0.09), (0.25, 0.32, 0.38)
+
+
+def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], colour: Triple) -> Part:
+    extents = (x, y, z)
+    size = tuple(high - low for low, high in extents)
+    centre = tuple((high + low) / 2 for low, high in extents)
+    return Part("box", size, centre, colour)  # type: ignore[arg-type]
+
+
+def _two_box(name: str, label: str, size: Triple, waist: float, cabin: tuple[float, float], colour: Triple) -> BodyKind:
+    """A passenger vehicle: full-length body up to `waist`, cabin between two shares of the length."""
+    length, width, height = size
+    half, side = length / 2, width / 2
+    body = _box((-half, half), (-side, side), (0.0, waist), colour)
+    ends = (-half + cabin[0] * length, -half + cabin[1] * length)
+    return BodyKind(name, label, size, (body, _box(ends, (0.1 - side, side - 0.1), (waist, height), GLASS)))
+
+
+def _lorry(name: str, label: str | None, size: Triple, cab: float, cab_height: float, colour: Triple) -> BodyKind:
+    """Cab in front (length `cab`) and a box behind it, both down to the ground (side skirts)."""
+    length, width, height = size
+    half, side = length / 2, width / 2
+    box = _box((-half, half - cab - 0.1), (-side, side), (0.0, height), (0.82, 0.82, 0.8))
+    front = _box((half - cab, half), (0.1 - side, side - 0.1), (0.0, cab_height), colour)
+    return BodyKind(name, label, size, (box, front))
+
+
+def _block(name: str, label: str | None, size: Triple, colour: Triple) -> BodyKind:
+    length, width, height = size
+    half, side = length / 2, width / 2
+    return BodyKind(name, label, size, (_box((-half, half), (-side, side), (0.0, height), colour),))
+
+
+def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
+    """Two legs one stride apart, torso and head, in the proportions of an adult: hip at 0.47 of the
+    height and chin at 0.87 (Drillis and Contini 1966, body segment lengths)."""
+    length, width, height = size
+    hip, chin = 0.47 * height, 0.87 * height
+    leg = 0.16
+    legs = [
+        Part("cylinder", (leg, leg, hip), (sign * (length - leg) / 2, -sign * width / 5, hip / 2), (0.15, 0.17, 0.3))
+        for sign in (1, -1)
+    ]
+    torso = Part("box", (0.6 * length, width, chin - hip), (0.0, 0.0, (hip + chin) / 2), colour)
+    head = Part("sphere", (height - chin,) * 3, (0.0, 0.0, (chin + height) / 2), (0.9, 0.72, 0.6))
+    return BodyKind(name, "pedestrian", size, (*legs, torso, head))
+
+
+def _cyclist(name: str, size: Triple) -> BodyKind:
+    length, width, height = size
+    radius = 0.34
+    wheels = [
+        _box((x - radius, x + radius), (-0.03, 0.03), (0.0, 2 * radius), TYRE)
+        for x in (length / 2 - radius, radius - length / 2)
+    ]
+    rider = _box((-0.25, 0.2), (-width / 2, width / 2), (2 * radius, height), (0.1, 0.5, 0.3))
+    return BodyKind(name, "bicycle", size, (*wheels, rider))
+
+
+CATALOGUE = {
+    kind.name: kind
+    for kind in (
+        _two_box("car", "car", (4.61, 1.95, 1.72), 0.95, (0.18, 0.72), (0.15, 0.3, 0.65)),
+        # Class-N1 panel van, reported as a truck: ISO-typical 5.5 x 2.0 x 2.4 (e.g. VW T6.1 high roof).
+        _two_box("van", "truck", (5.30, 1.90, 2.40), 2.00, (0.0, 0.85), (0.85, 0.85, 0.88)),
+        _lorry("truck", "truck", (6.74, 2.46, 2.73), 1.7, 2.3, (0.75, 0.2, 0.15)),
+        _block("bus", "bus", (11.19, 2.94, 3.47), (0.9, 0.75, 0.1)),
+        _cyclist("bicycle", (1.68, 0.60, 1.27)),
+        _person("pedestrian", (0.73, 0.66, 1.76), (0.85, 0.15, 0.2)),
+        # Bodies that the five reported classes do not hold.
+        _block("trailer", None, (12.01, 2.50, 3.82), (0.55, 0.57, 0.6)),
+        # Site hoarding: 2.4 m panels, as required for full-height hoardings by UK HSE HSG151.
+        _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3)),
+        _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
+        # The recording car of nuScenes, a Renault Zoe: 4.08 x 1.73 x 1.56 (manufacturer's data sheet).
+        BodyKind(
+            "ego",
+            None,
+            (4.08, 1.73, 1.56),
+            (
+                _box((-2.04, 2.04), (-0.865, 0.865), (0.0, 0.85), (0.9, 0.9, 0.92)),
+                _box((-1.7, 0.25), (-0.765, 0.765), (0.85, 1.56), GLASS),
+            ),
+        ),
+    )
+}

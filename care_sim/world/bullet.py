@@ -1,0 +1,126 @@
+"""The one owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from care_sim.frames import Frame, Pose, turned
+from care_sim.pinhole import PinholeCamera
+from care_sim.world.bodies import BodyKind, Part
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+NOTHING = -1
+RAYS_A_CALL = 8192
+"""`rayTestBatch` returns nothing, silently, for a batch of 16,384 rays or more."""
+
+_SHAPES = {"box": pybullet.GEOM_BOX, "cylinder": pybullet.GEOM_CYLINDER, "sphere": pybullet.GEOM_SPHERE}
+_OPAQUE, _TRANSPARENT = 1, 2
+_IDS_AND_LINKS = pybullet.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX
+_NEAR_M, _FAR_M = 0.1, 120.0
+
+
+class BulletWorld:
+    """Bodies standing on a ground plane, in one DIRECT client. Not to be shared between processes."""
+
+    def __init__(self) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        self.ground = pybullet.createMultiBody(0, plane, physicsClientId=self._client)
+
+    def close(self) -> None:
+        """Free the client; calling it again does nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    def add(self, kind: BodyKind, pose: Pose, *, transparent: bool = False) -> int:
+        """Place a body and return its id. A `transparent` one is not hit by rays."""
+        body = pybullet.createMultiBody(
+            0,
+            pybullet.createCollisionShapeArray(physicsClientId=self._client, **_collision(kind.parts)),
+            pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(kind.parts)),
+            physicsClientId=self._client,
+        )
+        group = _TRANSPARENT if transparent else _OPAQUE
+        pybullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=self._client)
+        self.move(body, pose)
+        return int(body)
+
+    def move(self, body: int, pose: Pose) -> None:
+        """Put a body at a pose."""
+        x, y, yaw = pose
+        turn = (0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
+        pybullet.resetBasePositionAndOrientation(body, (x, y, 0.0), turn, physicsClientId=self._client)
+
+    def cast(self, origin: Sequence[float], directions: Floats, reach: float) -> tuple[Floats, Integers]:
+        """Cast rays (n, 3 unit vectors, world frame) from `origin`.
+
+        Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NOTHING there.
+        """
+        targets = np.asarray(origin) + directions * reach
+        hits: list[tuple] = []
+        for start in range(0, len(targets), RAYS_A_CALL):
+            batch = targets[start : start + RAYS_A_CALL]
+            sources = np.broadcast_to(origin, batch.shape)
+            hits += pybullet.rayTestBatch(
+                sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client
+            )
+        if len(hits) != len(targets):
+            raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
+        ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
+        shares = np.fromiter((hit[2] for hit in hits), np.float64, len(hits))
+        return np.where(ids == NOTHING, np.inf, shares * reach), ids
+
+    def body_ids(self, camera: PinholeCamera, sensor: Frame) -> Integers:
+        """(height, width) id of the body each pixel of `camera` shows, NOTHING for the sky.
+
+        The camera is mounted in the frame `sensor`.
+        """
+        picture = self._picture(camera, sensor)
+        ids = np.asarray(picture[4]).reshape(camera.height, camera.width)
+        return np.where(ids < 0, NOTHING, ids & ((1 << 24) - 1))
+
+    def colours(self, camera: PinholeCamera, sensor: Frame) -> NDArray[np.uint8]:
+        """(height, width, 3) rendered picture of the same view as `body_ids`."""
+        picture = self._picture(camera, sensor)
+        return np.asarray(picture[2], np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
+
+    def clearance(self, body: int, other: int, within: float = 100.0) -> float:
+        """Smallest distance between two hulls, metres; negative when they overlap, inf beyond `within`."""
+        points = pybullet.getClosestPoints(body, other, within, physicsClientId=self._client)
+        return float(min((point[8] for point in points), default=np.inf))
+
+    def _picture(self, camera: PinholeCamera, sensor: Frame) -> tuple:
+        eye = sensor.origin + turned(np.array(camera.position), sensor.yaw)
+        forward, _, up = turned(camera.axes, sensor.yaw)
+        vertical = 2 * np.degrees(np.arctan(camera.height / 2 / camera.focal))
+        return pybullet.getCameraImage(
+            camera.width,
+            camera.height,
+            pybullet.computeViewMatrix(eye, eye + forward, up),
+            pybullet.computeProjectionMatrixFOV(vertical, camera.width / camera.height, _NEAR_M, _FAR_M),
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            flags=_IDS_AND_LINKS,
+            physicsClientId=self._client,
+        )
+
+
+def _collision(parts: Sequence[Part]) -> dict:
+    return {
+        "shapeTypes": [_SHAPES[part.shape] for part in parts],
+        "halfExtents": [[extent / 2 for extent in part.size] for part in parts],
+        "radii": [part.size[0] / 2 for part in parts],
+        "lengths": [part.size[2] for part in parts],
+        "collisionFramePositions": [part.centre for part in parts],
+    }
+
+
+def _visual(parts: Sequence[Part]) -> dict:
+    shapes = _collision(parts)
+    shapes["visualFramePositions"] = shapes.pop("collisionFramePositions")
+    shapes["rgbaColors"] = [(*part.colour, 1.0) for part in parts]
+    return shapes

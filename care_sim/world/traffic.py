@@ -1,0 +1,120 @@
+"""Road, ego kinematics and traffic of highway-env, seen in a z-up world.
+
+highway-env's y axis points down in its pictures; here y points left, so y and headings change sign
+at this border and nowhere else. Lane 0 is the ego's; lanes are numbered to the left, negative to the
+right.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from highway_env.road.lane import StraightLane
+from highway_env.road.road import Road, RoadNetwork
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from care_sim.frames import Pose
+from care_sim.world.bodies import BodyKind
+
+_ROAD_LENGTH_M = 1000.0
+
+
+class Traffic:
+    """A straight road and the vehicles that drive on it.
+
+    `directions` gives one entry a lane from right to left: +1 along the ego, -1 oncoming;
+    `ego_lane` is the index of the ego's lane in it.
+    """
+
+    def __init__(self, directions: Sequence[int], ego_lane: int, lane_width: float, speed_limit: float):
+        network = RoadNetwork()
+        self._lanes: list[tuple[str, str, int]] = []
+        counts = {1: 0, -1: 0}
+        for number, direction in enumerate(directions):
+            y = -(number - ego_lane) * lane_width
+            ends = ([-_ROAD_LENGTH_M, y], [_ROAD_LENGTH_M, y])
+            start, end = ends if direction > 0 else ends[::-1]
+            nodes = ("a", "b") if direction > 0 else ("b", "a")
+            network.add_lane(*nodes, StraightLane(start, end, width=lane_width, speed_limit=speed_limit))
+            self._lanes.append((*nodes, counts[direction]))
+            counts[direction] += 1
+        self._ego_lane = ego_lane
+        self._road = Road(network, np_random=np.random.RandomState(0))
+
+    def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
+        """The car that carries the sensors, in lane 0 at `x`, driven by `RoadVehicle.accelerate`."""
+        vehicle = self._make(Vehicle, x, 0, speed, kind)
+        vehicle.enter()
+        return vehicle
+
+    def add_driver(self, x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
+        """A vehicle that keeps its lane and follows the intelligent driver model (IDM) at `speed`."""
+        vehicle = self._make(IDMVehicle, x, lane, speed, kind)
+        vehicle.enter()
+        return vehicle
+
+    def add_parked_driver(self, x: float, lane: int, kind: BodyKind, target_speed: float) -> "RoadVehicle":
+        """An IDM driver who stands in `lane` until told to `pull_out`, and then wants `target_speed`."""
+        vehicle = self._make(IDMVehicle, x, lane, target_speed, kind)
+        vehicle.stand()
+        return vehicle
+
+    def lane_key(self, lane: int) -> tuple[str, str, int]:
+        """highway-env's index of a lane."""
+        return self._lanes[self._ego_lane + lane]
+
+    def join(self, vehicle: Vehicle) -> None:
+        """Put a vehicle on the road."""
+        self._road.vehicles.append(vehicle)
+
+    def step(self, dt: float) -> None:
+        """Let every driver decide, then move everything by `dt` seconds."""
+        self._road.act()
+        self._road.step(dt)
+
+    def _make(self, model: type[Vehicle], x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
+        key = self.lane_key(lane)
+        road_lane = self._road.network.get_lane(key)
+        along = float(road_lane.local_coordinates(np.array([x, road_lane.start[1]]))[0])
+        vehicle = model.make_on_lane(self._road, key, along, speed)
+        vehicle.LENGTH, vehicle.WIDTH = kind.size[:2]
+        vehicle.check_collisions = vehicle.collidable = False
+        vehicle.enable_lane_change = False
+        return RoadVehicle(vehicle, self)
+
+
+class RoadVehicle:
+    """One vehicle on the road, in the world frame."""
+
+    def __init__(self, vehicle: Vehicle, traffic: Traffic):
+        self._vehicle = vehicle
+        self._traffic = traffic
+
+    @property
+    def pose(self) -> Pose:
+        """x, y, heading."""
+        x, y = self._vehicle.position
+        return float(x), -float(y), -float(self._vehicle.heading)
+
+    @property
+    def speed(self) -> float:
+        """m/s along the heading."""
+        return float(self._vehicle.speed)
+
+    def enter(self) -> None:
+        """Join the traffic: from now on the vehicle moves, and others see it."""
+        self._traffic.join(self._vehicle)
+
+    def stand(self) -> None:
+        """Lose all speed at once."""
+        self._vehicle.speed = 0.0
+
+    def accelerate(self, acceleration: float, dt: float) -> None:
+        """Hold an acceleration (m/s^2) for the next step of `dt` seconds; a car at rest does not reverse."""
+        held = max(acceleration, -self.speed / dt)
+        self._vehicle.act({"acceleration": held, "steering": 0.0})
+
+    def pull_out(self, lane: int) -> None:
+        """Join the traffic and change over to `lane`."""
+        self._vehicle.target_lane_index = self._traffic.lane_key(lane)
+        self.enter()

@@ -1,0 +1,49 @@
+"""A person on foot: waits, then runs straight until the way is done."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from care_sim.frames import Pose
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A straight walk: from `start` (x, y) along `heading` for `length_m`, setting off at `starts_s`.
+
+    The person gains speed at `acceleration` until `speed`. Metres, seconds, world frame.
+    """
+
+    start: tuple[float, float]
+    heading: float
+    speed: float
+    acceleration: float
+    length_m: float
+    starts_s: float = 0.0
+
+    def setting_off(self, time: float) -> "Walk":
+        """The same walk, begun at `time`."""
+        return replace(self, starts_s=time)
+
+    def covered(self, time: float) -> float:
+        """Metres covered at `time`."""
+        moving = max(time - self.starts_s, 0.0)
+        gaining = min(moving, self.speed / self.acceleration)
+        distance = self.acceleration * gaining**2 / 2 + self.speed * (moving - gaining)
+        return min(distance, self.length_m)
+
+    def duration_to(self, distance: float) -> float:
+        """Seconds from setting off until `distance` metres are covered."""
+        run_up = self.speed**2 / (2 * self.acceleration)
+        if distance <= run_up:
+            return float(np.sqrt(2 * distance / self.acceleration))
+        return self.speed / self.acceleration + (distance - run_up) / self.speed
+
+    def pose(self, time: float) -> Pose:
+        """Pose at `time`."""
+        way = self.covered(time)
+        return (
+            self.start[0] + way * float(np.cos(self.heading)),
+            self.start[1] + way * float(np.sin(self.heading)),
+            self.heading,
+        )

@@ -1,0 +1,143 @@
+"""The world of one episode: every body, who moves it, and what the scoring reads off it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.errors import InvalidInput
+from care_sim.frames import Pose
+from care_sim.grid import Floats
+from care_sim.types import CLASSES, Ego
+from care_sim.world.bodies import CATALOGUE, BodyKind
+from care_sim.world.bullet import BulletWorld
+from care_sim.world.traffic import RoadVehicle, Traffic
+
+STEP_S = 0.05
+"""World step. Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A body with a pose at any time. `reported` says whether perception knows its class."""
+
+    name: str
+    kind: BodyKind
+    body: int
+    pose_at: Callable[[float], Pose]
+    reported: bool
+
+    @property
+    def label(self) -> int | None:
+        """Index into CLASSES, None when perception does not report it."""
+        return CLASSES.index(self.kind.label) if self.reported and self.kind.label else None
+
+
+@dataclass(frozen=True)
+class Passage:
+    """How close the ego came to the first-sighting actor while the world advanced.
+
+    `nearest_m` centre to centre and `clearance_m` hull to hull; `impact_speed_mps` is the ego's speed
+    at its first contact with any body, else None.
+    """
+
+    nearest_m: float
+    clearance_m: float
+    impact_speed_mps: float | None
+
+
+class World:
+    """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
+
+    World frame: x along the road, y left, z up; the ego starts with its centre at the origin.
+    """
+
+    def __init__(self, traffic: Traffic, ego_speed: float):
+        self.bullet = BulletWorld()
+        self.traffic = traffic
+        self.time = 0.0
+        self.actors: list[Actor] = []
+        self.ego_kind = CATALOGUE["ego"]
+        self.ego = traffic.add_ego(0.0, ego_speed, self.ego_kind)
+        self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
+        self.first_sighting: Actor | None = None
+        self._events: list[tuple[float, Callable[[], None]]] = []
+        self._motion = Ego(ego_speed)
+        self._steps = 0
+
+    def add(
+        self, name: str, kind: str, pose: Pose | Callable[[float], Pose] | RoadVehicle, *, reported: bool = True
+    ) -> Actor:
+        """Add a body that stands at a pose, follows a function of time, or drives in the traffic."""
+        pose_at: Callable[[float], Pose]
+        if isinstance(pose, RoadVehicle):
+            vehicle = pose
+            pose_at = lambda _time: vehicle.pose  # noqa: E731
+        elif callable(pose):
+            pose_at = pose
+        else:
+            fixed = pose
+            pose_at = lambda _time: fixed  # noqa: E731
+        body = self.bullet.add(CATALOGUE[kind], pose_at(0.0))
+        actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
+        self.actors.append(actor)
+        return actor
+
+    def at(self, time: float, event: Callable[[], None]) -> None:
+        """Call `event` once, at the first world step at or after `time`."""
+        self._events.append((time, event))
+
+    @property
+    def ego_motion(self) -> Ego:
+        """The car's own motion, as its odometry reports it."""
+        return self._motion
+
+    def box(self, actor: Actor) -> Floats:
+        """(7,) box of an actor in the world frame."""
+        x, y, yaw = actor.pose_at(self.time)
+        return np.array([x, y, actor.kind.size[2] / 2, *actor.kind.size, yaw])
+
+    def advance(self, acceleration: float, duration: float) -> Passage:
+        """Move everything by `duration` seconds, a whole number of world steps."""
+        passages = [self._step(acceleration) for _ in range(whole_steps(duration))]
+        impacts = (p.impact_speed_mps for p in passages if p.impact_speed_mps is not None)
+        return Passage(
+            min(p.nearest_m for p in passages), min(p.clearance_m for p in passages), next(impacts, None)
+        )
+
+    def close(self) -> None:
+        """Free the simulator."""
+        self.bullet.close()
+
+    def _step(self, acceleration: float) -> Passage:
+        before = self.ego.speed
+        self.ego.accelerate(acceleration, STEP_S)
+        self.traffic.step(STEP_S)
+        self._steps += 1
+        self.time = self._steps * STEP_S
+        for event in [event for due, event in self._events if due <= self.time]:
+            event()
+        self._events = [(due, event) for due, event in self._events if due > self.time]
+        self._motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / STEP_S)
+        self.bullet.move(self.ego_body, self.ego.pose)
+        for actor in self.actors:
+            self.bullet.move(actor.body, actor.pose_at(self.time))
+        return self._passage()
+
+    def _passage(self) -> Passage:
+        touched = any(self.bullet.clearance(self.ego_body, actor.body, 0.5) <= 0.0 for actor in self.actors)
+        nearest, clearance = np.inf, np.inf
+        if self.first_sighting is not None:
+            x, y, _ = self.first_sighting.pose_at(self.time)
+            ego_x, ego_y, _ = self.ego.pose
+            nearest = float(np.hypot(x - ego_x, y - ego_y))
+            clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
+        return Passage(nearest, clearance, self.ego.speed if touched else None)
+
+
+def whole_steps(duration: float) -> int:
+    """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide it."""
+    steps = round(duration / STEP_S)
+    if steps < 1 or abs(steps * STEP_S - duration) > 1e-9:
+        raise InvalidInput(f"keyframe_s must be a multiple of the world step {STEP_S} s, got {duration}")
+    return steps
