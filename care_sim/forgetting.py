@@ -61,7 +61,8 @@ class Forgetting:
         range_rate = np.einsum("ij,ij->i", relative, tracks.boxes[:, :2]) / ranges
         receding = range_rate > self.rules.receding_mps
         static = np.hypot(*tracks.velocities.T) < self.rules.static_mps
-        return (receding | static) & (ranges > self.rules.guard_distance(ego.speed))
+        harmless: NDArray[np.bool_] = receding | static
+        return harmless & (ranges > self.rules.guard_distance(ego.speed))
 
     def _uncertainty(self, ranges: Floats) -> Floats:
         """m_unc of Eq. 4, in columns."""

@@ -13,7 +13,7 @@ Pose = tuple[float, float, float]
 def turned(vectors: Floats, yaw: float) -> Floats:
     """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z."""
     cos, sin = np.cos(yaw), np.sin(yaw)
-    result = np.array(vectors, dtype=float)
+    result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
     result[..., 0], result[..., 1] = cos * x - sin * y, sin * x + cos * y
     return result
@@ -39,13 +39,17 @@ class Frame:
         """(3,) world position."""
         return np.array([self.x, self.y, self.z])
 
+    @property
+    def _offset(self) -> Floats:
+        return np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0, self.yaw])
+
     def boxes_to_local(self, boxes: Floats) -> Floats:
         """World boxes (n, 7) seen in this frame."""
-        return _moved(boxes - [*self.origin, 0, 0, 0, self.yaw], -self.yaw)
+        return _moved(boxes - self._offset, -self.yaw)
 
     def boxes_to_world(self, boxes: Floats) -> Floats:
         """Boxes (n, 7) of this frame in the world."""
-        return _moved(boxes, self.yaw) + [*self.origin, 0, 0, 0, self.yaw]
+        return _moved(boxes, self.yaw) + self._offset
 
 
 def _moved(boxes: Floats, yaw: float) -> Floats:

@@ -1,4 +1,5 @@
-"""The angular grid of firing cells, and the cells that boxes and ray bundles cover.
+"""
+The angular grid of firing cells, and the cells that boxes and ray bundles cover.
 
 Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is
 `row * columns + column`; row 0 is the highest elevation and column c covers the azimuths
@@ -23,7 +24,8 @@ ELEVATION_MARGIN = 1
 
 @dataclass(frozen=True)
 class AngularGrid:
-    """`columns` x `rows` firing cells of a rotating LiDAR.
+    """
+    `columns` x `rows` firing cells of a rotating LiDAR.
 
     The defaults are the grid of the paper (Remark 1): 512 columns, and the 32 rings of the
     nuScenes sensor from +10.67 to -30.67 degrees in equal steps. `range_m` is the reach of a ray.
@@ -77,10 +79,11 @@ class AngularGrid:
     def hulls(
         self,
         boxes: ArrayLike,
-        azimuth_margin: ArrayLike = AZIMUTH_MARGIN,
+        azimuth_margin: int | Cells = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
     ) -> list[Cells]:
-        """The dilated angular rectangle of every box, as ascending cells.
+        """
+        The dilated angular rectangle of every box, as ascending cells.
 
         `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
         number or one a box. A box that surrounds the sensor covers every column.
@@ -105,7 +108,8 @@ class AngularGrid:
         azimuth_margin: int = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
     ) -> list[Cells]:
-        """The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
+        """
+        The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
 
         The first ray of a bundle is its middle; the others lie within half a turn of it.
         """
@@ -133,7 +137,7 @@ class AngularGrid:
         left: Floats,
         lowest: Floats,
         highest: Floats,
-        azimuth_margin: ArrayLike,
+        azimuth_margin: int | Cells,
         elevation_margin: int,
     ) -> list[Cells]:
         first = np.floor((right + np.pi) / self.column_width).astype(np.int64) - azimuth_margin

@@ -1,16 +1,18 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.control import BrakingController
+from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
-from care_sim.grid import Cells
+from care_sim.grid import Cells, Floats
 from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
 from care_sim.perception.memory import TrackMemory
 from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture
-from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar, LidarNoise
 from care_sim.types import Belief, Keyframe, Rig, Scan
 from care_sim.world.world import World
@@ -22,8 +24,13 @@ class Sensing:
 
     engine: str = "bullet"
     min_returns: int = MIN_RETURNS
-    camera: CameraFaults = CameraFaults()
-    lidar: LidarNoise = LidarNoise()
+    camera: CameraFaults = field(default_factory=CameraFaults)
+    lidar: LidarNoise = field(default_factory=LidarNoise)
+
+    def __post_init__(self) -> None:
+        check_engine(self.engine)
+        if self.min_returns < 1 or self.min_returns != int(self.min_returns):
+            raise InvalidInput(f"min_returns must be a whole number >= 1, got {self.min_returns}")
 
 
 class ClosedLoop:
@@ -84,7 +91,7 @@ class ClosedLoop:
             impact_speed_mps=passage.impact_speed_mps,
         )
 
-    def _look(self, ranges: np.ndarray) -> None:
+    def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
         sensor = self.sensor
         self.picture = Picture.of(self.world.bullet.body_ids(self.rig.cameras[0], sensor))
@@ -96,13 +103,14 @@ class ClosedLoop:
             ranges,
         )
 
-    def _picture_of(self, scan: Scan) -> np.ndarray:
+    def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)
         ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
 
-    def _local_box(self, body: int) -> np.ndarray:
-        return self.sensor.boxes_to_local(self.world.box(self._actors[body])[None])[0]
+    def _local_box(self, body: int) -> Floats:
+        (box,) = self.sensor.boxes_to_local(self.world.box(self._actors[body])[None])
+        return box
 
     def _in_view(self) -> bool:
         target = self.world.first_sighting

@@ -1,4 +1,5 @@
-"""A pinhole camera fixed to the car: pixels to directions and back.
+"""
+A pinhole camera fixed to the car: pixels to directions and back.
 
 Image frame: u right, v down, in pixels, (0, 0) the outer corner of the top-left pixel. Camera
 directions are expressed in the sensor frame (x forward, y left, z up) of the LiDAR.
@@ -15,7 +16,8 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PinholeCamera:
-    """Intrinsics and extrinsics of one camera.
+    """
+    Intrinsics and extrinsics of one camera.
 
     `position` is the optical centre in the sensor frame (metres); `yaw` turns the optical axis
     about z and `pitch` raises it (radians). `horizontal_fov` in radians.
@@ -31,7 +33,7 @@ class PinholeCamera:
     @property
     def focal(self) -> float:
         """Focal length in pixels."""
-        return self.width / 2 / np.tan(self.horizontal_fov / 2)
+        return float(self.width / 2 / np.tan(self.horizontal_fov / 2))
 
     @cached_property
     def axes(self) -> Floats:
@@ -40,7 +42,8 @@ class PinholeCamera:
         return np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
 
     def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """Pixels (n, 2) and depths (n,) of sensor-frame points (n, 3).
+        """
+        Pixels (n, 2) and depths (n,) of sensor-frame points (n, 3).
 
         Points at or behind the image plane have depth <= 0 and NaN pixels.
         """
@@ -55,7 +58,8 @@ class PinholeCamera:
         return np.stack([np.ones_like(left), left, up], axis=-1) @ self.axes
 
     def box_rays(self, boxes: ArrayLike) -> Floats:
-        """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
+        """
+        (n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
 
         Centre first, then the corners (paper, Algorithm 2), then the points of the edges nearest
         to the principal point, where azimuth and elevation of a wide box are extreme.

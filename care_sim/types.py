@@ -1,4 +1,5 @@
-"""What the stages of a keyframe exchange.
+"""
+What the stages of a keyframe exchange.
 
 Frames: sensor frame x forward, y left, z up; metres, seconds, radians. A box is (7,): centre x, y,
 z, length, width, height, yaw. Velocities are over ground, in sensor axes. Nothing here carries a
@@ -47,7 +48,8 @@ class Detections:
 
 @dataclass(frozen=True)
 class ImageDetections:
-    """2D camera detections as columns of one table; `len()` is their number n.
+    """
+    2D camera detections as columns of one table; `len()` is their number n.
 
     `classes` (n,), `confidences` (n,), `boxes` (n, 4: left, top, right, bottom in pixels),
     `cameras` (n,) index into `Rig.cameras`, `ages` (n,) seconds since the picture was taken and
@@ -69,20 +71,19 @@ class ImageDetections:
     @classmethod
     def from_rows(cls, rows: NDArray[np.floating]) -> "ImageDetections":
         """Read rows in the order of `COLUMNS`; rows of class -1 are padding."""
-        rows = rows[rows[:, 0] >= 0].astype(float)
-        integers = rows[:, [0, 6]].astype(np.int64)
-        return cls(integers[:, 0], rows[:, 1], rows[:, 2:6], integers[:, 1], rows[:, 7], rows[:, 8])
+        table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
+        integers = table[:, [0, 6]].astype(np.int64)
+        return cls(integers[:, 0], table[:, 1], table[:, 2:6], integers[:, 1], table[:, 7], table[:, 8])
 
     def rows(self) -> Floats:
         """(n, 9) table in the order of `COLUMNS`."""
-        return np.column_stack(
-            [self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes]
-        )
+        return np.column_stack([self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes])
 
 
 @dataclass(frozen=True)
 class Tracks:
-    """Tracked objects as columns of one table; `len()` is their number n.
+    """
+    Tracked objects as columns of one table; `len()` is their number n.
 
     `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
     `misses` (n,) keyframes since the object was last detected.
@@ -107,14 +108,13 @@ class Tracks:
     @classmethod
     def from_rows(cls, rows: NDArray[np.floating]) -> "Tracks":
         """Read rows in the order of `COLUMNS`; rows of id -1 are padding."""
-        rows = rows[rows[:, 0] >= 0].astype(float)
-        integers = rows[:, [0, 1, 11]].astype(np.int64)
-        return cls(integers[:, 0], integers[:, 1], rows[:, 2:9], rows[:, 9:11], integers[:, 2])
+        table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
+        integers = table[:, [0, 1, 11]].astype(np.int64)
+        return cls(integers[:, 0], integers[:, 1], table[:, 2:9], table[:, 9:11], integers[:, 2])
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
         """Some of the tracks, by index or mask."""
-        columns = (self.ids, self.classes, self.boxes, self.velocities, self.misses)
-        return Tracks(*(column[rows] for column in columns))
+        return Tracks(self.ids[rows], self.classes[rows], self.boxes[rows], self.velocities[rows], self.misses[rows])
 
     def rows(self) -> Floats:
         """(n, 12) table in the order of `COLUMNS`."""
@@ -123,7 +123,8 @@ class Tracks:
 
 @dataclass(frozen=True)
 class Belief:
-    """All a policy may know when it chooses: what Gymnasium shows, and nothing else.
+    """
+    All a policy may know when it chooses: what Gymnasium shows, and nothing else.
 
     `budget` is B, the number of cells that may fire; `detections` are the camera's, `tracks` the
     forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return.
@@ -169,7 +170,8 @@ def _padded(rows: Floats, length: int) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a policy asks of the allocator (Algorithm 1).
+    """
+    What a policy asks of the allocator (Algorithm 1).
 
     `exploitation` are sets of cells, nearest object first; `layers` are the reserve layers in order
     of priority, each a sequence of sets of cells.
@@ -189,7 +191,8 @@ class Scan:
 
 @dataclass(frozen=True)
 class Rig:
-    """What is fixed about the sensing task and known to a policy in advance.
+    """
+    What is fixed about the sensing task and known to a policy in advance.
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` the time between
     two decisions.
@@ -212,7 +215,8 @@ class Command:
 
 @dataclass(frozen=True)
 class Keyframe:
-    """The record of one keyframe, from which every metric is computed. Scoring only: it holds truth.
+    """
+    The record of one keyframe, from which every metric is computed. Scoring only: it holds truth.
 
     `in_view`: the unimpaired camera shows the first-sighting actor; `detected`: the detector reported
     it. `distance_m`: planar, sensor to its centre, at the scan. The rest holds for the time until the

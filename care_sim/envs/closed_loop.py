@@ -19,7 +19,6 @@ from care_sim.perception.detectors import MIN_RETURNS
 from care_sim import reward as rewards
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, CameraFaults
-from care_sim.sensors.engines import check_engine
 from care_sim.sensors.lidar import LidarNoise
 from care_sim.types import Action, Keyframe, Rig
 from care_sim.world.world import whole_steps
@@ -64,7 +63,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
     allowed raises `care_sim.InvalidInput`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's interface)
     scenario_name: ClassVar[str]
 
     def __init__(
@@ -85,7 +84,6 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         **scenario_parameters: Any,
     ):
         check_rate("reserve_fraction", reserve_fraction)
-        check_engine(engine)
         whole_steps(keyframe_s)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")

@@ -1,5 +1,8 @@
 """The spaces of the environments, and the check of an action at their door."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -12,7 +15,7 @@ MAX_COUNT = 2.0**24
 """The largest count float32 holds exactly."""
 
 
-def observation_space(rig: Rig) -> spaces.Dict:
+def observation_space(rig: Rig) -> spaces.Space[Any]:
     """The bounded observation space of a rig; keys and columns as in `care_sim.types`."""
     grid = rig.grid
     far, size, turn = 2 * grid.range_m, 50.0, 4 * np.pi
@@ -22,7 +25,7 @@ def observation_space(rig: Rig) -> spaces.Dict:
     ego = [[0.0, -turn, -MAX_SPEED_MPS], [MAX_SPEED_MPS, turn, MAX_SPEED_MPS]]
     detections = [
         [-1, 0, 0, 0, 0, 0, 0, 0, -turn],
-        [classes, 1, width, height, width, height, len(rig.cameras) - 1, 60, turn],
+        [classes, 1, width, height, width, height, max(len(rig.cameras) - 1, 1), 60, turn],
     ]
     speed = MAX_SPEED_MPS
     tracks = [
@@ -52,11 +55,11 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDAr
     return scores.astype(np.float32, copy=False)
 
 
-def _box(bounds: list) -> spaces.Box:
+def _box(bounds: Sequence[Sequence[float]]) -> spaces.Box:
     low, high = (np.asarray(bound, np.float32) for bound in bounds)
     return spaces.Box(low, high, dtype=np.float32)
 
 
-def _table(bounds: list, rows: int) -> spaces.Box:
+def _table(bounds: Sequence[Sequence[float]], rows: int) -> spaces.Box:
     low, high = (np.tile(np.asarray(bound, np.float32), (rows, 1)) for bound in bounds)
     return spaces.Box(low, high, dtype=np.float32)

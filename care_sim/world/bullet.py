@@ -1,6 +1,7 @@
 """The one owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -55,19 +56,18 @@ class BulletWorld:
         turn = (0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
         pybullet.resetBasePositionAndOrientation(body, (x, y, 0.0), turn, physicsClientId=self._client)
 
-    def cast(self, origin: Sequence[float], directions: Floats, reach: float) -> tuple[Floats, Integers]:
-        """Cast rays (n, 3 unit vectors, world frame) from `origin`.
+    def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
+        """
+        Cast rays (n, 3 unit vectors, world frame) from `origin`.
 
         Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NOTHING there.
         """
-        targets = np.asarray(origin) + directions * reach
-        hits: list[tuple] = []
+        targets = origin + directions * reach
+        hits: list[tuple[Any, ...]] = []
         for start in range(0, len(targets), RAYS_A_CALL):
             batch = targets[start : start + RAYS_A_CALL]
             sources = np.broadcast_to(origin, batch.shape)
-            hits += pybullet.rayTestBatch(
-                sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client
-            )
+            hits += pybullet.rayTestBatch(sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client)
         if len(hits) != len(targets):
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
         ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
@@ -75,7 +75,8 @@ class BulletWorld:
         return np.where(ids == NOTHING, np.inf, shares * reach), ids
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame) -> Integers:
-        """(height, width) id of the body each pixel of `camera` shows, NOTHING for the sky.
+        """
+        (height, width) id of the body each pixel of `camera` shows, NOTHING for the sky.
 
         The camera is mounted in the frame `sensor`.
         """
@@ -93,11 +94,11 @@ class BulletWorld:
         points = pybullet.getClosestPoints(body, other, within, physicsClientId=self._client)
         return float(min((point[8] for point in points), default=np.inf))
 
-    def _picture(self, camera: PinholeCamera, sensor: Frame) -> tuple:
+    def _picture(self, camera: PinholeCamera, sensor: Frame) -> tuple[Any, ...]:
         eye = sensor.origin + turned(np.array(camera.position), sensor.yaw)
         forward, _, up = turned(camera.axes, sensor.yaw)
         vertical = 2 * np.degrees(np.arctan(camera.height / 2 / camera.focal))
-        return pybullet.getCameraImage(
+        picture: tuple[Any, ...] = pybullet.getCameraImage(
             camera.width,
             camera.height,
             pybullet.computeViewMatrix(eye, eye + forward, up),
@@ -107,9 +108,10 @@ class BulletWorld:
             flags=_IDS_AND_LINKS,
             physicsClientId=self._client,
         )
+        return picture
 
 
-def _collision(parts: Sequence[Part]) -> dict:
+def _collision(parts: Sequence[Part]) -> dict[str, Any]:
     return {
         "shapeTypes": [_SHAPES[part.shape] for part in parts],
         "halfExtents": [[extent / 2 for extent in part.size] for part in parts],
@@ -119,7 +121,7 @@ def _collision(parts: Sequence[Part]) -> dict:
     }
 
 
-def _visual(parts: Sequence[Part]) -> dict:
+def _visual(parts: Sequence[Part]) -> dict[str, Any]:
     shapes = _collision(parts)
     shapes["visualFramePositions"] = shapes.pop("collisionFramePositions")
     shapes["rgbaColors"] = [(*part.colour, 1.0) for part in parts]

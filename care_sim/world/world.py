@@ -35,7 +35,8 @@ class Actor:
 
 @dataclass(frozen=True)
 class Passage:
-    """How close the ego came to the first-sighting actor while the world advanced.
+    """
+    How close the ego came to the first-sighting actor while the world advanced.
 
     `nearest_m` centre to centre and `clearance_m` hull to hull; `impact_speed_mps` is the ego's speed
     at its first contact with any body, else None.
@@ -47,7 +48,8 @@ class Passage:
 
 
 class World:
-    """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
+    """
+    Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
 
     World frame: x along the road, y left, z up; the ego starts with its centre at the origin.
     """
@@ -101,9 +103,7 @@ class World:
         """Move everything by `duration` seconds, a whole number of world steps."""
         passages = [self._step(acceleration) for _ in range(whole_steps(duration))]
         impacts = (p.impact_speed_mps for p in passages if p.impact_speed_mps is not None)
-        return Passage(
-            min(p.nearest_m for p in passages), min(p.clearance_m for p in passages), next(impacts, None)
-        )
+        return Passage(min(p.nearest_m for p in passages), min(p.clearance_m for p in passages), next(impacts, None))
 
     def close(self) -> None:
         """Free the simulator."""

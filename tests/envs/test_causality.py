@@ -1,0 +1,65 @@
+"""What no fired ray touches and no camera sees cannot reach an observation."""
+
+import gymnasium
+import numpy as np
+
+from care_sim.world.bullet import NOTHING
+
+BEHIND, AHEAD = (-15.0, 1.0, 0.0), (12.0, 3.0, 0.0)
+
+
+def observe(pose, mask):
+    """Observations over four keyframes with a car put at `pose` that the camera has not in view."""
+    env = gymnasium.make("CARE-Dartout-v0", disable_env_checker=True, floor=False).unwrapped
+    env.reset(seed=0)
+    world = env.loop.world
+    hidden = world.add("hidden car", "car", pose)
+    observations = [env.step(mask)[0] for _ in range(4)]
+    _, hits = world.bullet.cast(env.loop.sensor.origin, env.rig.grid.directions[np.flatnonzero(mask)], 50.0)
+    env.close()
+    return observations, bool(np.any(hits == hidden.body))
+
+
+def forward_mask():
+    mask = np.zeros((32, 512), bool)
+    mask[:, 192:320] = True
+    return mask
+
+
+def test_moving_what_nobody_looks_at_changes_nothing():
+    (near, touched), (far, _) = observe(BEHIND, forward_mask()), observe((-30.0, -1.0, 0.5), forward_mask())
+    assert not touched
+    for before, after in zip(near, far, strict=True):
+        for key in before:
+            np.testing.assert_array_equal(before[key], after[key])
+
+
+def test_moving_what_a_fired_ray_touches_changes_the_scan():
+    backward = np.zeros((32, 512), bool)
+    backward[:, :64] = backward[:, -64:] = True
+    (near, touched), (far, _) = observe(BEHIND, backward), observe((-30.0, -1.0, 0.5), backward)
+    assert touched
+    assert not np.array_equal(near[0]["ranges"], far[0]["ranges"])
+
+
+def test_only_fired_cells_are_cast(monkeypatch):
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.05).unwrapped
+    env.reset(seed=0)
+    counts = []
+    cast = env.loop.world.bullet.cast
+    monkeypatch.setattr(env.loop.world.bullet, "cast", lambda *given: counts.append(len(given[1])) or cast(*given))
+    for _ in range(3):
+        env.step(env.action_space.sample())
+    assert counts == [819, 819, 819]
+    env.close()
+
+
+def test_the_observation_holds_no_body_id():
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=1.0).unwrapped
+    env.reset(seed=0)
+    env.step(np.ones((32, 512), bool))
+    tracks = env.loop.belief.tracks
+    assert len(tracks) > 3
+    np.testing.assert_array_equal(np.sort(tracks.ids), np.arange(len(tracks)))
+    assert NOTHING == -1
+    env.close()

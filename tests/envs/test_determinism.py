@@ -1,0 +1,95 @@
+"""The same seed gives the same episode to the last bit: in one process, in many, in every vector."""
+
+import hashlib
+import pathlib
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+
+NAME, SEED, STEPS = "care_sim:CARE-Dense-v0", 11, 8
+
+
+def digest(observations):
+    total = hashlib.sha256()
+    for observation in observations:
+        for key in sorted(observation):
+            total.update(np.ascontiguousarray(observation[key]).tobytes())
+    return total.hexdigest()
+
+
+def actions():
+    rng = np.random.default_rng(0)
+    return [rng.random((32, 512), dtype=np.float32) for _ in range(STEPS)]
+
+
+def alone():
+    env = gymnasium.make(NAME, disable_env_checker=True)
+    observations = [env.reset(seed=SEED)[0]]
+    observations += [env.step(action)[0] for action in actions()]
+    env.close()
+    return digest(observations)
+
+
+def in_a_vector(vector):
+    observations = [vector.reset(seed=[SEED, SEED + 1])[0]]
+    observations += [vector.step(np.stack([action, action]))[0] for action in actions()]
+    observations = [{key: value[0].copy() for key, value in observation.items()} for observation in observations]
+    vector.close()
+    return digest(observations)
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_vectors_of_gymnasium_give_the_same_episode(mode):
+    kwargs = {} if mode == "sync" else {"context": "spawn"}
+    vector = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode, vector_kwargs=kwargs)
+    assert in_a_vector(vector) == alone()
+
+
+def test_another_process_gives_the_same_episode():
+    here = str(pathlib.Path(__file__).parent)
+    program = f"import sys; sys.path.insert(0, {here!r}); import test_determinism; print(test_determinism.alone())"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == alone()
+
+
+@pytest.mark.slow
+def test_the_subprocess_vector_of_stable_baselines3_gives_the_same_episode():
+    vec_env = pytest.importorskip("stable_baselines3.common.vec_env")
+    vector = vec_env.SubprocVecEnv([make_one, make_one], start_method="spawn")
+    vector.seed(SEED)
+    observations = [vector.reset()]
+    observations += [vector.step(np.stack([action, action]))[0] for action in actions()]
+    vector.close()
+    assert digest([{key: value[0] for key, value in seen.items()} for seen in observations]) == alone()
+
+
+def make_one():
+    return gymnasium.make(NAME, disable_env_checker=True)
+
+
+def test_the_policy_loop_repeats_and_another_seed_differs():
+    digests = []
+    for seed in (SEED, SEED, SEED + 1):
+        env = gymnasium.make(NAME, disable_env_checker=True)
+        policy = care_sim.make_policy("care", env)
+        observations = [env.reset(seed=seed)[0]]
+        for _ in range(STEPS):
+            observations.append(env.step(policy(observations[-1]))[0])
+        digests.append(digest(observations))
+        env.close()
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_reset_without_a_seed_goes_on_in_the_stream_of_the_last_one():
+    env = gymnasium.make(NAME, disable_env_checker=True)
+    env.reset(seed=1)
+    second, third = env.reset()[1]["seed"], env.reset()[1]["seed"]
+    env.reset(seed=1)
+    assert (env.reset()[1]["seed"], env.reset()[1]["seed"]) == (second, third)
+    assert second != third
+    env.close()
