@@ -22,9 +22,7 @@ def budget_cells(budget: float, cells: int) -> int:
     return round(budget * cells)
 
 
-def allocate(
-    demand: Demand, budget: int, reserve_fraction: float, floor: Iterable[int] | None = None
-) -> Cells:
+def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterable[int] | None = None) -> Cells:
     """Choose at most `budget` cells, in order of selection.
 
     Exploitation sets fill at most round((1 - rho) B) cells, round-robin; then each reserve layer in
@@ -72,7 +70,8 @@ def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
 
 def fired_cells(scores: NDArray[np.floating], budget: int, floor: Cells | None) -> Cells:
     """The cells an action fires, ascending: the `budget` highest strictly positive scores, ties by
-    ascending index, topped up from `floor` when there are fewer (None leaves them unspent)."""
+    ascending index, topped up from `floor` when there are fewer (None leaves them unspent).
+    """
     flat = scores.ravel()
     chosen = np.flatnonzero(flat > 0)
     if len(chosen) > budget:

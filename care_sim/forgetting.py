@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.grid import AZIMUTH_MARGIN, Cells, Floats
+from care_sim.frames import Floats
+from care_sim.grid import AZIMUTH_MARGIN, Cells
 from care_sim.types import Ego, Tracks
 
 

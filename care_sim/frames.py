@@ -10,13 +10,21 @@ Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
 
 
-def turned(vectors: Floats, yaw: float) -> Floats:
-    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z."""
+def turned(vectors: Floats, yaw: float | Floats) -> Floats:
+    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z (one angle, or one a vector)."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
     result[..., 0], result[..., 1] = cos * x - sin * y, sin * x + cos * y
     return result
+
+
+_CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))])
+
+
+def box_corners(boxes: Floats) -> Floats:
+    """(n, 8, 3) corners of boxes (n, 7): four below, then the four above them."""
+    return boxes[:, None, :3] + turned(_CORNERS * boxes[:, None, 3:6], boxes[:, 6:7])
 
 
 @dataclass(frozen=True)

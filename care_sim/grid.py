@@ -1,5 +1,4 @@
-"""
-The angular grid of firing cells, and the cells that boxes and ray bundles cover.
+"""The angular grid of firing cells, and the cells that boxes and ray bundles cover.
 
 Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is
 `row * columns + column`; row 0 is the highest elevation and column c covers the azimuths
@@ -13,8 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from care_sim.frames import Floats, box_corners, turned
+
 Cells = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 AZIMUTH_MARGIN = 2
 """Dilation of hulls and wedges, in columns (paper, Remark 2)."""
@@ -24,8 +24,7 @@ ELEVATION_MARGIN = 1
 
 @dataclass(frozen=True)
 class AngularGrid:
-    """
-    `columns` x `rows` firing cells of a rotating LiDAR.
+    """`columns` x `rows` firing cells of a rotating LiDAR.
 
     The defaults are the grid of the paper (Remark 1): 512 columns, and the 32 rings of the
     nuScenes sensor from +10.67 to -30.67 degrees in equal steps. `range_m` is the reach of a ray.
@@ -82,8 +81,7 @@ class AngularGrid:
         azimuth_margin: int | Cells = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
     ) -> list[Cells]:
-        """
-        The dilated angular rectangle of every box, as ascending cells.
+        """The dilated angular rectangle of every box, as ascending cells.
 
         `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
         number or one a box. A box that surrounds the sensor covers every column.
@@ -108,8 +106,7 @@ class AngularGrid:
         azimuth_margin: int = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
     ) -> list[Cells]:
-        """
-        The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
+        """The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
 
         The first ray of a bundle is its middle; the others lie within half a turn of it.
         """
@@ -158,20 +155,15 @@ def _wrap(angle: Floats) -> Floats:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-_CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) / 2
-
-
 def _footprints(boxes: Floats) -> tuple[Floats, Floats, Floats]:
     """Ground-plane corners (n, 4, 2), and the nearest and farthest distance of each footprint."""
-    cos, sin = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
-    to_world = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-    local = _CORNERS * boxes[:, None, 3:5]
-    corners = boxes[:, None, :2] + local @ np.swapaxes(to_world, 1, 2)
-    sensor = np.einsum("nij,nj->ni", np.swapaxes(to_world, 1, 2), -boxes[:, :2])
+    corners = box_corners(boxes)[:, :4, :2]
+    sensor = turned(-boxes[:, :2], -boxes[:, 6])
     outside = np.maximum(np.abs(sensor) - boxes[:, 3:5] / 2, 0.0)
     return corners, np.hypot(*outside.T), np.hypot(corners[..., 0], corners[..., 1]).max(axis=1)
 
 
 def cell_set(cells: Sequence[int] | Cells) -> Cells:
     """`cells` as an ascending array without repeats."""
-    return np.unique(np.asarray(cells, dtype=np.int64))
+    array = np.asarray(cells, dtype=np.int64)
+    return array if np.all(array[1:] > array[:-1]) else np.unique(array)

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from care_sim.control import BrakingController
 from care_sim.errors import InvalidInput
-from care_sim.frames import Frame
-from care_sim.grid import Cells, Floats
+from care_sim.frames import Floats, Frame
+from care_sim.grid import Cells
 from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
 from care_sim.perception.memory import TrackMemory
-from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture
+from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture, window_on
 from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar, LidarNoise
 from care_sim.types import Belief, Keyframe, Rig, Scan
@@ -41,6 +41,7 @@ class ClosedLoop:
     ):
         self.world, self.rig = world, rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
+        self._reported = [actor for actor in world.actors if actor.body in labels]
         self._actors = {actor.body: actor for actor in world.actors}
         camera_rng, noise_rng = (np.random.default_rng(seed) for seed in seeds)
         engine = ENGINES[sensing.engine](world.bullet)
@@ -94,7 +95,9 @@ class ClosedLoop:
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
         sensor = self.sensor
-        self.picture = Picture.of(self.world.bullet.body_ids(self.rig.cameras[0], sensor))
+        camera = self.rig.cameras[0]
+        window = window_on(camera, sensor.boxes_to_local(self.world.boxes(self._reported)))
+        self.picture = Picture.of(self.world.bullet.body_ids(camera, sensor, window))
         self.belief = Belief(
             self.world.ego_motion,
             self.rig.budget,
@@ -109,7 +112,7 @@ class ClosedLoop:
         return ranges.reshape(self.rig.grid.shape)
 
     def _local_box(self, body: int) -> Floats:
-        (box,) = self.sensor.boxes_to_local(self.world.box(self._actors[body])[None])
+        box: Floats = self.sensor.boxes_to_local(self.world.boxes([self._actors[body]]))[0]
         return box
 
     def _in_view(self) -> bool:

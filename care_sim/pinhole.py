@@ -1,5 +1,4 @@
-"""
-A pinhole camera fixed to the car: pixels to directions and back.
+"""A pinhole camera fixed to the car: pixels to directions and back.
 
 Image frame: u right, v down, in pixels, (0, 0) the outer corner of the top-left pixel. Camera
 directions are expressed in the sensor frame (x forward, y left, z up) of the LiDAR.
@@ -9,15 +8,20 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from care_sim.frames import Floats, box_corners
+
+NEAR_M = 0.1
+"""Nothing nearer to the image plane than this is seen."""
+
+_EDGES = np.array([(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)])
+"""The twelve edges of a box, as pairs of `box_corners`."""
 
 
 @dataclass(frozen=True)
 class PinholeCamera:
-    """
-    Intrinsics and extrinsics of one camera.
+    """Intrinsics and extrinsics of one camera.
 
     `position` is the optical centre in the sensor frame (metres); `yaw` turns the optical axis
     about z and `pitch` raises it (radians). `horizontal_fov` in radians.
@@ -42,8 +46,7 @@ class PinholeCamera:
         return np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
 
     def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """
-        Pixels (n, 2) and depths (n,) of sensor-frame points (n, 3).
+        """Pixels (n, 2) and depths (n,) of sensor-frame points (n, 3).
 
         Points at or behind the image plane have depth <= 0 and NaN pixels.
         """
@@ -58,8 +61,7 @@ class PinholeCamera:
         return np.stack([np.ones_like(left), left, up], axis=-1) @ self.axes
 
     def box_rays(self, boxes: ArrayLike) -> Floats:
-        """
-        (n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
+        """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
 
         Centre first, then the corners (paper, Algorithm 2), then the points of the edges nearest
         to the principal point, where azimuth and elevation of a wide box are extreme.
@@ -70,3 +72,23 @@ class PinholeCamera:
         columns = [(left + right) / 2, left, left, right, right, u, u, left, right]
         rows = [(top + bottom) / 2, top, bottom, top, bottom, top, bottom, v, v]
         return self.rays(np.stack([np.stack(columns, -1), np.stack(rows, -1)], axis=-1))
+
+    def project_boxes(self, boxes: Floats) -> Floats:
+        """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where they reach
+        beyond it; NaN for a box wholly behind NEAR_M. A box that crosses that plane is cut there.
+        """
+        corners = (box_corners(boxes) - self.position) @ self.axes.T
+        starts, ends = corners[:, _EDGES[:, 0]], corners[:, _EDGES[:, 1]]
+        points = np.concatenate([_cut(starts, ends), _cut(ends, starts)], axis=1)
+        depth, left, up = np.moveaxis(points, -1, 0)
+        u, v = self.width / 2 - self.focal * left / depth, self.height / 2 - self.focal * up / depth
+        return np.stack([reduce(w, axis=1) for reduce in (np.fmin.reduce, np.fmax.reduce) for w in (u, v)], axis=-1)
+
+
+def _cut(points: Floats, others: Floats) -> Floats:
+    """`points` (..., 3: depth, left, up), moved along the line to `others` up to NEAR_M; NaN if both lie behind."""
+    depth, far = points[..., 0], others[..., 0]
+    behind = depth < NEAR_M
+    span = np.where(behind & (far >= NEAR_M), far - depth, np.nan)
+    share = np.where(behind, (NEAR_M - depth) / span, 0.0)
+    return points + (others - points) * share[..., None]

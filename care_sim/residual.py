@@ -1,10 +1,13 @@
 """Algorithm 2 of the paper: camera detections that no forecast explains, as wedges of cells."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.frames import turned
-from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, Cells, Floats
+from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, Cells
+from care_sim.pinhole import PinholeCamera
 from care_sim.types import Belief, ImageDetections, Rig, Tracks
 
 
@@ -15,13 +18,11 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
     by the yaw change since the picture was taken.
     """
     result = np.zeros(len(detections), bool)
-    for row, (camera, yaw_change) in enumerate(zip(detections.cameras, detections.yaw_changes, strict=True)):
-        same_class = tracks.classes == detections.classes[row]
-        pixels, depth = rig.cameras[camera].project(turned(tracks.boxes[same_class, :3], yaw_change))
-        left, top, right, bottom = detections.boxes[row]
-        u, v = pixels.T
+    for rows, camera, yaw_change in _pictures(detections, rig):
+        u, v = camera.project(turned(tracks.boxes[:, :3], yaw_change))[0].T
+        left, top, right, bottom = detections.boxes[rows].T[..., None]
         inside = (left <= u) & (u <= right) & (top <= v) & (v <= bottom)
-        result[row] = bool(np.any(inside & (depth > 0)))
+        result[rows] = np.any(inside & (detections.classes[rows, None] == tracks.classes), axis=1)
     return result
 
 
@@ -32,15 +33,10 @@ def wedges(
     elevation_margin: int = ELEVATION_MARGIN,
 ) -> list[Cells]:
     """The depth-free wedge W(d) of every detection, turned by the yaw change since its picture."""
-    if not len(detections):
-        return []
-    bundles = [
-        turned(rig.cameras[camera].box_rays(box)[0], -yaw_change)
-        for camera, box, yaw_change in zip(
-            detections.cameras, detections.boxes, detections.yaw_changes, strict=True
-        )
-    ]
-    return rig.grid.wedges(np.stack(bundles), azimuth_margin, elevation_margin)
+    bundles = np.empty((len(detections), 9, 3))
+    for rows, camera, yaw_change in _pictures(detections, rig):
+        bundles[rows] = turned(camera.box_rays(detections.boxes[rows]), -yaw_change)
+    return rig.grid.wedges(bundles, azimuth_margin, elevation_margin)
 
 
 def camera_layers(
@@ -56,3 +52,9 @@ def camera_layers(
     explained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if is_known]
     return unexplained_wedges, explained_wedges
 
+
+def _pictures(detections: ImageDetections, rig: Rig) -> Iterator[tuple[NDArray[np.bool_], PinholeCamera, float]]:
+    """The rows that come from each camera's picture, the camera, and the yaw change since it was taken."""
+    for index in np.unique(detections.cameras).tolist():
+        rows = detections.cameras == index
+        yield rows, rig.cameras[index], float(detections.yaw_changes[rows][0])

@@ -1,5 +1,4 @@
-"""
-What the stages of a keyframe exchange.
+"""What the stages of a keyframe exchange.
 
 Frames: sensor frame x forward, y left, z up; metres, seconds, radians. A box is (7,): centre x, y,
 z, length, width, height, yaw. Velocities are over ground, in sensor axes. Nothing here carries a
@@ -12,7 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.grid import AngularGrid, Cells, Floats
+from care_sim.frames import Floats
+from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
@@ -48,8 +48,7 @@ class Detections:
 
 @dataclass(frozen=True)
 class ImageDetections:
-    """
-    2D camera detections as columns of one table; `len()` is their number n.
+    """2D camera detections as columns of one table; `len()` is their number n.
 
     `classes` (n,), `confidences` (n,), `boxes` (n, 4: left, top, right, bottom in pixels),
     `cameras` (n,) index into `Rig.cameras`, `ages` (n,) seconds since the picture was taken and
@@ -82,8 +81,7 @@ class ImageDetections:
 
 @dataclass(frozen=True)
 class Tracks:
-    """
-    Tracked objects as columns of one table; `len()` is their number n.
+    """Tracked objects as columns of one table; `len()` is their number n.
 
     `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
     `misses` (n,) keyframes since the object was last detected.
@@ -123,8 +121,7 @@ class Tracks:
 
 @dataclass(frozen=True)
 class Belief:
-    """
-    All a policy may know when it chooses: what Gymnasium shows, and nothing else.
+    """All a policy may know when it chooses: what Gymnasium shows, and nothing else.
 
     `budget` is B, the number of cells that may fire; `detections` are the camera's, `tracks` the
     forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return.
@@ -170,8 +167,7 @@ def _padded(rows: Floats, length: int) -> NDArray[np.float32]:
 
 @dataclass(frozen=True)
 class Demand:
-    """
-    What a policy asks of the allocator (Algorithm 1).
+    """What a policy asks of the allocator (Algorithm 1).
 
     `exploitation` are sets of cells, nearest object first; `layers` are the reserve layers in order
     of priority, each a sequence of sets of cells.
@@ -191,8 +187,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Rig:
-    """
-    What is fixed about the sensing task and known to a policy in advance.
+    """What is fixed about the sensing task and known to a policy in advance.
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` the time between
     two decisions.
@@ -215,8 +210,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Keyframe:
-    """
-    The record of one keyframe, from which every metric is computed. Scoring only: it holds truth.
+    """The record of one keyframe, from which every metric is computed. Scoring only: it holds truth.
 
     `in_view`: the unimpaired camera shows the first-sighting actor; `detected`: the detector reported
     it. `distance_m`: planar, sensor to its centre, at the scan. The rest holds for the time until the

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from care_sim import reward as rewards
 from care_sim.allocation import RESERVE_FRACTION, budget_cells, fired_cells
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.errors import InvalidInput, check_rate
@@ -16,7 +17,6 @@ from care_sim.evaluation.metrics import outcome
 from care_sim.grid import AngularGrid, Cells
 from care_sim.loop import ClosedLoop, Sensing
 from care_sim.perception.detectors import MIN_RETURNS
-from care_sim import reward as rewards
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, CameraFaults
 from care_sim.sensors.lidar import LidarNoise
@@ -41,9 +41,9 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
     |---|---|---|
     | `ego` | (3,) | speed m/s, yaw rate rad/s, acceleration m/s^2 |
     | `budget` | (1,) | B / N, the share of cells that may fire |
-    | `detections` | (64, 9) | camera: class, confidence, left, top, right, bottom (pixels), camera, age s, yaw change rad; class -1 pads |
-    | `tracks` | (64, 12) | forecasts in the sensor frame: id, class, x, y, z, length, width, height, yaw, vx, vy, keyframes since detected; id -1 pads |
-    | `ranges` | (E, A) | the last scan in metres, 0 not fired, maximum range without a return |
+    | `detections` | (64, 9) | camera detections, columns `ImageDetections.COLUMNS`; class -1 pads |
+    | `tracks` | (64, 12) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
+    | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
     ### Reward
     A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision,
@@ -129,9 +129,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         loop = self.loop
         scores = checked_scores(action, self.rig.grid.shape)
         frame = loop.keyframe(fired_cells(scores, self.rig.budget, self._floor(loop.index)))
-        terms = rewards.terms(
-            frame, any(f.in_view for f in self.keyframes), any(f.detected for f in self.keyframes)
-        )
+        terms = rewards.terms(frame, any(f.in_view for f in self.keyframes), any(f.detected for f in self.keyframes))
         self.keyframes.append(frame)
         terminated = frame.impact_speed_mps is not None
         truncated = loop.world.time >= self.scenario.duration_s - 1e-9

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from care_sim.grid import Floats
+from care_sim.frames import Floats
 from care_sim.types import Detections
 from care_sim.world.bullet import Integers
 
@@ -13,8 +13,7 @@ MIN_RETURNS = 3
 
 
 class ReturnsDetector:
-    """
-    Detects every reported body hit by at least `min_returns` fired rays, with its true box.
+    """Detects every reported body hit by at least `min_returns` fired rays, with its true box.
 
     The only part of perception that may see body ids; it upper-bounds a learned detector (paper,
     Sec. 5.6). `labels` maps the ids of reported bodies to classes.
@@ -25,8 +24,7 @@ class ReturnsDetector:
         self._min_returns = min_returns
 
     def detect(self, hits: Integers, box_of: Callable[[int], Floats]) -> tuple[Detections, Integers]:
-        """
-        Detections from the body id behind every fired ray, and the detected ids for the scoring.
+        """Detections from the body id behind every fired ray, and the detected ids for the scoring.
 
         `box_of` gives the (7,) sensor-frame box of a body.
         """

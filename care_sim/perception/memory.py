@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from care_sim.frames import Frame, turned
-from care_sim.grid import Floats
+from care_sim.frames import Floats, Frame, turned
 from care_sim.types import MAX_TRACKS, Detections, Tracks
 
 _EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
@@ -101,4 +100,3 @@ class TrackMemory:
             np.concatenate([old.misses, np.zeros(count, np.int64)]),
         )
         self._known_velocity = np.concatenate([self._known_velocity, np.zeros(count, bool)])
-

@@ -7,7 +7,8 @@ from care_sim.types import Belief, Demand
 
 class Care(Policy):
     """The camera-residual reserve of the paper (Sec. 4.2, Algorithm 2): history plus the layer U of
-    unexplained wedges. Without a camera detection it is the history policy, cell for cell."""
+    unexplained wedges. Without a camera detection it is the history policy, cell for cell.
+    """
 
     name = "care"
 

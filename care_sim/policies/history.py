@@ -6,7 +6,8 @@ from care_sim.types import Belief, Demand
 
 class History(Policy):
     """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning: the
-    exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is empty."""
+    exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is empty.
+    """
 
     name = "history"
 

@@ -58,7 +58,8 @@ FOLLOWER_M = -22.5
 @dataclass(frozen=True)
 class Dense(CrossingScenario):
     """The street of `CrossingScenario` with `vehicles` tracked vehicles in the camera's view, two parked
-    beside the ego, and a driver who follows it."""
+    beside the ego, and a driver who follows it.
+    """
 
     vehicles: int = 5
     place_jitter_m: Range = (-0.4, 0.4)

@@ -8,10 +8,10 @@ import numpy as np
 from scipy import ndimage
 
 from care_sim.errors import InvalidInput, check_rate
-from care_sim.grid import Floats
+from care_sim.frames import Floats
 from care_sim.pinhole import PinholeCamera
 from care_sim.types import ImageDetections
-from care_sim.world.bullet import Integers
+from care_sim.world.bullet import Integers, Window
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
 """Metres in the sensor frame: CAM_FRONT of nuScenes stands this far before and below LIDAR_TOP."""
@@ -39,6 +39,19 @@ class CameraFaults:
         check_rate("false_negative_rate", self.false_negative_rate)
         if self.latency < 0 or self.latency != int(self.latency):
             raise InvalidInput(f"camera_latency must be a whole number of keyframes >= 0, got {self.latency}")
+
+
+def window_on(camera: PinholeCamera, boxes: Floats) -> Window:
+    """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in view."""
+    rectangles = camera.project_boxes(boxes)
+    low = np.clip(np.floor(rectangles[:, :2]) - 1, 0, None)
+    high = np.clip(np.ceil(rectangles[:, 2:]) + 1, None, (camera.width, camera.height))
+    visible = np.all(low < high, axis=1)
+    if not visible.any():
+        return 0, 0, 0, 0
+    left, top = low[visible].min(axis=0).astype(int).tolist()
+    right, bottom = high[visible].max(axis=0).astype(int).tolist()
+    return left, top, right, bottom
 
 
 @dataclass(frozen=True)
@@ -97,9 +110,7 @@ class CameraDetector:
     def _look(self, picture: Picture) -> ImageDetections:
         draws = self._rng.random(len(self._labels))
         missed = {
-            body
-            for body, draw in zip(self._labels, draws, strict=True)
-            if draw < self._faults.false_negative_rate
+            body for body, draw in zip(self._labels, draws, strict=True) if draw < self._faults.false_negative_rate
         }
         seen = np.array(
             [

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from care_sim.errors import unknown
-from care_sim.grid import Floats
+from care_sim.frames import Floats
 from care_sim.world.bullet import BulletWorld, Integers
 
 

@@ -30,7 +30,8 @@ class LidarNoise:
 
 class Lidar:
     """Casts the fired cells through a ray engine; noise draws are one a cell, fired or not, so that
-    every policy meets the same noise (common random numbers)."""
+    every policy meets the same noise (common random numbers).
+    """
 
     def __init__(self, grid: AngularGrid, engine: RayEngine, noise: LidarNoise, rng: np.random.Generator):
         self.grid = grid

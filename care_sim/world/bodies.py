@@ -1,5 +1,4 @@
-"""
-The catalogue of bodies: what each looks like, how large it is, and where the size comes from.
+"""The catalogue of bodies: what each looks like, how large it is, and where the size comes from.
 
 Body frame: x forward, y left, z up, origin on the ground under the centre. Sizes are length, width,
 height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as
@@ -67,8 +66,7 @@ def _block(name: str, label: str | None, size: Triple, colour: Triple) -> BodyKi
 
 
 def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
-    """
-    Two legs one stride apart, torso and head, in the proportions of an adult: hip at 0.47 of the
+    """Two legs one stride apart, torso and head, in the proportions of an adult: hip at 0.47 of the
     height and chin at 0.87 (Drillis and Contini 1966, body segment lengths).
     """
     length, width, height = size

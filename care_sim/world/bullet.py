@@ -8,28 +8,38 @@ import pybullet
 from numpy.typing import NDArray
 
 from care_sim.frames import Frame, Pose, turned
-from care_sim.pinhole import PinholeCamera
+from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Window = tuple[int, int, int, int]
+"""Left, top, right, bottom in whole pixels."""
+
 NOTHING = -1
 RAYS_A_CALL = 8192
 """`rayTestBatch` returns nothing, silently, for a batch of 16,384 rays or more."""
 
 _SHAPES = {"box": pybullet.GEOM_BOX, "cylinder": pybullet.GEOM_CYLINDER, "sphere": pybullet.GEOM_SPHERE}
 _OPAQUE, _TRANSPARENT = 1, 2
-_IDS_AND_LINKS = pybullet.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX
-_NEAR_M, _FAR_M = 0.1, 120.0
+_ID_BITS = (1 << 24) - 1
+"""A pixel holds the body id in its low 24 bits and the link above."""
+_FAR_M = 120.0
 
 
 class BulletWorld:
-    """Bodies standing on a ground plane, in one DIRECT client. Not to be shared between processes."""
+    """Bodies standing on a ground plane, in one DIRECT client. Not to be shared between processes.
 
-    def __init__(self) -> None:
+    What the sensors look through (the ground in the camera, the car that carries them) has no look, which
+    costs nothing to render; with `drawn` it has one, for pictures that people look at.
+    """
+
+    def __init__(self, *, drawn: bool = False) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
+        self._drawn = drawn
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
-        self.ground = pybullet.createMultiBody(0, plane, physicsClientId=self._client)
+        look = -1 if drawn else self._no_look()
+        self.ground = pybullet.createMultiBody(0, plane, look, physicsClientId=self._client)
 
     def close(self) -> None:
         """Free the client; calling it again does nothing."""
@@ -38,11 +48,12 @@ class BulletWorld:
             self._client = -1
 
     def add(self, kind: BodyKind, pose: Pose, *, transparent: bool = False) -> int:
-        """Place a body and return its id. A `transparent` one is not hit by rays."""
+        """Place a body and return its id. A `transparent` one is neither hit by rays nor seen."""
+        seen = self._drawn or not transparent
         body = pybullet.createMultiBody(
             0,
             pybullet.createCollisionShapeArray(physicsClientId=self._client, **_collision(kind.parts)),
-            pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(kind.parts)),
+            self._look(kind.parts) if seen else self._no_look(),
             physicsClientId=self._client,
         )
         group = _TRANSPARENT if transparent else _OPAQUE
@@ -57,8 +68,7 @@ class BulletWorld:
         pybullet.resetBasePositionAndOrientation(body, (x, y, 0.0), turn, physicsClientId=self._client)
 
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
-        """
-        Cast rays (n, 3 unit vectors, world frame) from `origin`.
+        """Cast rays (n, 3 unit vectors, world frame) from `origin`.
 
         Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NOTHING there.
         """
@@ -74,19 +84,22 @@ class BulletWorld:
         shares = np.fromiter((hit[2] for hit in hits), np.float64, len(hits))
         return np.where(ids == NOTHING, np.inf, shares * reach), ids
 
-    def body_ids(self, camera: PinholeCamera, sensor: Frame) -> Integers:
-        """
-        (height, width) id of the body each pixel of `camera` shows, NOTHING for the sky.
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window | None = None) -> Integers:
+        """(height, width) id of the body each pixel of `camera` shows, NOTHING where there is none.
 
-        The camera is mounted in the frame `sensor`.
+        The camera is mounted in the frame `sensor`. Pixels outside `window` are left at NOTHING.
         """
-        picture = self._picture(camera, sensor)
-        ids = np.asarray(picture[4]).reshape(camera.height, camera.width)
-        return np.where(ids < 0, NOTHING, ids & ((1 << 24) - 1))
+        left, top, right, bottom = window if window is not None else (0, 0, camera.width, camera.height)
+        ids = np.full((camera.height, camera.width), NOTHING, np.int64)
+        if left < right and top < bottom:
+            rendered = np.asarray(self._render(camera, sensor, (left, top, right, bottom))[4])
+            rendered = rendered.reshape(bottom - top, right - left)
+            ids[top:bottom, left:right] = np.where(rendered < 0, NOTHING, rendered & _ID_BITS)
+        return ids
 
     def colours(self, camera: PinholeCamera, sensor: Frame) -> NDArray[np.uint8]:
         """(height, width, 3) rendered picture of the same view as `body_ids`."""
-        picture = self._picture(camera, sensor)
+        picture = self._render(camera, sensor, (0, 0, camera.width, camera.height))
         return np.asarray(picture[2], np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
 
     def clearance(self, body: int, other: int, within: float = 100.0) -> float:
@@ -94,21 +107,31 @@ class BulletWorld:
         points = pybullet.getClosestPoints(body, other, within, physicsClientId=self._client)
         return float(min((point[8] for point in points), default=np.inf))
 
-    def _picture(self, camera: PinholeCamera, sensor: Frame) -> tuple[Any, ...]:
+    def _render(self, camera: PinholeCamera, sensor: Frame, window: Window) -> tuple[Any, ...]:
         eye = sensor.origin + turned(np.array(camera.position), sensor.yaw)
         forward, _, up = turned(camera.axes, sensor.yaw)
-        vertical = 2 * np.degrees(np.arctan(camera.height / 2 / camera.focal))
+        left, top, right, bottom = window
+        scale = NEAR_M / camera.focal
+        across = [(u - camera.width / 2) * scale for u in (left, right)]
+        upward = [(camera.height / 2 - v) * scale for v in (bottom, top)]
         picture: tuple[Any, ...] = pybullet.getCameraImage(
-            camera.width,
-            camera.height,
+            right - left,
+            bottom - top,
             pybullet.computeViewMatrix(eye, eye + forward, up),
-            pybullet.computeProjectionMatrixFOV(vertical, camera.width / camera.height, _NEAR_M, _FAR_M),
+            pybullet.computeProjectionMatrix(*across, *upward, NEAR_M, _FAR_M),
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
-            flags=_IDS_AND_LINKS,
+            flags=pybullet.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX,
             physicsClientId=self._client,
         )
         return picture
+
+    def _look(self, parts: Sequence[Part]) -> int:
+        return int(pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(parts)))
+
+    def _no_look(self) -> int:
+        """A speck: without a visual shape PyBullet would draw the collision shape."""
+        return int(pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=[1e-4] * 3, physicsClientId=self._client))
 
 
 def _collision(parts: Sequence[Part]) -> dict[str, Any]:

@@ -1,5 +1,4 @@
-"""
-Road, ego kinematics and traffic of highway-env, seen in a z-up world.
+"""Road, ego kinematics and traffic of highway-env, seen in a z-up world.
 
 highway-env's y axis points down in its pictures; here y points left, so y and headings change sign
 at this border and nowhere else. Lane 0 is the ego's; lanes are numbered to the left, negative to the
@@ -21,8 +20,7 @@ _ROAD_LENGTH_M = 1000.0
 
 
 class Traffic:
-    """
-    A straight road and the vehicles that drive on it.
+    """A straight road and the vehicles that drive on it.
 
     `directions` gives one entry a lane from right to left: +1 along the ego, -1 oncoming;
     `ego_lane` is the index of the ego's lane in it.

@@ -1,13 +1,12 @@
 """The world of one episode: every body, who moves it, and what the scoring reads off it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from care_sim.errors import InvalidInput
-from care_sim.frames import Pose
-from care_sim.grid import Floats
+from care_sim.frames import Floats, Pose
 from care_sim.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.bullet import BulletWorld
@@ -35,8 +34,7 @@ class Actor:
 
 @dataclass(frozen=True)
 class Passage:
-    """
-    How close the ego came to the first-sighting actor while the world advanced.
+    """How close the ego came to the first-sighting actor while the world advanced.
 
     `nearest_m` centre to centre and `clearance_m` hull to hull; `impact_speed_mps` is the ego's speed
     at its first contact with any body, else None.
@@ -48,8 +46,7 @@ class Passage:
 
 
 class World:
-    """
-    Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
+    """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
 
     World frame: x along the road, y left, z up; the ego starts with its centre at the origin.
     """
@@ -94,10 +91,11 @@ class World:
         """The car's own motion, as its odometry reports it."""
         return self._motion
 
-    def box(self, actor: Actor) -> Floats:
-        """(7,) box of an actor in the world frame."""
-        x, y, yaw = actor.pose_at(self.time)
-        return np.array([x, y, actor.kind.size[2] / 2, *actor.kind.size, yaw])
+    def boxes(self, actors: Sequence[Actor]) -> Floats:
+        """(n, 7) boxes of actors in the world frame."""
+        rows = [(*actor.pose_at(self.time), *actor.kind.size) for actor in actors]
+        x, y, yaw, length, width, height = np.array(rows).reshape(-1, 6).T
+        return np.column_stack([x, y, height / 2, length, width, height, yaw])
 
     def advance(self, acceleration: float, duration: float) -> Passage:
         """Move everything by `duration` seconds, a whole number of world steps."""
