@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+
+from care_sim.evaluation.metrics import outcome
+from care_sim.types import Keyframe, Outcome
+
+
+def keyframe(index=0, **changes):
+    quiet = {
+        "time_s": index / 10, "fired": np.arange(100), "in_view": False, "detected": False, "braking": False,
+        "speed_mps": 8.0, "distance_m": 30.0 - index, "nearest_m": 30.0 - index, "clearance_m": 25.0 - index,
+        "impact_speed_mps": None,
+    }  # fmt: skip
+    return Keyframe(index=index, **{**quiet, **changes})
+
+
+def test_an_episode_worked_by_hand():
+    episode = [
+        keyframe(0, nearest_m=1.0, clearance_m=0.1),
+        keyframe(1, in_view=True, nearest_m=9.0, clearance_m=7.5),
+        keyframe(2, in_view=True, detected=True, distance_m=14.4, braking=True, nearest_m=8.0, clearance_m=6.0),
+        keyframe(3, detected=True, distance_m=12.0, braking=True, nearest_m=5.5, clearance_m=3.25, fired=np.arange(7)),
+        keyframe(4, in_view=True, nearest_m=6.0, clearance_m=4.0),
+    ]
+    assert outcome(episode) == Outcome(14.4, True, 5.5, 3.25, False, None, 407)
+
+
+def test_never_seen_never_detected():
+    assert outcome([keyframe(0), keyframe(1)]) == Outcome(None, False, None, None, False, None, 200)
+
+
+def test_seen_but_never_detected_still_has_a_clearance():
+    result = outcome([keyframe(0), keyframe(1, in_view=True)])
+    assert (result.detection_distance_m, result.min_distance_m, result.clearance_m) == (None, 29.0, 24.0)
+
+
+def test_the_first_contact_gives_the_impact_speed():
+    result = outcome([keyframe(0), keyframe(1, impact_speed_mps=3.5), keyframe(2, impact_speed_mps=2.0)])
+    assert (result.collision, result.impact_speed_mps) == (True, 3.5)
+
+
+def test_a_touch_at_standstill_is_a_collision():
+    result = outcome([keyframe(0, impact_speed_mps=0.0)])
+    assert (result.collision, result.impact_speed_mps) == (True, 0.0)
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_rays_are_counted_as_fired(count):
+    assert outcome([keyframe(n, fired=np.arange(n)) for n in range(count)]).rays_fired == sum(range(count))

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_sim.pinhole import PinholeCamera
+
+cameras = st.builds(
+    PinholeCamera,
+    width=st.integers(32, 640),
+    height=st.integers(32, 480),
+    horizontal_fov=st.floats(0.3, 2.5),
+    position=st.tuples(*[st.floats(-2, 2)] * 3),
+    yaw=st.floats(-np.pi, np.pi),
+    pitch=st.floats(-1, 1),
+)
+
+
+def test_ninety_degrees_wide_has_half_its_width_as_focal_length():
+    assert PinholeCamera(320, 180, np.pi / 2).focal == pytest.approx(160)
+
+
+@pytest.mark.parametrize(
+    ("point", "pixel"),
+    [((10, 0, 0), (160, 90)), ((10, 5, 0), (80, 90)), ((10, -10, 0), (320, 90)), ((20, 0, 5), (160, 50))],
+)
+def test_left_is_left_and_up_is_up_in_the_picture(point, pixel):
+    pixels, depth = PinholeCamera().project([point])
+    assert pixels[0] == pytest.approx(pixel)
+    assert depth[0] == pytest.approx(point[0])
+
+
+def test_yaw_turns_left_and_pitch_raises():
+    left, _ = PinholeCamera(yaw=0.2).project([[np.cos(0.2), np.sin(0.2), 0.0]])
+    raised, _ = PinholeCamera(pitch=0.2).project([[np.cos(0.2), 0.0, np.sin(0.2)]])
+    assert left[0] == pytest.approx((160, 90))
+    assert raised[0] == pytest.approx((160, 90))
+
+
+def test_the_optical_centre_is_where_it_is_mounted():
+    pixels, depth = PinholeCamera(position=(1.0, 2.0, 3.0)).project([[11.0, 2.0, 3.0]])
+    assert pixels[0] == pytest.approx((160, 90))
+    assert depth[0] == pytest.approx(10)
+
+
+def test_points_behind_have_no_pixel():
+    pixels, depth = PinholeCamera().project([[-10.0, 0, 0], [0.0, 1, 0]])
+    assert np.all(np.isnan(pixels))
+    assert np.all(depth <= 0)
+
+
+@given(cameras, st.floats(0, 1), st.floats(0, 1), st.floats(0.5, 100))
+def test_rays_and_projection_undo_each_other(camera, across, down, scale):
+    pixel = np.array([across * camera.width, down * camera.height])
+    point = np.array(camera.position) + scale * camera.rays(pixel)
+    pixels, depth = camera.project([point])
+    assert pixels[0] == pytest.approx(pixel, abs=1e-6 * camera.width * (1 + camera.focal / camera.width))
+    assert depth[0] == pytest.approx(scale)
+
+
+@given(cameras)
+def test_axes_are_orthonormal_and_right_handed(camera):
+    assert camera.axes @ camera.axes.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(camera.axes) == pytest.approx(1)
+
+
+def test_box_rays_begin_with_the_centre_and_hold_the_corners():
+    camera = PinholeCamera()
+    rays = camera.box_rays([[10, 20, 30, 60]])
+    pixels, _ = camera.project(rays[0])
+    assert rays.shape == (1, 9, 3)
+    assert pixels[0] == pytest.approx((20, 40))
+    corners = {tuple(pixel) for pixel in np.round(pixels[1:], 6).tolist()}
+    assert {(10, 20), (10, 60), (30, 20), (30, 60)} <= corners

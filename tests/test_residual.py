@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+
+from care_sim.pinhole import PinholeCamera
+from care_sim.residual import camera_layers, explained, wedges
+from care_sim.types import Belief, Ego, Rig
+
+CAMERA = PinholeCamera()
+RIG = Rig(cameras=(CAMERA,))
+
+
+def box_around(point, half=5.0, camera=CAMERA):
+    (pixel,), _ = camera.project([point])
+    return (pixel[0] - half, pixel[1] - half, pixel[0] + half, pixel[1] + half)
+
+
+def belief(detections, tracks):
+    return Belief(Ego(), RIG.budget, detections, tracks, np.zeros(RIG.grid.shape, np.float32))
+
+
+def test_a_same_class_centre_inside_the_box_explains_it(tracks_at, seen):
+    tracks = tracks_at(("pedestrian", 20, 2, 0, 0))
+    inside = seen(("pedestrian", *box_around((20, 2, -1))))
+    assert explained(inside, tracks, RIG).tolist() == [True]
+
+
+def test_another_class_explains_nothing(tracks_at, seen):
+    tracks = tracks_at(("car", 20, 2, 0, 0))
+    assert explained(seen(("pedestrian", *box_around((20, 2, -1)))), tracks, RIG).tolist() == [False]
+
+
+def test_a_centre_beside_the_box_explains_nothing(tracks_at, seen):
+    tracks = tracks_at(("car", 20, 2, 0, 0))
+    left, top, right, bottom = box_around((20, 2, -1))
+    beside = seen(("car", left + 12, top, right + 12, bottom), ("car", left, top + 12, right, bottom + 12))
+    assert explained(beside, tracks, RIG).tolist() == [False, False]
+
+
+def test_one_track_of_several_is_enough_and_each_box_is_judged_alone(tracks_at, seen):
+    tracks = tracks_at(("car", 30, -4, 0, 0), ("truck", 20, 2, 0, 0), ("car", 20, 2, 0, 0))
+    boxes = seen(("car", *box_around((20, 2, -1))), ("car", *box_around((15, -8, -1))))
+    assert explained(boxes, tracks, RIG).tolist() == [True, False]
+
+
+def test_a_track_behind_the_camera_explains_nothing(tracks_at, seen):
+    """Its mirror image through the pinhole would lie in the box."""
+    tracks = tracks_at(("car", -20, -2, 0, 0), z=1.0)
+    assert explained(seen(("car", *box_around((20, 2, -1)))), tracks, RIG).tolist() == [False]
+
+
+def test_forecasts_are_turned_back_to_when_the_picture_was_taken(tracks_at, seen):
+    """The car has turned 0.2 rad left since: what is ahead now stood 0.2 rad to the left in the picture."""
+    ahead = tracks_at(("car", 20, 0, 0, 0))
+    then = (20 * np.cos(0.2), 20 * np.sin(0.2), -1)
+    assert explained(seen(("car", *box_around(then)), yaw_change=0.2), ahead, RIG).tolist() == [True]
+    assert explained(seen(("car", *box_around(then)), yaw_change=0.0), ahead, RIG).tolist() == [False]
+    assert explained(seen(("car", *box_around(then)), yaw_change=-0.2), ahead, RIG).tolist() == [False]
+
+
+def test_wedges_are_turned_to_where_the_car_looks_now(seen):
+    then = (20 * np.cos(0.2), 20 * np.sin(0.2), 0)
+    (wedge,) = wedges(seen(("car", *box_around(then)), yaw_change=0.2), RIG)
+    columns = np.unique(wedge % 512)
+    assert 256 in columns
+    assert abs(columns.mean() - 255.5) < 2
+
+
+@pytest.mark.parametrize("camera", range(6))
+def test_every_detection_is_judged_by_its_own_camera(tracks_at, seen, camera):
+    cameras = tuple(PinholeCamera(yaw=yaw) for yaw in np.deg2rad([0, 60, 120, 180, 240, 300]))
+    rig = Rig(cameras=cameras)
+    x, y = 20 * np.cos(cameras[camera].yaw), 20 * np.sin(cameras[camera].yaw)
+    tracks = tracks_at(("car", x, y, 0, 0), z=0.0)
+    detection = seen(("car", 155, 85, 165, 95), camera=camera)
+    assert explained(detection, tracks, rig).tolist() == [True]
+    (wedge,) = wedges(detection, rig)
+    assert rig.grid.cells_of([[x, y, 0.0]])[0] in wedge
+
+
+def test_layers_part_what_memory_explains_from_what_it_does_not(tracks_at, seen):
+    tracks = tracks_at(("car", 20, 2, 0, 0), ("car", 30, -6, 0, 0))
+    boxes = seen(
+        ("car", *box_around((20, 2, -1))), ("pedestrian", *box_around((15, -8, -1))), ("car", *box_around((30, -6, -1)))
+    )
+    unexplained, known = camera_layers(belief(boxes, tracks), RIG)
+    first, second, third = (wedge.tolist() for wedge in wedges(boxes, RIG))
+    assert [wedge.tolist() for wedge in unexplained] == [second]
+    assert [wedge.tolist() for wedge in known] == [first, third]
+
+
+def test_without_tracks_everything_is_residual_and_without_camera_nothing(tracks_at, seen):
+    boxes = seen(("car", 10, 10, 50, 50), ("bus", 100, 80, 200, 120))
+    unexplained, known = camera_layers(belief(boxes, tracks_at()), RIG)
+    assert (len(unexplained), len(known)) == (2, 0)
+    assert camera_layers(belief(seen(), tracks_at(("car", 20, 0, 0, 0))), RIG) == ([], [])

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.reward import KEEP_CLEAR_M, WEIGHTS, terms, weights
+from care_sim.types import Keyframe
+
+
+def keyframe(**changes):
+    quiet = {
+        "index": 0, "time_s": 0.0, "fired": np.arange(3), "in_view": False, "detected": False, "braking": False,
+        "speed_mps": 8.0, "distance_m": 30.0, "nearest_m": 30.0, "clearance_m": 20.0, "impact_speed_mps": None,
+    }  # fmt: skip
+    return Keyframe(**{**quiet, **changes})
+
+
+def nothing(**changes):
+    return {"delay": 0.0, "clearance": 0.0, "collision": 0.0, "braking": 0.0, **changes}
+
+
+@pytest.mark.parametrize(
+    ("frame", "before", "expected"),
+    [
+        ({}, (False, False), {}),
+        ({"in_view": True}, (False, False), {"delay": -1.0}),
+        ({"in_view": False}, (True, False), {"delay": -1.0}),
+        ({"in_view": True, "detected": True}, (True, False), {}),
+        ({"in_view": True}, (True, True), {}),
+        ({"braking": True}, (False, False), {"braking": -1.0}),
+        ({"braking": True, "in_view": True, "detected": True}, (False, False), {}),
+        ({"braking": True}, (True, True), {}),
+        ({"clearance_m": 0.5}, (False, False), {}),
+        ({"clearance_m": KEEP_CLEAR_M}, (True, True), {}),
+        ({"clearance_m": KEEP_CLEAR_M / 4}, (True, True), {"clearance": -0.75}),
+        ({"clearance_m": -0.3, "impact_speed_mps": 4.0}, (True, True), {"clearance": -1.0, "collision": -1.0}),
+        ({"clearance_m": np.inf, "impact_speed_mps": 0.0}, (False, False), {"collision": -1.0}),
+    ],
+)
+def test_terms(frame, before, expected):
+    assert terms(keyframe(**frame), *before) == nothing(**expected)
+
+
+def test_a_weight_is_changed_by_name_and_the_rest_stays():
+    assert weights(None) == WEIGHTS
+    assert weights({"delay": 5.0}) == {**WEIGHTS, "delay": 5.0}
+    assert WEIGHTS["delay"] == 1.0
+
+
+def test_an_unknown_term_is_refused_with_the_known_ones():
+    with pytest.raises(InvalidInput, match=r"'speed'.*braking, clearance, collision, delay"):
+        weights({"speed": 1.0})
+
+
+def test_every_term_has_a_weight():
+    assert set(terms(keyframe(), False, False)) == set(WEIGHTS)
