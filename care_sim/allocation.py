@@ -44,8 +44,10 @@ def _round_robin(sets: Sequence[Cells], limit: int, chosen: dict[int, None]) -> 
     while queues and len(chosen) < limit:
         waiting = []
         for queue in queues:
-            cell = next((cell for cell in queue if cell not in chosen), None)
-            if cell is None:
+            for cell in queue:
+                if cell not in chosen:
+                    break
+            else:
                 continue
             chosen[cell] = None
             if len(chosen) == limit:

@@ -179,7 +179,8 @@ class DartoutEnv(ClosedLoopEnv):
 
     The paper's first closed-loop scene. The seed draws the speeds, the place and the timing; see
     `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources, all of which can be
-    passed as arguments. `occluder="truck"` parks a vehicle that perception reports instead.
+    passed as arguments. `occluder="truck", occluder_reported=True` parks a vehicle that
+    perception reports instead.
     """
 
     __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import unknown
+from care_sim.errors import InvalidInput, unknown
 from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
     LANE_WIDTH_M,
@@ -31,12 +31,13 @@ class CrossingScenario(Scenario):
     """A two-way street with a parking lane on each side. The occluder stands in the right one; the
     person waits hidden behind its far end, then runs straight across to the far kerb.
 
-    A trailer or a hoarding is none of the five reported classes, so neither detector speaks of it. With
-    `occluder="truck"` or `"van"` a reported vehicle stands in its place, and the person emerges inside
-    that track's dilated hull: the second reading of the scene. Ranges are drawn uniformly by the seed.
+    Perception does not report the occluder: a trailer or a hoarding is none of the five classes. With
+    `occluder="truck"` (or "van") and `occluder_reported=True` it does, and the person emerges inside that
+    track's dilated hull: the second reading of the scene. Ranges are drawn uniformly by the seed.
     """
 
     occluder: str = "trailer"
+    occluder_reported: bool = False
     ego_speed_mps: Range = EGO_SPEED_MPS
     crossing_m: Range = (37.0, 41.0)
     """From the ego's first position to the person's line: four to five seconds of approach, so that every
@@ -56,6 +57,8 @@ class CrossingScenario(Scenario):
     def __post_init__(self) -> None:
         if self.occluder not in OCCLUDERS:
             raise unknown("occluder", self.occluder, OCCLUDERS)
+        if self.occluder_reported and CATALOGUE[self.occluder].label is None:
+            raise InvalidInput(f"occluder_reported needs occluder='truck' or 'van', a {self.occluder} has no class")
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
@@ -77,7 +80,7 @@ class CrossingScenario(Scenario):
         length, width, _ = CATALOGUE[self.occluder].size
         y = RIGHT_PARKING_Y + draw(rng, self.kerb_offset_m)
         x = crossing_x - draw(rng, self.gap_m) - length / 2
-        world.add("occluder", self.occluder, (x, y, 0.0))
+        world.add("occluder", self.occluder, (x, y, 0.0), reported=self.occluder_reported)
         return y - width / 2 + 0.4
 
     def _add_person(

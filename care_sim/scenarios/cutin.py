@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import unknown
 from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
     LANE_WIDTH_M,
@@ -18,19 +17,17 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
-OCCLUDERS = ("bus", "trailer")
-
 
 @dataclass(frozen=True)
 class CutIn(Scenario):
     """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the right
     lane; a car standing hidden before it pulls out (highway-env lane change, IDM) ahead of the ego.
 
-    The bus is one of the five reported classes; `occluder="trailer"` is not. Ranges are drawn uniformly
-    by the seed.
+    The bus is one of the five classes; `occluder_reported=False` keeps perception silent about it. Ranges
+    are drawn uniformly by the seed.
     """
 
-    occluder: str = "bus"
+    occluder_reported: bool = True
     ego_speed_mps: Range = EGO_SPEED_MPS
     stop_m: Range = (42.0, 46.0)
     """From the ego's first position to the front of the bus: far enough for the bus to hide the car."""
@@ -40,17 +37,14 @@ class CutIn(Scenario):
     """Time gap of the ego to the car's rear when it pulls out. UN Regulation 157 (5.2.5.2) counts a
     cut-in at this closing speed as avoidable down to about 1 s."""
 
-    def __post_init__(self) -> None:
-        if self.occluder not in OCCLUDERS:
-            raise unknown("occluder", self.occluder, OCCLUDERS)
-
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
         ego_speed, stop_x = draw(rng, self.ego_speed_mps), draw(rng, self.stop_m)
         traffic = Traffic((1, 1), ego_lane=1, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
         world = World(traffic, ego_speed)
-        occluder, car = CATALOGUE[self.occluder], CATALOGUE["car"]
-        world.add("occluder", self.occluder, (stop_x - occluder.size[0] / 2, -LANE_WIDTH_M, 0.0))
+        occluder, car = CATALOGUE["bus"], CATALOGUE["car"]
+        stop = (stop_x - occluder.size[0] / 2, -LANE_WIDTH_M, 0.0)
+        world.add("occluder", "bus", stop, reported=self.occluder_reported)
 
         rear_x = stop_x + draw(rng, self.gap_m)
         driver = traffic.add_parked_driver(rear_x + car.size[0] / 2, -1, car, SPEED_LIMIT_MPS)

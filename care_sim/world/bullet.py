@@ -40,6 +40,7 @@ class BulletWorld:
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
         look = -1 if drawn else self._no_look()
         self.ground = pybullet.createMultiBody(0, plane, look, physicsClientId=self._client)
+        self._set_group(self.ground, _OPAQUE)
 
     def close(self) -> None:
         """Free the client; calling it again does nothing."""
@@ -56,8 +57,7 @@ class BulletWorld:
             self._look(kind.parts) if seen else self._no_look(),
             physicsClientId=self._client,
         )
-        group = _TRANSPARENT if transparent else _OPAQUE
-        pybullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=self._client)
+        self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
         self.move(body, pose)
         return int(body)
 
@@ -125,6 +125,9 @@ class BulletWorld:
             physicsClientId=self._client,
         )
         return picture
+
+    def _set_group(self, body: int, group: int) -> None:
+        pybullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=self._client)
 
     def _look(self, parts: Sequence[Part]) -> int:
         return int(pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(parts)))

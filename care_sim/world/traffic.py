@@ -17,6 +17,8 @@ from care_sim.frames import Pose
 from care_sim.world.bodies import BodyKind
 
 _ROAD_LENGTH_M = 1000.0
+MAX_STEERING = np.deg2rad(35.0)
+"""Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out sideways."""
 
 
 class Traffic:
@@ -80,6 +82,7 @@ class Traffic:
         vehicle.LENGTH, vehicle.WIDTH = kind.size[:2]
         vehicle.check_collisions = vehicle.collidable = False
         vehicle.enable_lane_change = False
+        vehicle.MAX_STEERING_ANGLE = MAX_STEERING
         return RoadVehicle(vehicle, self)
 
 

@@ -16,6 +16,10 @@ STEP_S = 0.05
 """World step. Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
 
 
+Motion = Callable[[float], Pose]
+"""The pose of a body at a time in seconds."""
+
+
 @dataclass(frozen=True)
 class Actor:
     """A body with a pose at any time. `reported` says whether perception knows its class."""
@@ -23,7 +27,7 @@ class Actor:
     name: str
     kind: BodyKind
     body: int
-    pose_at: Callable[[float], Pose]
+    pose_at: Motion
     reported: bool
 
     @property
@@ -60,26 +64,22 @@ class World:
         self.ego = traffic.add_ego(0.0, ego_speed, self.ego_kind)
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self.first_sighting: Actor | None = None
+        self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
-        self._motion = Ego(ego_speed)
+        self._ego_motion = Ego(ego_speed)
         self._steps = 0
 
-    def add(
-        self, name: str, kind: str, pose: Pose | Callable[[float], Pose] | RoadVehicle, *, reported: bool = True
-    ) -> Actor:
-        """Add a body that stands at a pose, follows a function of time, or drives in the traffic."""
-        pose_at: Callable[[float], Pose]
-        if isinstance(pose, RoadVehicle):
-            vehicle = pose
-            pose_at = lambda _time: vehicle.pose  # noqa: E731
-        elif callable(pose):
-            pose_at = pose
-        else:
-            fixed = pose
-            pose_at = lambda _time: fixed  # noqa: E731
+    def add(self, name: str, kind: str, pose: Pose | Motion | RoadVehicle, *, reported: bool = True) -> Actor:
+        """Add a body that stands at a pose, follows a function of time, or drives in the traffic.
+
+        `reported=False` keeps perception silent about it, whatever its kind.
+        """
+        pose_at = _motion(pose)
         body = self.bullet.add(CATALOGUE[kind], pose_at(0.0))
         actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
         self.actors.append(actor)
+        if not isinstance(pose, tuple):
+            self._moving.append(actor)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -89,7 +89,7 @@ class World:
     @property
     def ego_motion(self) -> Ego:
         """The car's own motion, as its odometry reports it."""
-        return self._motion
+        return self._ego_motion
 
     def boxes(self, actors: Sequence[Actor]) -> Floats:
         """(n, 7) boxes of actors in the world frame."""
@@ -116,9 +116,9 @@ class World:
         for event in [event for due, event in self._events if due <= self.time]:
             event()
         self._events = [(due, event) for due, event in self._events if due > self.time]
-        self._motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / STEP_S)
+        self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / STEP_S)
         self.bullet.move(self.ego_body, self.ego.pose)
-        for actor in self.actors:
+        for actor in self._moving:
             self.bullet.move(actor.body, actor.pose_at(self.time))
         return self._passage()
 
@@ -131,6 +131,14 @@ class World:
             nearest = float(np.hypot(x - ego_x, y - ego_y))
             clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
         return Passage(nearest, clearance, self.ego.speed if touched else None)
+
+
+def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
+    if isinstance(pose, RoadVehicle):
+        return lambda _time: pose.pose
+    if callable(pose):
+        return pose
+    return lambda _time: pose
 
 
 def whole_steps(duration: float) -> int:
