@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from care_sim.frames import Frame, Pose, turned
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.quiet_pybullet import pybullet
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
