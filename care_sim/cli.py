@@ -1,0 +1,117 @@
+"""The command line `care-sim`: finds the command, runs it, and says in one line what was wrong."""
+
+import contextlib
+import inspect
+import io
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, NoReturn
+
+import tyro
+
+from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.study.commands import Crowding, Report, Reproduce, Run, Sweep
+
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+@dataclass(frozen=True)
+class Policies:
+    """List the policies."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.policies import BUILT_IN, policy_names
+
+        for name in policy_names():
+            print(f"{name:12} {_summary(BUILT_IN[name]) if name in BUILT_IN else 'From an installed package.'}")
+        return 0
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """List the scenarios and their parameters."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.scenarios import SCENARIOS
+
+        for name, scenario in SCENARIOS.items():
+            print(f"{name:12} {_summary(scenario)}")
+            print("".join(f"    {field.name}={field.default!r}\n" for field in fields(scenario)))
+        return 0
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure the speed of the environments beside highway-env."""
+
+
+ABOUT = "Closed-loop benchmark for adaptive LiDAR sensing."
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "reproduce": Reproduce,
+    "run": Run,
+    "sweep": Sweep,
+    "crowding": Crowding,
+    "report": Report,
+    "policies": Policies,
+    "scenarios": Scenarios,
+    "bench": Bench,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit: 0 done, 1 some episode failed, 2 bad input, 130 interrupted."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        sys.exit(_command(arguments))
+    except (InvalidInput, MissingExtra) as error:
+        _complain(str(error))
+    except OSError as error:
+        _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except KeyboardInterrupt:
+        _complain("interrupted; finished episodes are kept, the same command goes on from there", INTERRUPTED)
+
+
+def _command(arguments: list[str]) -> int:
+    if arguments[:1] == ["bench"]:
+        from care_sim import bench
+
+        options = _in_one_line(lambda: tyro.cli(bench.BenchConfig, args=arguments[1:], prog="care-sim bench"))
+        return bench.run(options)
+    command = _in_one_line(
+        lambda: tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="care-sim", description=ABOUT, args=arguments)
+    )
+    return int(command())
+
+
+def _in_one_line(parse: Callable[[], Any]) -> Any:
+    """Parse the command line with tyro; help is printed as tyro does, a mistake becomes one line."""
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return parse()
+    except SystemExit as end:
+        if end.code in (0, None):
+            raise
+    raise InvalidInput(_one_line(complaint.getvalue()))
+
+
+def _one_line(box: str) -> str:
+    """The message that tyro draws as a box: sections between rules, without title, second guesses and help."""
+    lines = [line.strip(" │╭╮╰╯") for line in box.splitlines()][1:]
+    sections = " ".join(lines).replace("─" * 3, "\n").replace("─", "").splitlines()
+    texts = [" ".join(section.split()).partition(" in care-sim ")[0] for section in sections]
+    return "; ".join(text.rstrip(".") for text in texts if text and not text.startswith("For full helptext"))
+
+
+def _summary(thing: object) -> str:
+    """The line that the module of a policy or scenario begins with."""
+    module = inspect.getmodule(thing)
+    return (inspect.getdoc(module) or "").partition("\n")[0]
+
+
+def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
+    print(f"care-sim: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(code)

@@ -1,0 +1,213 @@
+"""The commands that play episodes: frozen dataclasses whose fields are their options.
+
+What imports the simulator or draws is imported by the command that needs it: help stays quick.
+"""
+
+import ast
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from care_sim.allocation import RESERVE_FRACTION
+from care_sim.errors import InvalidInput
+from care_sim.perception.detectors import MIN_RETURNS
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from care_sim.study.config import EpisodeConfig, Parameters
+
+DONE, FAILED = 0, 1
+PIPE_WIDTH = 180
+"""Columns of a table that is not printed on a terminal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """Conditions that all episodes share."""
+
+    reserve_fraction: float = RESERVE_FRACTION
+    """Share rho of the budget that the allocator keeps for the reserve, 0 to 1."""
+    min_returns: int = MIN_RETURNS
+    """Fired rays that must hit an object for it to be detected."""
+    lidar_range_sigma: float = 0.0
+    """Gaussian noise on every range, metres."""
+    lidar_dropout: float = 0.0
+    """Rate of returns lost, 0 to 1."""
+    engine: str = "bullet"
+    """Ray engine."""
+    floor: bool = True
+    """Whether the shared random floor spends what the policy leaves of the budget."""
+    scenario_parameters: tuple[str, ...] = ()
+    """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policy as NAME=VALUE, for example k_safe=0 for care-sbf."""
+
+    def arguments(self) -> dict[str, Any]:
+        """As arguments of `EpisodeConfig`."""
+        pairs = {
+            "scenario_parameters": _pairs(self.scenario_parameters),
+            "policy_parameters": _pairs(self.policy_parameters),
+        }
+        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Play one episode and print its timeline and outcome."""
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
+    """dartout, dense or cutin; `care-sim scenarios` lists them."""
+    policy: str = "care"
+    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
+    budget: float = 0.1
+    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
+    seed: int = 0
+    """Draws scenario, camera faults, noise and floor."""
+    false_negative_rate: float = 0.0
+    """Rate at which the camera misses a detection, 0 to 1."""
+    camera_latency: int = 0
+    """Age of the camera's detections in whole keyframes."""
+    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = Conditions()
+    """Further conditions."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.config import grid
+        from care_sim.study.episode import trace
+        from care_sim.study.timeline import print_timeline
+
+        axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
+        faults = ([self.false_negative_rate], [self.camera_latency])
+        (config,) = grid(*axes, *faults, **self.conditions.arguments())
+        print_timeline(config, *trace(config), _console())
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Study:
+    seeds: tuple[int, ...] = (5,)
+    """One number: that many seeds, from 0. Several: these seeds."""
+    workers: int = os.cpu_count() or 1
+    """Processes that play episodes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep(_Study):
+    """Play every combination of scenarios, policies, budgets, faults and seeds."""
+
+    scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
+    """`care-sim scenarios` lists them."""
+    policies: tuple[str, ...] = ("history", "all-camera", "care", "full")
+    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
+    budgets: tuple[float, ...] = (0.1,)
+    """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
+    false_negative_rates: tuple[float, ...] = (0.0,)
+    """Rates at which the camera misses a detection, 0 to 1."""
+    camera_latencies: tuple[int, ...] = (0,)
+    """Ages of the camera's detections in whole keyframes."""
+    out: Path = Path("runs/sweep")
+    """Folder of the results; an interrupted sweep goes on there."""
+    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = Conditions()
+    """Further conditions."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.config import grid
+
+        axes = (self.scenarios, self.policies, self.budgets, _seeds(self.seeds))
+        faults = (self.false_negative_rates, self.camera_latencies)
+        return _conduct(grid(*axes, *faults, **self.conditions.arguments()), self.out, self.workers)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce(_Study):
+    """Play the paper's closed-loop study, 49 configurations a seed, and print it beside the paper's figures."""
+
+    out: Path = Path("runs/reproduce")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.paper import configurations
+
+        return _conduct(configurations(_seeds(self.seeds)), self.out, self.workers)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowding(_Study):
+    """Find where the all-camera reserve collapses as vehicles fill the dense street, 117 configurations a seed."""
+
+    out: Path = Path("runs/crowding")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.crowding import configurations
+
+        return _conduct(configurations(_seeds(self.seeds)), self.out, self.workers)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Print the tables of a folder of results, and draw its figures again."""
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
+    """The --out of an earlier study."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.report import ROWS, print_report, write_report
+        from care_sim.study.rows import read_rows
+
+        rows = read_rows(self.folder / ROWS)
+        print_report(rows, _console())
+        write_report(rows, self.folder)
+        return 0
+
+
+def _conduct(configs: "Sequence[EpisodeConfig]", out: Path, workers: int) -> int:
+    from care_sim.study.report import ROWS, conduct, print_report
+    from care_sim.study.rows import read_rows
+
+    failures = conduct(configs, out, workers)
+    if len(failures) < len(configs):
+        print_report(read_rows(out / ROWS), _console())
+        print(f"Results are in {out}")
+    for failure in failures:
+        print(f"care-sim: failed: {failure}", file=sys.stderr)
+    return FAILED if failures else DONE
+
+
+def _seeds(numbers: Sequence[int]) -> list[int]:
+    if len(numbers) != 1:
+        return list(numbers)
+    if numbers[0] < 1:
+        raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {numbers[0]}")
+    return list(range(numbers[0]))
+
+
+def _pairs(texts: Sequence[str]) -> "Parameters":
+    return tuple(_pair(text) for text in texts)
+
+
+def _pair(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InvalidInput(f"parameters are given as NAME=VALUE, got {text!r}")
+    try:
+        literal = ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        literal = value
+    return name, tuple(literal) if isinstance(literal, list) else literal
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    return Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=PIPE_WIDTH)

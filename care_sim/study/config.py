@@ -1,0 +1,145 @@
+"""What an episode is made of: checked when written down, and named by a digest."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import product
+from typing import Any
+
+import gymnasium
+
+import care_sim
+from care_sim.allocation import RESERVE_FRACTION
+from care_sim.envs import IDS
+from care_sim.errors import InvalidInput
+from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
+from care_sim.policies import make_policy
+from care_sim.policies.base import Policy
+from care_sim.scenarios import make_scenario
+from care_sim.study.provenance import code_digest
+
+Parameters = tuple[tuple[str, Any], ...]
+"""Names and values, of a scenario's physics or of a policy."""
+
+ENVIRONMENTS = {name.split("-")[1].lower(): name for name in IDS}
+"""Environment id of every scenario."""
+
+FULL_BUDGET = 1.0
+"""`full` fires every cell, whatever the budget of the policies it bounds."""
+
+
+@dataclass(frozen=True)
+class EpisodeConfig:
+    """Everything that decides an episode.
+
+    The fields are the arguments of the environments (see `care_sim.envs.closed_loop.ClosedLoopEnv`);
+    `scenario_parameters` and `policy_parameters` are pairs of name and value. Raises InvalidInput for
+    anything that scenario, environment or policy does not accept.
+    """
+
+    scenario: str
+    policy: str
+    budget: float = 0.1
+    seed: int = 0
+    reserve_fraction: float = RESERVE_FRACTION
+    false_negative_rate: float = 0.0
+    camera_latency: int = 0
+    min_returns: int = MIN_RETURNS
+    lidar_range_sigma: float = 0.0
+    lidar_dropout: float = 0.0
+    engine: str = "bullet"
+    floor: bool = True
+    scenario_parameters: Parameters = ()
+    policy_parameters: Parameters = ()
+
+    def __post_init__(self) -> None:
+        if self.seed < 0 or self.seed != int(self.seed):
+            raise InvalidInput(f"seed must be a whole number >= 0, got {self.seed}")
+        make_scenario(self.scenario, **dict(self.scenario_parameters))
+        ReturnsDetector({}, self.min_returns)
+        with self.make_env() as env:
+            self.make_policy(env)
+
+    def make_env(self) -> gymnasium.Env[Any, Any]:
+        """The environment of this episode, not yet reset."""
+        return gymnasium.make(
+            f"care_sim:{ENVIRONMENTS[self.scenario]}",
+            disable_env_checker=True,
+            budget=self.budget,
+            reserve_fraction=self.reserve_fraction,
+            false_negative_rate=self.false_negative_rate,
+            camera_latency=self.camera_latency,
+            min_returns=self.min_returns,
+            lidar_range_sigma=self.lidar_range_sigma,
+            lidar_dropout=self.lidar_dropout,
+            engine=self.engine,
+            floor=self.floor,
+            **dict(self.scenario_parameters),
+        )
+
+    def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
+        """The policy of this episode for its environment."""
+        return make_policy(self.policy, env, **dict(self.policy_parameters))
+
+    def row(self) -> dict[str, Any]:
+        """Every parameter flat; those of scenario and policy as `scenario.NAME` and `policy.NAME`."""
+        flat = {name: getattr(self, name) for name in PLAIN_FIELDS}
+        flat |= {f"scenario.{name}": value for name, value in self.scenario_parameters}
+        return flat | {f"policy.{name}": value for name, value in self.policy_parameters}
+
+    def digest(self) -> str:
+        """Hash of the effective configuration, package version and code included."""
+        effective = [sorted(self.row().items()), care_sim.__version__, code_digest()]
+        return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
+
+    @property
+    def label(self) -> str:
+        """A short name for people: scenario, policy, budget, seed and what departs from the defaults."""
+        usual = {field.name: field.default for field in fields(self)}
+        main = ("scenario", "policy", "budget", "seed")
+        changes = [f"{n}={v}" for n, v in self.row().items() if n not in main and v != usual.get(n)]
+        return " ".join([f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes])
+
+
+PLAIN_FIELDS = [field.name for field in fields(EpisodeConfig) if not field.name.endswith("_parameters")]
+"""Fields that are one value."""
+
+
+def grid(
+    scenarios: Iterable[str],
+    policies: Iterable[str],
+    budgets: Sequence[float],
+    seeds: Sequence[int],
+    false_negative_rates: Sequence[float] = (0.0,),
+    camera_latencies: Sequence[int] = (0,),
+    **common: Any,
+) -> list[EpisodeConfig]:
+    """All combinations, without repeats; `full` runs once for all budgets. `common` are further fields."""
+    combinations = product(scenarios, policies, budgets, false_negative_rates, camera_latencies, seeds)
+    configs = (
+        EpisodeConfig(
+            scenario,
+            policy,
+            FULL_BUDGET if policy == "full" else budget,
+            seed,
+            false_negative_rate=rate,
+            camera_latency=latency,
+            **common,
+        )
+        for scenario, policy, budget, rate, latency, seed in combinations
+    )
+    return list(dict.fromkeys(configs))
+
+
+def without_seeds(configs: Sequence[EpisodeConfig]) -> list[dict[str, Any]]:
+    """The configurations as plain data, each once, with the list of its seeds."""
+    seeds: dict[str, list[int]] = {}
+    kept: dict[str, dict[str, Any]] = {}
+    for config in configs:
+        plain = asdict(config)
+        seed = plain.pop("seed")
+        key = json.dumps(plain)
+        kept[key] = plain
+        seeds.setdefault(key, []).append(seed)
+    return [{**plain, "seeds": seeds[key]} for key, plain in kept.items()]

@@ -1,0 +1,76 @@
+"""One episode: a configuration in, one tidy row out."""
+
+import hashlib
+import resource
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+import care_sim
+from care_sim.study.config import EpisodeConfig
+from care_sim.types import Keyframe, Observation
+from care_sim.world.world import World
+
+Row = dict[str, Any]
+
+
+def run_episode(config: EpisodeConfig) -> Row:
+    """Play an episode and return its row.
+
+    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields of
+    `care_sim.types.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far; and
+    `episode_hash` over cells fired, ranges returned and poses, equal wherever the episode is repeated.
+    """
+    return trace(config)[0]
+
+
+def trace(config: EpisodeConfig) -> tuple[Row, list[Keyframe]]:
+    """Play an episode; its row and the record of every keyframe (scoring only: it holds truth)."""
+    started = time.perf_counter()
+    seal = Seal()
+    with config.make_env() as env:
+        policy = config.make_policy(env)
+        observation, info = env.reset(seed=config.seed)
+        policy.reset()
+        ended = False
+        while not ended:
+            observation, _, terminated, truncated, info = env.step(policy(observation))
+            seal.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
+            ended = terminated or truncated
+        keyframes: list[Keyframe] = env.unwrapped.keyframes  # type: ignore[attr-defined]
+    row = {
+        **config.row(),
+        "version": care_sim.__version__,
+        "digest": config.digest(),
+        **info["outcome"],
+        "keyframes": len(keyframes),
+        "wall_s": time.perf_counter() - started,
+        "peak_rss_mb": peak_rss_mb(),
+        "episode_hash": seal.hexdigest(),
+    }
+    return row, keyframes
+
+
+class Seal:
+    """A hash over all that happens in an episode."""
+
+    def __init__(self) -> None:
+        self._content = hashlib.sha256()
+
+    def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
+        """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
+        poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
+        for part in (fired, observation["ranges"], np.array(poses)):
+            self._content.update(part.tobytes())
+
+    def hexdigest(self) -> str:
+        """The hash so far."""
+        return self._content.hexdigest()[:16]
+
+
+def peak_rss_mb() -> float:
+    """The most memory this process has held, in MB."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1e6 if sys.platform == "darwin" else 1e3)

@@ -1,0 +1,72 @@
+"""A study from configurations to a folder of results, and a report of what lies in one."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from care_sim.errors import InvalidInput
+from care_sim.study.config import EpisodeConfig, without_seeds
+from care_sim.study.episode import Row
+from care_sim.study.figures import save, study_figures
+from care_sim.study.journal import Journal
+from care_sim.study.provenance import machine, versions
+from care_sim.study.rows import write_rows
+from care_sim.study.runner import ExecutorFactory, Failure, processes, run_all
+from care_sim.study.tables import CAPTION, collision_note, study_tables
+
+ROWS = "episodes.parquet"
+JOURNAL = "journal.jsonl"
+
+
+def conduct(
+    configs: Sequence[EpisodeConfig], folder: Path, workers: int, make_executor: ExecutorFactory = processes
+) -> list[Failure]:
+    """Run a study into `folder`, going on where an earlier run stopped; returns the episodes that failed.
+
+    Writes `journal.jsonl` as episodes finish, then `config.json`, `episodes.parquet` with the rows of
+    `configs` in their order, `tables.md` and the figures. Raises InvalidInput for no episode or no worker,
+    and OSError when the folder cannot be written.
+    """
+    if not configs:
+        raise InvalidInput("a study needs at least one value on every axis")
+    if workers < 1:
+        raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
+    with Journal(folder / JOURNAL) as journal:
+        settings = {"versions": versions(), "machine": machine(), "configurations": without_seeds(configs)}
+        (folder / "config.json").write_text(json.dumps(settings, indent=1) + "\n")
+        failures = _run_with_progress(configs, journal, workers, make_executor)
+        rows = [journal[digest] for digest in (config.digest() for config in configs) if digest in journal]
+    if rows:
+        write_rows(rows, folder / ROWS)
+        write_report(rows, folder)
+    return failures
+
+
+def write_report(rows: Sequence[Row], folder: Path) -> None:
+    """Write tables and figures into a folder."""
+    tables = [table.markdown() for table in study_tables(rows)]
+    (folder / "tables.md").write_text("\n".join([f"{CAPTION}\n\n{collision_note(rows)}\n", *tables]))
+    for name, figure in study_figures(rows).items():
+        save(figure, folder / name)
+
+
+def print_report(rows: Sequence[Row], console: Console) -> None:
+    """Print the tables."""
+    for table in study_tables(rows):
+        console.print(table.rich())
+        console.print()
+    console.print(CAPTION, markup=False)
+    console.print(collision_note(rows), markup=False)
+
+
+def _run_with_progress(
+    configs: Sequence[EpisodeConfig], journal: Journal, workers: int, make_executor: ExecutorFactory
+) -> list[Failure]:
+    done = sum(config.digest() in journal for config in configs)
+    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task("", total=len(configs), completed=done)
+        return run_all(configs, journal, workers, make_executor, lambda: progress.advance(task))

@@ -1,0 +1,42 @@
+"""Rows of episodes in a Parquet file."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from care_sim.errors import InvalidInput
+from care_sim.study.config import PLAIN_FIELDS
+from care_sim.study.episode import Row
+from care_sim.types import Outcome
+
+REQUIRED = {*PLAIN_FIELDS, *Outcome.__dataclass_fields__}
+"""Columns without which a file is none of ours."""
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """Write rows to a Parquet file in one move: readers see the old file or the new one."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: pa.array([row.get(name) for row in rows]) for name in names}
+    measured = {
+        name: column.cast(pa.float64()) if column.type == pa.null() else column for name, column in columns.items()
+    }
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    pq.write_table(pa.table(measured), unfinished)
+    unfinished.replace(path)
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Read rows back. Raises InvalidInput for a file that is damaged or holds no episodes."""
+    if not path.is_file():
+        raise InvalidInput(f"no results at {path}; expected a folder that a study wrote, or its Parquet file")
+    try:
+        rows: list[Row] = pq.read_table(path).to_pylist()
+    except (pa.ArrowException, OSError) as error:
+        raise InvalidInput(f"{path} is not a readable Parquet file: {str(error).splitlines()[0]}") from error
+    missing = REQUIRED - set(rows[0] if rows else ())
+    if missing:
+        raise InvalidInput(f"{path} holds no rows of episodes: it lacks {', '.join(sorted(missing))}")
+    return rows

@@ -1,0 +1,79 @@
+from dataclasses import replace
+
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.study import provenance
+from care_sim.study.config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, without_seeds
+
+GOOD = EpisodeConfig("dense", "care")
+
+
+def test_every_scenario_has_its_environment():
+    from care_sim.scenarios import SCENARIOS
+
+    assert set(ENVIRONMENTS) == set(SCENARIOS)
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"scenario": "dance"}, ["'dance'", "cutin, dartout, dense"]),
+        ({"policy": "best"}, ["'best'", "all-camera, care"]),
+        ({"budget": 0.0}, ["budget", "(0, 1]"]),
+        ({"budget": 1.1}, ["budget", "(0, 1]"]),
+        ({"budget": float("nan")}, ["budget"]),
+        ({"seed": -1}, ["seed", ">= 0"]),
+        ({"reserve_fraction": 1.5}, ["reserve_fraction", "[0, 1]"]),
+        ({"false_negative_rate": -0.1}, ["false_negative_rate", "[0, 1]"]),
+        ({"camera_latency": -1}, ["camera_latency", ">= 0"]),
+        ({"min_returns": 0}, ["min_returns", ">= 1"]),
+        ({"lidar_range_sigma": -1.0}, ["range_sigma"]),
+        ({"lidar_dropout": 2.0}, ["dropout", "[0, 1]"]),
+        ({"engine": "warp"}, ["'warp'", "bullet"]),
+        ({"scenario_parameters": (("wheels", 3),)}, ["'wheels'", "vehicles"]),
+        ({"scenario_parameters": (("budget", 1.0),)}, ["'budget'", "vehicles"]),
+        ({"scenario_parameters": (("vehicles", 99),)}, ["vehicles", "0..12"]),
+        ({"policy": "care-sbf", "policy_parameters": (("k", 3),)}, ["'k'", "k_safe"]),
+        ({"policy": "full", "budget": 0.1}, ["full", "budget=1.0"]),
+    ],
+)
+def test_bad_input_names_the_thing_and_what_is_allowed(change, names):
+    with pytest.raises(InvalidInput) as error:
+        replace(GOOD, **change)
+    assert all(name in str(error.value) for name in names), error.value
+    assert "\n" not in str(error.value)
+
+
+def test_the_digest_tells_every_parameter_apart():
+    changes = [
+        {"policy": "history"},
+        {"budget": 0.2},
+        {"seed": 1},
+        {"camera_latency": 1},
+        {"floor": False},
+        {"scenario_parameters": (("vehicles", 4),)},
+        {"policy": "care-sbf", "policy_parameters": (("k_safe", 0.0),)},
+    ]
+    digests = [config.digest() for config in (GOOD, *(replace(GOOD, **change) for change in changes))]
+    assert len(set(digests)) == len(digests)
+    assert EpisodeConfig("dense", "care").digest() == GOOD.digest()
+
+
+def test_the_digest_covers_the_code(monkeypatch):
+    before = GOOD.digest()
+    monkeypatch.setattr("care_sim.study.config.code_digest", lambda: "edited")
+    assert GOOD.digest() != before
+    assert len(provenance.code_digest()) == 16
+
+
+def test_the_row_is_flat_and_the_label_names_what_is_unusual():
+    config = replace(GOOD, camera_latency=2, scenario_parameters=(("vehicles", 7),))
+    assert set(config.row()) == {*PLAIN_FIELDS, "scenario.vehicles"}
+    assert config.label == "dense care 0.1 seed 0 camera_latency=2 scenario.vehicles=7"
+
+
+def test_full_runs_once_for_all_budgets():
+    configs = grid(["dense"], ["care", "full"], (0.03, 0.1), (0, 1))
+    assert [(c.policy, c.budget) for c in configs if c.seed == 0] == [("care", 0.03), ("care", 0.1), ("full", 1.0)]
+    assert [plain["seeds"] for plain in without_seeds(configs)] == [[0, 1]] * 3

@@ -1,0 +1,135 @@
+"""Real episodes in real processes, short ones."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.episode import run_episode, trace
+from care_sim.study.journal import Journal
+from care_sim.study.report import JOURNAL, ROWS, conduct
+from care_sim.study.rows import read_rows
+from care_sim.study.runner import run_all
+from care_sim.types import Outcome
+
+SHORT = (("duration_s", 0.3),)
+MEASURED = {"wall_s", "peak_rss_mb"}
+
+THIRD_PARTY = """
+import os
+from care_sim.policies.history import History
+
+class Dies(History):
+    def demand(self, belief):
+        os._exit(3)
+
+class Raises(History):
+    def demand(self, belief):
+        raise RuntimeError("no idea")
+"""
+
+
+@pytest.fixture
+def third_party(tmp_path, monkeypatch):
+    """An installed package whose policies do not behave."""
+    site = tmp_path / "site"
+    info = site / "misbehaving-1.0.dist-info"
+    info.mkdir(parents=True)
+    (site / "misbehaving.py").write_text(THIRD_PARTY)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: misbehaving\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[care_sim.policies]\ndies = misbehaving:Dies\nraises = misbehaving:Raises\n"
+    )
+    monkeypatch.syspath_prepend(site)
+
+
+def short(policies, seeds=(0,), budgets=(0.1,)):
+    return grid(["dartout"], policies, budgets, seeds, scenario_parameters=SHORT)
+
+
+def steady(row):
+    return {name: value for name, value in row.items() if name not in MEASURED}
+
+
+def test_an_episode_is_one_tidy_row():
+    config = EpisodeConfig("dartout", "care", seed=3, scenario_parameters=SHORT)
+    row, keyframes = trace(config)
+    assert set(config.row()) | set(Outcome.__dataclass_fields__) < set(row)
+    assert (row["keyframes"], row["digest"], row["rays_fired"]) == (3, config.digest(), 3 * 1638)
+    assert len(keyframes) == 3
+    assert 0 < row["wall_s"] < 60
+    assert 50 < row["peak_rss_mb"] < 500
+
+
+def test_the_hash_tells_episodes_apart_and_repeats():
+    a, b = (run_episode(config) for config in short(["care"], seeds=(0, 1)))
+    assert a["episode_hash"] != b["episode_hash"]
+    assert steady(run_episode(short(["care"])[0])) == steady(a)
+    street = [EpisodeConfig("dense", policy, scenario_parameters=SHORT) for policy in ("care", "random")]
+    assert len({run_episode(config)["episode_hash"] for config in street}) == 2
+
+
+def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path):
+    configs = short(["history", "full"], budgets=(0.05, 0.1))
+    assert conduct(configs, tmp_path, workers=2) == []
+    rows = read_rows(tmp_path / ROWS)
+    assert [row["digest"] for row in rows] == [config.digest() for config in configs]
+    assert rows[0]["episode_hash"] == run_episode(configs[0])["episode_hash"]
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"config.json", JOURNAL, ROWS, "tables.md"}
+
+
+def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
+    configs = short(["history", "care", "random"])
+    conduct(configs[:2], tmp_path, workers=1)
+    path = tmp_path / JOURNAL
+    first, second = path.read_text().splitlines()
+    path.write_text(f"{first}\n{second[:40]}")
+    assert conduct(configs, tmp_path, workers=1) == []
+    lines = path.read_text().splitlines()
+    assert lines[0] == first
+    assert len(lines) == 4
+    assert len(read_rows(tmp_path / ROWS)) == 3
+
+
+def test_any_executor_will_do(tmp_path):
+    with Journal(tmp_path / JOURNAL) as journal:
+        done = []
+        assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, lambda: done.append(1)) == []
+        assert done == [1]
+        assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, lambda: done.append(1)) == []
+        assert done == [1]
+
+
+def test_a_dead_worker_costs_only_its_own_episode(third_party, tmp_path):
+    configs = short(["history", "dies", "care", "raises", "random"])
+    failures = conduct(configs, tmp_path, workers=2)
+    reasons = {failure.config.policy: str(failure) for failure in failures}
+    assert set(reasons) == {"dies", "raises"}
+    assert reasons["dies"] == "dartout dies 0.1 seed 0 scenario.duration_s=0.3: the worker process died"
+    assert reasons["raises"].endswith("RuntimeError: no idea")
+    assert [row["policy"] for row in read_rows(tmp_path / ROWS)] == ["history", "care", "random"]
+    assert conduct(configs[:1], tmp_path, workers=1) == []
+
+
+def test_an_interrupt_keeps_what_was_computed(tmp_path):
+    sweep = ["sweep", "--scenarios", "dartout", "--policies", "random", "--seeds", "500", "--workers", "1"]
+    options = ["--out", str(tmp_path), "--scenario-parameters", "duration_s=0.1"]
+    command = [sys.executable, "-c", "import sys; from care_sim.cli import main; main(sys.argv[1:])", *sweep, *options]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    journal = tmp_path / JOURNAL
+    deadline = time.monotonic() + 40
+    while not (journal.exists() and journal.read_text().count("\n") >= 2) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    os.killpg(process.pid, signal.SIGINT)
+    _, complaint = process.communicate(timeout=40)
+    assert process.returncode == 130, complaint
+    assert complaint.strip().splitlines()[-1].startswith("care-sim: interrupted")
+    assert "Traceback" not in complaint
+    with Journal(journal) as kept:
+        assert len(kept) >= 2

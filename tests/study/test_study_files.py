@@ -1,0 +1,71 @@
+import json
+from dataclasses import asdict
+
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.journal import Journal
+from care_sim.study.rows import read_rows, write_rows
+from care_sim.types import Outcome
+
+ROWS = [
+    EpisodeConfig("dense", policy).row() | asdict(Outcome(distance, True, None, 2.5, False, None, 98280))
+    for policy, distance in (("history", None), ("care", 1 / 3))
+]
+
+
+def test_rows_come_back_as_written(tmp_path):
+    rows = [ROWS[0] | {"scenario.vehicles": 7}, ROWS[1] | {"scenario.gap_m": (0.5, 0.6)}]
+    write_rows(rows, tmp_path / "episodes.parquet")
+    first, second = read_rows(tmp_path / "episodes.parquet")
+    assert first == rows[0] | {"scenario.gap_m": None}
+    assert second == rows[1] | {"scenario.vehicles": None, "scenario.gap_m": [0.5, 0.6]}
+    assert [path.name for path in tmp_path.iterdir()] == ["episodes.parquet"]
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1 not a table PAR1"])
+def test_a_damaged_file_is_named(content, tmp_path):
+    path = tmp_path / "episodes.parquet"
+    path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=r"episodes\.parquet is not a readable Parquet file"):
+        read_rows(path)
+
+
+def test_a_truncated_file_is_named(tmp_path):
+    path = tmp_path / "episodes.parquet"
+    write_rows(ROWS, path)
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(InvalidInput, match="not a readable Parquet file"):
+        read_rows(path)
+
+
+def test_a_file_of_something_else_is_named(tmp_path):
+    write_rows([{"apples": 3}], tmp_path / "episodes.parquet")
+    with pytest.raises(InvalidInput, match=r"it lacks .*policy"):
+        read_rows(tmp_path / "episodes.parquet")
+
+
+def test_the_journal_passes_over_a_torn_line_and_goes_on_behind_it(tmp_path):
+    path = tmp_path / "deep" / "journal.jsonl"
+    with Journal(path) as journal:
+        journal.append({"digest": "a", "x": 0.1})
+        journal.append({"digest": "b", "x": None})
+    path.write_text(path.read_text()[:-9])
+    with Journal(path) as journal:
+        assert "a" in journal
+        assert "b" not in journal
+        journal.append({"digest": "c", "x": 1 / 3})
+    with Journal(path) as journal:
+        assert journal["a"] == {"digest": "a", "x": 0.1}
+        assert journal["c"]["x"] == 1 / 3
+
+
+def test_the_journal_survives_rubbish(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(b'\xff\xfe\n[1]\n3\n{"no": 1}\n' + json.dumps({"digest": "a"}).encode())
+    with Journal(path) as journal:
+        assert "a" in journal
+        journal.append({"digest": "b"})
+    with Journal(path) as journal:
+        assert "b" in journal

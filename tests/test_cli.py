@@ -1,0 +1,120 @@
+import subprocess
+import sys
+import time
+
+import pytest
+
+from care_sim.cli import main
+from care_sim.study.commands import Conditions
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.report import ROWS
+from care_sim.study.rows import read_rows
+
+SHORT = ["--scenario-parameters", "duration_s=0.3"]
+
+
+def run(capsys, *arguments):
+    """Exit code, output and error lines of a command."""
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return end.value.code, out, err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        ([], ["reproduce", "sweep"]),
+        (["walk"], ["walk", "reproduce"]),
+        (["run"], ["SCENARIO"]),
+        (["run", "dance"], ["'dance'", "dartout"]),
+        (["run", "dense", "--policy", "best"], ["'best'", "care"]),
+        (["run", "dense", "--bugdet", "1"], ["--bugdet", "--budget"]),
+        (["run", "dense", "--budget", "x"], ["--budget", "'x'"]),
+        (["run", "dense", "--budget", "0"], ["budget", "(0, 1]"]),
+        (["run", "dense", "--budget", "1.5"], ["budget", "(0, 1]"]),
+        (["run", "dense", "--camera-latency", "-1"], ["camera_latency", ">= 0"]),
+        (["run", "dense", "--false-negative-rate", "1.1"], ["false_negative_rate", "[0, 1]"]),
+        (["run", "dense", "--lidar-dropout", "-1"], ["dropout", "[0, 1]"]),
+        (["run", "dense", "--reserve-fraction", "2"], ["reserve_fraction", "[0, 1]"]),
+        (["run", "dense", "--engine", "warp"], ["'warp'", "bullet"]),
+        (["run", "dense", "--min-returns", "0"], ["min_returns", ">= 1"]),
+        (["run", "dense", "--seed", "-1"], ["seed", ">= 0"]),
+        (["run", "dense", "--scenario-parameters", "wheels=3"], ["'wheels'", "vehicles"]),
+        (["run", "dense", "--scenario-parameters", "wheels"], ["NAME=VALUE", "'wheels'"]),
+        (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
+        (["sweep", "--seeds", "0"], ["seeds", ">= 1"]),
+        (["sweep", "--budgets"], ["at least one"]),
+        (["reproduce", "--workers", "0"], ["workers", ">= 1"]),
+        (["report", "nowhere"], ["nowhere"]),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("care-sim: ")
+    assert err.count("\n") == 1
+    assert all(name in err for name in names), err
+
+
+def test_a_folder_that_cannot_be_written_is_named(capsys, tmp_path):
+    (tmp_path / "file").touch()
+    code, _, err = run(capsys, "sweep", "--seeds", "1", "--out", tmp_path / "file" / "out")
+    assert (code, err.count("\n")) == (2, 1)
+    assert str(tmp_path / "file") in err
+
+
+def test_a_damaged_parquet_file_is_named(capsys, tmp_path):
+    (tmp_path / ROWS).write_bytes(b"PAR1 and then nothing")
+    code, _, err = run(capsys, "report", tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert ROWS in err
+
+
+def test_run_prints_the_timeline_and_the_outcome(capsys):
+    code, out, _ = run(capsys, "run", "dense", "--policy", "full", "--budget", "0.2", *SHORT)
+    assert code == 0
+    assert out.count("16384") == 3
+    assert all(word in out for word in ("speed m/s", "detection_distance_m", "episode_hash"))
+
+
+def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
+    axes = ["--scenarios", "dartout", "--policies", "random", "full", "--budgets", "0.05", "0.1"]
+    code, out, err = run(capsys, "sweep", *axes, "--seeds", "3", "4", "--out", tmp_path, "--workers", "1", *SHORT)
+    assert code == 0, err
+    rows = read_rows(tmp_path / ROWS)
+    assert {(row["policy"], row["budget"], row["seed"]) for row in rows} == {
+        (policy, budget, seed)
+        for policy, budget in (("random", 0.05), ("random", 0.1), ("full", 1.0))
+        for seed in (3, 4)
+    }
+    (tmp_path / "tables.md").unlink()
+    code, again, _ = run(capsys, "report", tmp_path)
+    assert code == 0
+    assert again in out
+    assert (tmp_path / "tables.md").exists()
+
+
+def test_the_lists(capsys):
+    assert "care-sbf" in run(capsys, "policies")[1]
+    out = run(capsys, "scenarios")[1]
+    assert "dartout" in out
+    assert "vehicles=5" in out
+
+
+def test_the_defaults_are_those_of_an_episode():
+    usual = EpisodeConfig("dense", "care")
+    assert all(getattr(usual, name) == value for name, value in Conditions().arguments().items())
+
+
+@pytest.mark.parametrize("command", ["", "run", "sweep", "reproduce", "crowding", "report"])
+def test_help_is_quick_and_complete(command):
+    code = "import sys; from care_sim.cli import main; main(sys.argv[1:])"
+    started = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", code, *command.split(), "--help"], capture_output=True, text=True, check=True
+    )
+    assert time.perf_counter() - started < 5
+    assert "--help" in done.stdout
+    assert "pyarrow" not in done.stderr
