@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.pinhole import PinholeCamera
+from care_sim.pinhole import NEAR_M, PinholeCamera
 
 cameras = st.builds(
     PinholeCamera,
@@ -72,3 +72,34 @@ def test_box_rays_begin_with_the_centre_and_hold_the_corners():
     assert pixels[0] == pytest.approx((20, 40))
     corners = {tuple(pixel) for pixel in np.round(pixels[1:], 6).tolist()}
     assert {(10, 20), (10, 60), (30, 20), (30, 60)} <= corners
+
+
+boxes = st.tuples(*[st.floats(-30, 30)] * 2, st.floats(-3, 3), *[st.floats(0.2, 12)] * 3, st.floats(-3, 3)).map(
+    np.array
+)
+
+
+@given(cameras, boxes)
+def test_a_projected_box_is_the_tightest_around_what_lies_ahead_of_the_near_plane(camera, box):
+    steps = np.linspace(-0.5, 0.5, 21)
+    shares = np.array(np.meshgrid(steps, steps, steps)).reshape(3, -1).T
+    local = shares * box[3:6]
+    cos, sin = np.cos(box[6]), np.sin(box[6])
+    points = box[:3] + np.stack(
+        [cos * local[:, 0] - sin * local[:, 1], sin * local[:, 0] + cos * local[:, 1], local[:, 2]], -1
+    )
+    pixels, depth = camera.project(points)
+    (rectangle,) = camera.project_boxes(box[None])
+    ahead = depth >= NEAR_M + 1e-9
+    if not ahead.any():
+        return
+    slack = 1e-6 * (1 + np.abs(rectangle).max())
+    assert np.all(pixels[ahead].min(axis=0) >= rectangle[:2] - slack)
+    assert np.all(pixels[ahead].max(axis=0) <= rectangle[2:] + slack)
+    if ahead.all():
+        found = np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
+        assert found == pytest.approx(rectangle, rel=1e-6, abs=1e-4)
+
+
+def test_a_box_behind_the_camera_has_no_rectangle():
+    assert np.all(np.isnan(PinholeCamera().project_boxes(np.array([[-10.0, 0, 0, 2, 2, 2, 0]]))))

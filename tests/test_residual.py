@@ -3,7 +3,7 @@ import pytest
 
 from care_sim.pinhole import PinholeCamera
 from care_sim.residual import camera_layers, explained, wedges
-from care_sim.types import Belief, Ego, Rig
+from care_sim.types import Belief, Ego, ImageDetections, Rig
 
 CAMERA = PinholeCamera()
 RIG = Rig(cameras=(CAMERA,))
@@ -93,3 +93,13 @@ def test_without_tracks_everything_is_residual_and_without_camera_nothing(tracks
     unexplained, known = camera_layers(belief(boxes, tracks_at()), RIG)
     assert (len(unexplained), len(known)) == (2, 0)
     assert camera_layers(belief(seen(), tracks_at(("car", 20, 0, 0, 0))), RIG) == ([], [])
+
+
+@pytest.mark.xfail(strict=True, reason="all detections of a camera are turned by the first one's yaw change")
+def test_each_detection_is_turned_by_its_own_yaw_change(seen):
+    """Two pictures of one camera, taken before and after a turn of 0.2 rad."""
+    ahead, left = (155, 85, 165, 95), box_around((20 * np.cos(0.2), 20 * np.sin(0.2), 0))
+    old, new = seen(("car", *left), yaw_change=0.2), seen(("car", *ahead))
+    both = ImageDetections.from_rows(np.concatenate([new.rows(), old.rows()]))
+    columns = [np.unique(wedge % 512).mean() for wedge in wedges(both, RIG)]
+    assert columns == pytest.approx([255.5, 255.5], abs=2)

@@ -1,0 +1,214 @@
+"""Common checks for every policy in every scenario, and what sets each one apart."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.allocation import allocate
+from care_sim.errors import InvalidInput
+from care_sim.types import CLASSES, MAX_DETECTIONS, Belief, Ego, ImageDetections, Rig, Tracks
+
+SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]
+POLICIES = ["full", "random", "history", "all-camera", "care", "care-sbf"]
+CAMERA_POLICIES = ["care", "all-camera", "care-sbf"]
+
+
+def made(scenario, policy="care", budget=0.05, **parameters):
+    env = gymnasium.make(scenario, budget=1.0 if policy == "full" else budget, **parameters)
+    return env, care_sim.make_policy(policy, env)
+
+
+def driven(scenario, policy, keyframes=60, seed=0, **parameters):
+    """Observations, actions and infos of the first keyframes of an episode."""
+    env, chooses = made(scenario, policy, **parameters)
+    observation, _ = env.reset(seed=seed)
+    chooses.reset()
+    history = []
+    for _ in range(keyframes):
+        action = chooses(observation)
+        following, _, terminated, truncated, info = env.step(action)
+        history.append((observation, action, info))
+        observation = following
+        if terminated or truncated:
+            break
+    env.close()
+    return history
+
+
+@pytest.fixture(scope="module")
+def encounter():
+    """Observations of a dense street from a second before the person appears to a second after."""
+    return [observation for observation, _, _ in driven("CARE-Dense-v0", "care", 36)][14:]
+
+
+@pytest.fixture
+def environment():
+    env = gymnasium.make("CARE-Dense-v0", budget=0.05)
+    yield env
+    env.close()
+
+
+def test_the_built_in_policies_are_listed():
+    assert set(POLICIES) <= set(care_sim.policy_names())
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("policy", POLICIES)
+def test_a_policy_spends_within_the_budget_and_repeats_itself(scenario, policy):
+    history = driven(scenario, policy, 12)
+    env, again = made(scenario, policy)
+    again.reset()
+    for observation, action, info in history:
+        asked = np.flatnonzero(action)
+        assert (action.shape, action.dtype) == (env.unwrapped.rig.grid.shape, np.float32)
+        assert env.action_space.contains(action)
+        assert len(asked) <= env.unwrapped.rig.budget
+        assert len(info["fired"]) == len(set(info["fired"].tolist())) == env.unwrapped.rig.budget
+        assert set(asked.tolist()) <= set(info["fired"].tolist())
+        assert np.array_equal(again(observation), action)
+    env.close()
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_reset_forgets_the_episode(policy, encounter):
+    env, chooses = made("CARE-Dense-v0", policy)
+    chooses.reset()
+    first = [chooses(observation) for observation in encounter]
+    chooses.reset()
+    assert all(np.array_equal(chooses(o), action) for o, action in zip(encounter, first, strict=True))
+    env.close()
+
+
+@pytest.mark.parametrize("policy", ["care", "all-camera"])
+def test_without_a_detection_camera_policies_act_as_history_cell_for_cell(policy, encounter, environment):
+    padding = np.zeros((MAX_DETECTIONS, len(ImageDetections.COLUMNS)), np.float32)
+    padding[:, 0] = -1
+    chooses, history = (care_sim.make_policy(name, environment) for name in (policy, "history"))
+    for observation in encounter:
+        blind = {**observation, "detections": padding}
+        assert np.array_equal(chooses(blind), history(blind))
+    assert any(not np.array_equal(chooses(o), history(o)) for o in encounter)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("policy", ["care", "all-camera"])
+def test_with_a_camera_that_misses_everything_whole_episodes_are_those_of_history(scenario, policy):
+    blind = driven(scenario, policy, false_negative_rate=1.0)
+    history = driven(scenario, "history", false_negative_rate=1.0)
+    assert len(blind) == len(history) == 60
+    for (_, _, one), (_, _, other) in zip(blind, history, strict=True):
+        assert np.array_equal(one["fired"], other["fired"])
+
+
+def test_history_ignores_what_the_camera_sees():
+    seeing = driven("CARE-Dense-v0", "history", 40)
+    blind = driven("CARE-Dense-v0", "history", 40, false_negative_rate=1.0)
+    assert all(np.array_equal(a["fired"], b["fired"]) for (_, _, a), (_, _, b) in zip(seeing, blind, strict=True))
+
+
+def test_care_differs_from_all_camera_only_by_what_tracks_explain(encounter, environment):
+    """Where everything is explained, CARE is history; where nothing is, it is the all-camera reserve."""
+    care, everything, history = (care_sim.make_policy(n, environment) for n in ("care", "all-camera", "history"))
+    no_tracks = np.zeros_like(encounter[0]["tracks"])
+    no_tracks[:, 0] = -1
+    for observation in encounter:
+        untracked = {**observation, "tracks": no_tracks}
+        assert np.array_equal(care(untracked), everything(untracked))
+    assert any(np.array_equal(care(o), history(o)) for o in encounter)
+    assert any(not np.array_equal(care(o), everything(o)) for o in encounter)
+
+
+def test_random_asks_for_nothing(encounter, environment):
+    chooses = care_sim.make_policy("random", environment)
+    assert not any(chooses(observation).any() for observation in encounter)
+
+
+def test_full_asks_for_everything_and_refuses_another_budget(environment):
+    env, full = made("CARE-Dartout-v0", "full")
+    observation, _ = env.reset(seed=0)
+    assert np.all(full(observation) > 0)
+    env.close()
+    with pytest.raises(InvalidInput, match=r"full needs .*budget=1\.0.*819 of 16384"):
+        care_sim.make_policy("full", environment)
+
+
+def belief_of(tracks=(), ego_speed=0.0):
+    table = np.array(tracks, dtype=float).reshape(-1, len(Tracks.COLUMNS))
+    nothing = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
+    return Belief(Ego(ego_speed), 819, nothing, Tracks.from_rows(table), np.zeros((32, 512), np.float32))
+
+
+def standing(number, x, y=0.0, vy=0.0):
+    return [number, CLASSES.index("car"), x, y, -1.0, 4.6, 1.95, 1.7, 0.0, 0.0, vy, 0]
+
+
+def test_history_demands_the_hulls_nearest_first(environment):
+    history, rig = care_sim.make_policy("history", environment), environment.unwrapped.rig
+    belief = belief_of([standing(0, 10), standing(1, 20, 5), standing(2, 40, -5)])
+    hulls = rig.grid.hulls(belief.tracks.boxes)
+    assert [s.tolist() for s in history.demand(belief).exploitation] == [hull.tolist() for hull in hulls]
+    assert not any(len(layer) for layer in history.demand(belief).layers)
+
+
+def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation_pad(environment):
+    sbf, rig = care_sim.make_policy("care-sbf", environment), environment.unwrapped.rig
+    belief = belief_of([standing(0, 10), standing(1, 20, 5, vy=3.0), standing(2, 30, -5)])
+    sbf.reset()
+    for _ in range(5):
+        demand = sbf.demand(belief)
+    near, moving, far = belief.tracks.boxes
+    bare_near, bare_far = rig.grid.hulls([near, far], 0)
+    (full_moving,) = rig.grid.hulls([moving])
+    assert [cells.tolist() for cells in demand.exploitation] == [
+        full_moving.tolist(),
+        bare_near.tolist(),
+        bare_far.tolist(),
+    ]
+
+
+def test_parameters_of_forgetting_reach_the_rules(environment):
+    belief = belief_of([standing(0, 10)], ego_speed=8.0)
+    guarded, unguarded = (care_sim.make_policy("care-sbf", environment, **p) for p in ({}, {"k_safe": 0.0}))
+    for _ in range(5):
+        kept, dropped = guarded.demand(belief), unguarded.demand(belief)
+    assert len(kept.exploitation[0]) > len(dropped.exploitation[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "named"),
+    [
+        ("clairvoyant", {}, r"policy 'clairvoyant'; known: all-camera, care, care-sbf, full, history, random"),
+        ("care", {"boldness": 2}, "boldness"),
+        ("care-sbf", {"k_save": 2}, r"'k_save'.*k_safe"),
+    ],
+)
+def test_unknown_policies_and_parameters_are_refused_by_name(name, parameters, named, environment):
+    with pytest.raises(InvalidInput, match=named):
+        care_sim.make_policy(name, environment, **parameters)
+
+
+def test_another_environment_is_refused():
+    with pytest.raises(InvalidInput, match="needs an environment of CARE-Sim"):
+        care_sim.make_policy("care", gymnasium.make("CartPole-v1"))
+
+
+def test_the_reserve_fraction_of_the_environment_is_obeyed():
+    env, history = made("CARE-Dense-v0", "history", reserve_fraction=1.0)
+    observation, _ = env.reset(seed=0)
+    for _ in range(5):
+        observation, *_ = env.step(history(observation))
+    assert (observation["tracks"][:, 0] >= 0).any()
+    assert not history(observation).any()
+    env.close()
+
+
+@pytest.mark.parametrize("policy", CAMERA_POLICIES)
+def test_an_action_is_the_allocation_of_the_demand(policy, encounter, environment):
+    acting, asking = (care_sim.make_policy(policy, environment) for _ in range(2))
+    rig: Rig = environment.unwrapped.rig
+    for observation in encounter:
+        belief = Belief.from_observation(observation)
+        cells = allocate(asking.demand(belief), rig.budget, rig.reserve_fraction)
+        assert set(np.flatnonzero(acting(observation)).tolist()) == set(cells.tolist())

@@ -1,0 +1,143 @@
+"""The encounter of every scenario, seen by a full scan and the unimpaired camera of an ego that never brakes."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+
+from care_sim.frames import Frame
+from care_sim.grid import AngularGrid
+from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.sensors.camera import FRONT_CAMERA, MIN_PIXELS, Picture
+from care_sim.sensors.lidar import LIDAR_POSITION
+
+GRID = AngularGrid()
+KEYFRAME = 0.1
+FIRST_RETURNS = 3
+pytestmark = pytest.mark.slow
+every_episode = pytest.mark.parametrize("seed", range(10))
+every_scenario = pytest.mark.parametrize("name", SCENARIOS)
+every_crossing = pytest.mark.parametrize("name", ["dartout", "dense"])
+
+
+@dataclass(frozen=True)
+class Sight:
+    returns: int
+    pixels: int
+    reported: int
+    ahead_m: float
+    clearance_m: float
+    impact: bool
+
+    @property
+    def visible(self):
+        return self.returns >= FIRST_RETURNS or self.pixels >= MIN_PIXELS
+
+
+def sight(world):
+    """What a full scan and the camera have of the first-sighting actor; rays outside its hull cannot meet it."""
+    actor, sensor = world.first_sighting, Frame.mounted(world.ego.pose, LIDAR_POSITION)
+    box = sensor.boxes_to_local(world.boxes([actor]))
+    (hull,) = GRID.hulls(box)
+    heading = np.array(
+        [[np.cos(sensor.yaw), -np.sin(sensor.yaw), 0], [np.sin(sensor.yaw), np.cos(sensor.yaw), 0], [0, 0, 1]]
+    )
+    _, ids = world.bullet.cast(sensor.origin, GRID.directions[hull] @ heading.T, GRID.range_m)
+    picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
+    others = [other for other in world.actors if other.label is not None and other is not actor]
+    pixels = int(picture.pixels[picture.bodies == actor.body].sum())
+    passage = world.advance(0.0, KEYFRAME)
+    return Sight(
+        int(np.sum(ids == actor.body)),
+        pixels,
+        sum(picture.shows(other.body) for other in others),
+        float(box[0, 0]),
+        passage.clearance_m,
+        passage.impact_speed_mps is not None,
+    )
+
+
+@cache
+def episode(name, seed):
+    world = make_scenario(name).build(np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0]))
+    sights = [sight(world) for _ in range(60)]
+    world.close()
+    return sights
+
+
+def encounter(name, seed):
+    """The keyframes until the ego has drawn level with the actor."""
+    sights = episode(name, seed)
+    level = next((n for n, one in enumerate(sights) if one.ahead_m < 3.0), len(sights))
+    return sights[:level]
+
+
+@every_episode
+@every_scenario
+def test_nothing_of_the_actor_is_seen_in_the_first_second(name, seed):
+    start = episode(name, seed)[:10]
+    assert [one.returns for one in start] == [0] * 10
+    assert [one.pixels for one in start] == [0] * 10
+
+
+@every_episode
+@every_crossing
+def test_who_is_seen_once_stays_in_sight_until_the_encounter(name, seed):
+    visible = [one.visible for one in encounter(name, seed)]
+    assert True in visible
+    assert all(visible[visible.index(True) :])
+
+
+@every_episode
+def test_the_car_that_cuts_in_stays_in_sight_but_for_a_blink_at_the_threshold(seed):
+    visible = [one.visible for one in encounter("cutin", seed)]
+    after = visible[visible.index(True) :]
+    assert after.count(False) <= 1
+    assert all(after[3:])
+
+
+@every_episode
+@every_crossing
+def test_the_person_appears_out_of_full_cover(name, seed):
+    """From the first photon to enough for a detection it takes no more than two keyframes."""
+    sights = encounter(name, seed)
+    first = next(n for n, one in enumerate(sights) if one.returns or one.pixels)
+    detectable = next(n for n, one in enumerate(sights) if one.returns >= FIRST_RETURNS)
+    assert detectable - first <= 2
+    assert 1.0 <= first * KEYFRAME <= 4.0
+
+
+@every_episode
+@every_crossing
+def test_an_ego_that_never_brakes_hits_nobody_and_passes_close(name, seed):
+    sights = episode(name, seed)
+    assert not any(one.impact for one in sights)
+    assert 0.3 < min(one.clearance_m for one in sights) < 2.0
+
+
+@every_episode
+@every_crossing
+def test_there_is_room_to_brake_when_the_person_appears(name, seed):
+    """Less reaction, more than the stopping distance from 30 km/h at 5 m/s^2, so that sensing decides."""
+    first = next(one for one in encounter(name, seed) if one.returns >= FIRST_RETURNS)
+    assert 14.0 < first.ahead_m < 18.5
+
+
+@every_episode
+def test_dartout_and_dense_differ_only_in_the_other_vehicles(seed):
+    for alone, crowded in zip(encounter("dartout", seed), encounter("dense", seed), strict=True):
+        assert (alone.returns, alone.pixels, alone.ahead_m) == (crowded.returns, crowded.pixels, crowded.ahead_m)
+
+
+@every_episode
+def test_five_reported_vehicles_are_in_view_when_the_person_appears(seed):
+    """One more may stand at the edge of the picture."""
+    first = next(one for one in encounter("dense", seed) if one.returns >= FIRST_RETURNS)
+    assert first.reported in (5, 6)
+
+
+def test_over_ten_seeds_the_street_holds_five_vehicles():
+    firsts = [next(one for one in encounter("dense", seed) if one.returns >= FIRST_RETURNS) for seed in range(10)]
+    assert np.median([one.reported for one in firsts]) == 5
+    assert all(one.reported == 0 for seed in range(10) for one in encounter("dartout", seed))

@@ -1,0 +1,147 @@
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.frames import Frame
+from care_sim.sensors.engines import ENGINES, check_engine
+from care_sim.sensors.lidar import Lidar, LidarNoise
+from care_sim.types import Scan
+from care_sim.world.bodies import CATALOGUE
+
+SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
+
+
+class Watched:
+    """Passes rays on to an engine and keeps them."""
+
+    def __init__(self, engine):
+        self.engine, self.directions = engine, []
+
+    def cast(self, origin, directions, reach):
+        self.directions.append(directions)
+        return self.engine.cast(origin, directions, reach)
+
+
+@pytest.fixture
+def street(bullet):
+    bullet.add(CATALOGUE["bus"], (12.0, 4.0, 0.0))
+    bullet.add(CATALOGUE["trailer"], (-15.0, 0.0, np.pi / 2))
+    bullet.add(CATALOGUE["car"], (8.0, -3.0, 0.5))
+    return bullet
+
+
+def lidar(grid, bullet, seed=0, **noise):
+    return Lidar(grid, ENGINES["bullet"](bullet), LidarNoise(**noise), np.random.default_rng(seed))
+
+
+def everything(grid):
+    return np.arange(grid.size)
+
+
+def test_only_the_fired_cells_are_cast(grid, street):
+    engine = Watched(street)
+    cells = np.array([5, 300, 9000, 16383])
+    Lidar(grid, engine, LidarNoise(), np.random.default_rng(0)).fire(cells, SENSOR)
+    assert len(engine.directions) == 1
+    assert engine.directions[0] == pytest.approx(grid.directions[cells])
+
+
+def test_a_scan_of_some_cells_is_that_part_of_the_full_scan(grid, street):
+    full, full_bodies = lidar(grid, street).fire(everything(grid), SENSOR)
+    cells = np.sort(np.random.default_rng(1).choice(grid.size, 500, replace=False))
+    part, bodies = lidar(grid, street).fire(cells, SENSOR)
+    assert part.cells.tolist() == cells.tolist()
+    assert np.array_equal(part.ranges, full.ranges[cells])
+    assert np.array_equal(bodies, full_bodies[cells])
+
+
+def test_a_full_scan_answers_every_cell(grid, street):
+    scan, bodies = lidar(grid, street).fire(everything(grid), SENSOR)
+    assert len(scan.ranges) == len(bodies) == 16384
+    assert len(set(bodies.tolist()) - {-1, street.ground}) == 3
+
+
+def test_returns_lie_on_the_bodies_they_hit(grid, street):
+    bus = street.add(CATALOGUE["bus"], (5.0, 20.0, 1.0))
+    scan, bodies = lidar(grid, street).fire(everything(grid), SENSOR)
+    hit = bodies == bus
+    points = SENSOR.origin + scan.ranges[hit, None] * grid.directions[hit]
+    local = Frame(5.0, 20.0, 3.47 / 2, 1.0).boxes_to_local(np.hstack([points, np.zeros((hit.sum(), 4))]))[:, :3]
+    assert hit.sum() > 50
+    assert np.all(np.abs(local) <= np.array([11.19, 2.94, 3.47]) / 2 + 1e-3)
+    assert np.abs(np.abs(local) / (np.array([11.19, 2.94, 3.47]) / 2)).max(axis=1) == pytest.approx(1, abs=1e-3)
+
+
+def test_the_scan_turns_with_the_sensor(grid, street):
+    trailer_behind = lidar(grid, street).fire(np.array([16 * 512]), SENSOR)[1]
+    turned_round = lidar(grid, street).fire(np.array([16 * 512 + 256]), Frame(0, 0, 1.84, np.pi))[1]
+    assert trailer_behind.tolist() == turned_round.tolist()
+    assert trailer_behind[0] != -1
+
+
+def test_a_scan_carries_no_body_ids():
+    assert [field.name for field in fields(Scan)] == ["cells", "ranges"]
+
+
+def test_without_noise_the_generator_does_not_matter(grid, street):
+    one, other = (lidar(grid, street, seed).fire(everything(grid), SENSOR) for seed in (0, 1))
+    assert np.array_equal(one[0].ranges, other[0].ranges)
+    assert np.array_equal(one[1], other[1])
+
+
+def test_range_noise_has_its_spread_and_leaves_misses_alone(grid, street):
+    clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
+    noisy, _ = lidar(grid, street, range_sigma_m=0.05).fire(everything(grid), SENSOR)
+    hit = np.isfinite(clean.ranges)
+    errors = noisy.ranges[hit] - clean.ranges[hit]
+    assert np.isinf(noisy.ranges[~hit]).all()
+    assert errors.std() == pytest.approx(0.05, rel=0.1)
+    assert errors.mean() == pytest.approx(0, abs=0.01)
+
+
+def test_dropout_loses_its_share_of_returns_with_their_bodies(grid, street):
+    clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
+    noisy, bodies = lidar(grid, street, dropout=0.3).fire(everything(grid), SENSOR)
+    hit = np.isfinite(clean.ranges)
+    assert np.isinf(noisy.ranges[hit]).mean() == pytest.approx(0.3, abs=0.05)
+    assert np.array_equal(bodies == -1, np.isinf(noisy.ranges))
+    kept = np.isfinite(noisy.ranges)
+    assert np.array_equal(noisy.ranges[kept], clean.ranges[kept])
+
+
+def test_total_dropout_returns_nothing(grid, street):
+    scan, bodies = lidar(grid, street, dropout=1.0).fire(everything(grid), SENSOR)
+    assert np.isinf(scan.ranges).all()
+    assert np.all(bodies == -1)
+
+
+def test_noise_of_a_cell_does_not_depend_on_which_others_fire(grid, street):
+    noise = {"range_sigma_m": 0.1, "dropout": 0.3}
+    everywhere, here = lidar(grid, street, **noise), lidar(grid, street, **noise)
+    cells = np.arange(7000, 9000, 3)
+    for _ in range(3):
+        full, part = everywhere.fire(everything(grid), SENSOR)[0], here.fire(cells, SENSOR)[0]
+        assert np.array_equal(part.ranges, full.ranges[cells])
+
+
+def test_firing_nothing_returns_nothing(grid, street):
+    scan, bodies = lidar(grid, street).fire(np.array([], dtype=np.int64), SENSOR)
+    assert len(scan.ranges) == len(bodies) == 0
+
+
+@pytest.mark.parametrize(
+    ("noise", "named"),
+    [({"dropout": 1.5}, "dropout"), ({"dropout": -0.1}, "dropout"), ({"range_sigma_m": -1}, "range_sigma_m"),
+     ({"range_sigma_m": float("nan")}, "range_sigma_m")],
+)  # fmt: skip
+def test_impossible_noise_is_refused_by_name(noise, named):
+    with pytest.raises(InvalidInput, match=named):
+        LidarNoise(**noise)
+
+
+def test_an_unknown_engine_is_refused_with_the_known_ones():
+    check_engine("bullet")
+    with pytest.raises(InvalidInput, match=r"engine 'warp'.*bullet"):
+        check_engine("warp")

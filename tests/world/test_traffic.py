@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.traffic import Traffic
+
+CAR, EGO = CATALOGUE["car"], CATALOGUE["ego"]
+DT = 0.05
+
+
+def drive(traffic, seconds, *watched, ego=None, acceleration=lambda time: 0.0):
+    """Poses of the watched vehicles at every step, (steps, vehicles, 3)."""
+    poses = []
+    for step in range(round(seconds / DT)):
+        if ego is not None:
+            ego.accelerate(acceleration(step * DT), DT)
+        traffic.step(DT)
+        poses.append([vehicle.pose for vehicle in watched])
+    return np.array(poses)
+
+
+LANES = [(0, 0, 0.0), (0, 1, 3.5), (1, -1, -3.5), (1, 1, 3.5), (2, -2, -7.0)]
+
+
+@pytest.mark.parametrize(("ego_lane", "lane", "y"), LANES)
+def test_lanes_are_numbered_to_the_left_of_the_ego(ego_lane, lane, y):
+    traffic = Traffic((1, 1, 1), ego_lane, 3.5, 14.0)
+    assert traffic.add_driver(12.0, lane, 8.0, CAR).pose == pytest.approx((12.0, y, 0.0))
+
+
+def test_an_oncoming_driver_faces_and_comes_towards_the_ego():
+    traffic = Traffic((1, -1), 0, 3.5, 14.0)
+    driver = traffic.add_driver(30.0, 1, 8.0, CAR)
+    x, y, heading = driver.pose
+    assert (x, y) == pytest.approx((30.0, 3.5))
+    assert np.cos(heading) == pytest.approx(-1)
+    poses = drive(traffic, 1.0, driver)
+    assert poses[-1, 0, :2] == pytest.approx([22.0, 3.5], abs=0.1)
+
+
+@pytest.mark.parametrize(("ego_lane", "start", "target"), [(1, -1, 0), (0, 0, 1), (0, 1, 0)])
+def test_a_lane_change_ends_in_its_lane_and_turns_the_right_way(ego_lane, start, target):
+    traffic = Traffic((1, 1), ego_lane, 3.5, 14.0)
+    driver = traffic.add_parked_driver(20.0, start, CAR, 8.0)
+    driver.pull_out(target)
+    poses = drive(traffic, 12.0, driver)[:, 0]
+    side = np.sign(target - start)
+    assert poses[-1, 1] == pytest.approx(3.5 * target, abs=0.1)
+    assert poses[-1, 2] == pytest.approx(0.0, abs=0.02)
+    assert (side * poses[:, 2]).max() > 0.05
+    assert (side * poses[:, 2]).min() > -0.05
+    assert (side * np.diff(poses[:, 1])).min() > -0.01
+
+
+def test_heading_points_where_a_vehicle_goes():
+    traffic = Traffic((1, 1), 0, 3.5, 14.0)
+    driver = traffic.add_parked_driver(0.0, 0, CAR, 8.0)
+    driver.pull_out(1)
+    poses = drive(traffic, 6.0, driver)[:, 0]
+    moves = np.diff(poses[:, :2], axis=0)
+    fast = np.hypot(*moves.T) / DT > 6.0
+    assert np.arctan2(moves[fast, 1], moves[fast, 0]) == pytest.approx(poses[1:][fast, 2], abs=0.15)
+
+
+def test_a_parked_driver_stands_until_told():
+    traffic = Traffic((1, 1), 1, 3.5, 14.0)
+    driver = traffic.add_parked_driver(20.0, -1, CAR, 8.0)
+    assert np.ptp(drive(traffic, 2.0, driver)[:, 0], axis=0) == pytest.approx([0, 0, 0])
+    driver.pull_out(0)
+    drive(traffic, 4.0, driver)
+    assert 3.0 < driver.speed <= 8.1
+
+
+def test_a_follower_does_not_hit_a_braking_ego():
+    traffic = Traffic((1, -1), 0, 3.5, 14.0)
+    ego = traffic.add_ego(0.0, 8.0, EGO)
+    follower = traffic.add_driver(-22.5, 0, 8.0, CAR)
+    poses = drive(traffic, 8.0, ego, follower, ego=ego, acceleration=lambda time: 0.0 if time < 1 else -5.0)
+    gaps = poses[:, 0, 0] - poses[:, 1, 0] - (EGO.size[0] + CAR.size[0]) / 2
+    assert gaps.min() > 0.5
+    assert ego.speed == pytest.approx(0.0, abs=1e-9)
+    assert follower.speed < 2.0
+
+
+def test_the_ego_stops_and_never_reverses():
+    traffic = Traffic((1, -1), 0, 3.5, 14.0)
+    ego = traffic.add_ego(0.0, 3.0, EGO)
+    poses = drive(traffic, 3.0, ego, ego=ego, acceleration=lambda time: -5.0)
+    assert np.all(np.diff(poses[:, 0, 0]) >= -1e-12)
+    assert poses[-1, 0, 0] == pytest.approx(9 / 10, abs=0.1)
+    assert ego.speed == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_ego_holds_its_speed_and_lane():
+    traffic = Traffic((1, -1), 0, 3.5, 14.0)
+    ego = traffic.add_ego(0.0, 8.0, EGO)
+    poses = drive(traffic, 2.0, ego, ego=ego)
+    assert poses[-1, 0] == pytest.approx([16.0, 0.0, 0.0])
+
+
+def test_the_ego_gains_speed_at_the_acceleration_it_is_told():
+    traffic = Traffic((1, -1), 0, 3.5, 14.0)
+    ego = traffic.add_ego(0.0, 2.0, EGO)
+    drive(traffic, 2.0, ego, ego=ego, acceleration=lambda time: 1.5)
+    assert ego.speed == pytest.approx(5.0)
+
+
+def test_two_roads_with_the_same_traffic_agree_to_the_last_bit():
+    def trace():
+        traffic = Traffic((1, 1), 1, 3.5, 14.0)
+        ego, driver = traffic.add_ego(0.0, 8.0, EGO), traffic.add_parked_driver(20.0, -1, CAR, 8.0)
+        driver.pull_out(0)
+        return drive(traffic, 4.0, ego, driver, ego=ego)
+
+    assert np.array_equal(trace(), trace())

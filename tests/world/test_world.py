@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.types import CLASSES
+from care_sim.world.traffic import Traffic
+from care_sim.world.walker import Walk
+from care_sim.world.world import STEP_S, World, whole_steps
+
+
+@pytest.fixture
+def world():
+    made = World(Traffic((1, -1), 0, 3.5, 14.0), ego_speed=10.0)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize(("duration", "steps"), [(0.05, 1), (0.1, 2), (0.3, 6), (0.5, 10), (6.0, 120)])
+def test_whole_steps(duration, steps):
+    assert whole_steps(duration) == steps
+
+
+@pytest.mark.parametrize("duration", [0.07, 0.12, 0.026, 0.0, -0.1, 0.01, 1 / 3])
+def test_a_period_that_does_not_divide_is_refused(duration):
+    with pytest.raises(InvalidInput, match=r"keyframe_s must be a multiple .* 0\.05"):
+        whole_steps(duration)
+
+
+def test_time_and_ego_advance_together(world):
+    for _ in range(10):
+        world.advance(0.0, 0.1)
+    assert world.time == pytest.approx(1.0)
+    assert world.ego.pose == pytest.approx((10.0, 0.0, 0.0))
+    assert (world.ego_motion.speed, world.ego_motion.acceleration) == pytest.approx((10.0, 0.0))
+
+
+def test_odometry_reports_what_braking_really_does(world):
+    world.advance(-5.0, 0.1)
+    assert (world.ego_motion.speed, world.ego_motion.acceleration) == pytest.approx((9.5, -5.0))
+    world.advance(-5.0, 3.0)
+    assert (world.ego_motion.speed, world.ego_motion.acceleration) == pytest.approx((0.0, 0.0))
+
+
+def test_a_collision_is_told_with_the_speed_of_the_first_contact(world):
+    """The bus stands 7 m before the bumper; braking at 5 m/s^2 from 10 m/s leaves sqrt(30) m/s there."""
+    world.add("bus", "bus", (2.04 + 7.0 + 11.19 / 2, 0.0, 0.0))
+    passage = world.advance(-5.0, 1.5)
+    assert passage.impact_speed_mps == pytest.approx(np.sqrt(30), abs=0.25)
+
+
+def test_passing_close_by_is_no_collision(world):
+    bus = world.add("bus", "bus", (10.0, 0.865 + 0.05 + 1.47, 0.0))
+    world.first_sighting = bus
+    passage = world.advance(0.0, 2.0)
+    assert passage.impact_speed_mps is None
+    assert passage.clearance_m == pytest.approx(0.05, abs=5e-3)
+    assert passage.nearest_m == pytest.approx(0.865 + 0.05 + 1.47, abs=0.05)
+
+
+def test_any_body_counts_for_the_collision_but_only_the_first_sighting_for_clearance(world):
+    world.add("hoarding", "hoarding", (8.0, 0.0, np.pi / 2))
+    world.first_sighting = world.add("person", "pedestrian", (0.0, 20.0, 0.0))
+    passage = world.advance(0.0, 1.0)
+    assert passage.impact_speed_mps == pytest.approx(10.0)
+    assert passage.clearance_m > 15
+
+
+def test_a_contact_between_the_ends_of_a_keyframe_is_not_missed():
+    """A person who crosses just ahead of the bumper while the car passes."""
+    world = World(Traffic((1, -1), 0, 3.5, 14.0), ego_speed=10.0)
+    walk = Walk((4.0, 0.0), np.pi / 2, 3.0, 100.0, 50.0)
+    world.first_sighting = world.add("person", "pedestrian", walk.pose)
+    passages = [world.advance(0.0, 1.0)]
+    assert passages[0].impact_speed_mps == pytest.approx(10.0)
+    world.close()
+
+
+def test_actors_follow_their_functions_in_picture_and_truth(world):
+    walk = Walk((20.0, -5.0), np.pi / 2, 2.0, 100.0, 50.0, 0.5)
+    person = world.add("person", "pedestrian", walk.pose)
+    world.advance(0.0, 1.5)
+    assert world.boxes([person])[0] == pytest.approx([20, -5 + 1.98, 0.88, 0.73, 0.66, 1.76, np.pi / 2])
+    ranges, ids = world.bullet.cast([20.0, -20.0, 1.0], np.array([[0.0, 1.0, 0.0]]), 30.0)
+    assert ids.tolist() == [person.body]
+    assert ranges[0] == pytest.approx(20 - 5 + 1.98 - 0.6 * 0.73 / 2, abs=1e-3)
+
+
+def test_events_happen_once_at_their_step(world):
+    happened = []
+    world.at(0.12, lambda: happened.append(world.time))
+    world.at(0.3, lambda: happened.append(world.time))
+    world.advance(0.0, 0.1)
+    assert happened == []
+    world.advance(0.0, 0.4)
+    assert happened == pytest.approx([0.15, 0.3])
+    assert STEP_S == 0.05
+
+
+def test_labels_are_for_reported_bodies_of_the_five_classes(world):
+    car = world.add("a", "car", (10.0, 5.0, 0.0))
+    silent = world.add("b", "car", (20.0, 5.0, 0.0), reported=False)
+    trailer = world.add("c", "trailer", (30.0, 5.0, 0.0))
+    assert (car.label, silent.label, trailer.label) == (CLASSES.index("car"), None, None)
+
+
+def test_a_driver_of_the_traffic_is_a_body_too(world):
+    driver = world.traffic.add_driver(30.0, 1, 8.0, world.ego_kind)
+    actor = world.add("oncoming", "car", driver)
+    world.advance(0.0, 1.0)
+    x, y, *_ = world.boxes([actor])[0]
+    assert (x, y) == pytest.approx((22.0, 3.5), abs=0.1)
