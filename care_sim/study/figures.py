@@ -114,27 +114,25 @@ def _line(axes: Axes, places: Sequence[float], cells: Sequence[Cell]) -> tuple[f
         if cell.never:
             note = f"{cell.never} never"
             axes.annotate(
-                note, (place, cell.detection.median), (6, -10), textcoords="offset points", color=colour, size=8
+                note, (place, cell.detection.median), (6, 6), textcoords="offset points", color=colour, size=8
             )
     return medians[-1], policy, colour
 
 
 def _label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
     """Name the curves at their right ends, pushed apart where they meet."""
-    bottom, top = axes.get_ylim()
-    bottom, top = min(bottom, 0.0), top + 0.05 * (top - bottom)
-    axes.set_ylim(bottom, top)
-    gap, height = 0.06 * (top - bottom), top
+    top = axes.get_ylim()[1]
+    gap, height = 0.06 * top, top
     for value, text, colour in sorted(labels, reverse=True):
         height = min(value, height - gap)
-        place = (1.02, (height - bottom) / (top - bottom))
-        axes.annotate(text, place, xycoords="axes fraction", color=colour, va="center", annotation_clip=False)
+        axes.annotate(text, (1.02, height), xycoords=("axes fraction", "data"), color=colour, va="center")
 
 
 def _finish(axes: Axes, xlabel: str, title: str) -> None:
     axes.set_xlabel(xlabel)
     axes.set_ylabel("first detection (m, median and quartiles)")
     axes.set_title(title, loc="left", fontsize=10)
+    axes.set_ylim(bottom=0.0)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.92")
     axes.set_axisbelow(True)
