@@ -84,8 +84,12 @@ class Lost(care_sim.Policy):
 
     name = "lost"
 
+    def __init__(self, rig, cell):
+        super().__init__(rig)
+        self.cell = cell
+
     def demand(self, belief):
-        return care_sim.Demand([np.array([-1, 5, 16384])])
+        return care_sim.Demand([np.array([5, self.cell])])
 
 
 def test_no_demand_can_overspend(env):
@@ -95,7 +99,8 @@ def test_no_demand_can_overspend(env):
     assert np.count_nonzero(action) == len(info["fired"]) == 1638
 
 
-def test_cells_off_the_grid_are_refused_with_the_policys_name(env):
+@pytest.mark.parametrize("cell", [-1, 16384])
+def test_cells_off_the_grid_are_refused_with_the_policys_name(env, cell):
     observation, _ = env.reset(seed=0)
     with pytest.raises(InvalidInput, match=r"policy lost: cells must lie in 0\.\.16383"):
-        Lost(env.unwrapped.rig)(observation)
+        Lost(env.unwrapped.rig, cell)(observation)
