@@ -70,11 +70,11 @@ def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
     return scores.reshape(shape)
 
 
-def fired_cells(scores: NDArray[np.floating], budget: int, floor: Cells | None) -> Cells:
+def fired_cells(scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, floor: Cells | None) -> Cells:
     """The cells an action fires, ascending: the `budget` highest strictly positive scores, ties by
     ascending index, topped up from `floor` when there are fewer (None leaves them unspent).
     """
-    flat = scores.ravel()
+    flat = scores.ravel().astype(np.float32, copy=False)
     chosen = np.flatnonzero(flat > 0)
     if len(chosen) > budget:
         chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]

@@ -13,7 +13,7 @@ class MissingExtra(ImportError):
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
     """The error for a name that is not among the known ones."""
-    return InvalidInput(f"unknown {kind} {str(name)!r}; known: {', '.join(sorted(known))}")
+    return InvalidInput(f"unknown {kind} {str(name)!r}; known: {', '.join(sorted(known)) or 'none'}")
 
 
 def check_rate(name: str, value: float) -> None:

@@ -62,7 +62,7 @@ class Forgetting:
         range_rate = np.einsum("ij,ij->i", relative, tracks.boxes[:, :2]) / ranges
         receding = range_rate > self.rules.receding_mps
         static = np.hypot(*tracks.velocities.T) < self.rules.static_mps
-        harmless: NDArray[np.bool_] = receding | static
+        harmless: NDArray[np.bool_] = (receding | static) & (tracks.hits > 1)
         return harmless & (ranges > self.rules.guard_distance(ego.speed))
 
     def _uncertainty(self, ranges: Floats) -> Floats:

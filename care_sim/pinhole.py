@@ -46,11 +46,11 @@ class PinholeCamera:
         return np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
 
     def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """Pixels (n, 2) and depths (n,) of sensor-frame points (n, 3).
+        """Pixels (..., 2) and depths (...) of sensor-frame points (..., 3).
 
         Points at or behind the image plane have depth <= 0 and NaN pixels.
         """
-        depth, left, up = self.axes @ (np.asarray(points, dtype=float).reshape(-1, 3) - self.position).T
+        depth, left, up = np.moveaxis((np.asarray(points, dtype=float) - self.position) @ self.axes.T, -1, 0)
         scale = self.focal / np.where(depth > 0, depth, np.nan)
         return np.stack([self.width / 2 - left * scale, self.height / 2 - up * scale], axis=-1), depth
 

@@ -18,8 +18,10 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
     by the yaw change since the picture was taken.
     """
     result = np.zeros(len(detections), bool)
-    for rows, camera, yaw_change in _pictures(detections, rig):
-        u, v = camera.project(turned(tracks.boxes[:, :3], yaw_change))[0].T
+    centres = np.broadcast_to(tracks.boxes[:, :3], (len(detections), len(tracks), 3))
+    centres = turned(centres, detections.yaw_changes[:, None])
+    for rows, camera in _cameras(detections, rig):
+        u, v = np.moveaxis(camera.project(centres[rows])[0], -1, 0)
         left, top, right, bottom = detections.boxes[rows].T[..., None]
         inside = (left <= u) & (u <= right) & (top <= v) & (v <= bottom)
         result[rows] = np.any(inside & (detections.classes[rows, None] == tracks.classes), axis=1)
@@ -34,9 +36,9 @@ def wedges(
 ) -> list[Cells]:
     """The depth-free wedge W(d) of every detection, turned by the yaw change since its picture."""
     bundles = np.empty((len(detections), 9, 3))
-    for rows, camera, yaw_change in _pictures(detections, rig):
-        bundles[rows] = turned(camera.box_rays(detections.boxes[rows]), -yaw_change)
-    return rig.grid.wedges(bundles, azimuth_margin, elevation_margin)
+    for rows, camera in _cameras(detections, rig):
+        bundles[rows] = camera.box_rays(detections.boxes[rows])
+    return rig.grid.wedges(turned(bundles, -detections.yaw_changes[:, None]), azimuth_margin, elevation_margin)
 
 
 def camera_layers(
@@ -53,8 +55,7 @@ def camera_layers(
     return unexplained_wedges, explained_wedges
 
 
-def _pictures(detections: ImageDetections, rig: Rig) -> Iterator[tuple[NDArray[np.bool_], PinholeCamera, float]]:
-    """The rows that come from each camera's picture, the camera, and the yaw change since it was taken."""
+def _cameras(detections: ImageDetections, rig: Rig) -> Iterator[tuple[NDArray[np.bool_], PinholeCamera]]:
+    """Every camera with the mask of its detections."""
     for index in np.unique(detections.cameras).tolist():
-        rows = detections.cameras == index
-        yield rows, rig.cameras[index], float(detections.yaw_changes[rows][0])
+        yield detections.cameras == index, rig.cameras[index]

@@ -6,7 +6,7 @@ body id of the simulator: truth stays in the world and in the scoring.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,8 +71,8 @@ class ImageDetections:
     def from_rows(cls, rows: NDArray[np.floating]) -> "ImageDetections":
         """Read rows in the order of `COLUMNS`; rows of class -1 are padding."""
         table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        integers = table[:, [0, 6]].astype(np.int64)
-        return cls(integers[:, 0], table[:, 1], table[:, 2:6], integers[:, 1], table[:, 7], table[:, 8])
+        classes, cameras = table[:, [0, 6]].astype(np.int64).T
+        return cls(classes, table[:, 1], table[:, 2:6], cameras, table[:, 7], table[:, 8])
 
     def rows(self) -> Floats:
         """(n, 9) table in the order of `COLUMNS`."""
@@ -84,7 +84,8 @@ class Tracks:
     """Tracked objects as columns of one table; `len()` is their number n.
 
     `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
-    `misses` (n,) keyframes since the object was last detected.
+    `misses` (n,) keyframes since the object was last detected, `hits` (n,) keyframes at which it was; with
+    fewer than two the velocity is not known and reads 0.
     """
 
     ids: Cells
@@ -92,8 +93,9 @@ class Tracks:
     boxes: Floats
     velocities: Floats
     misses: Cells
+    hits: Cells
 
-    COLUMNS = ("id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses")
+    COLUMNS = ("id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses", "hits")
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -107,16 +109,16 @@ class Tracks:
     def from_rows(cls, rows: NDArray[np.floating]) -> "Tracks":
         """Read rows in the order of `COLUMNS`; rows of id -1 are padding."""
         table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        integers = table[:, [0, 1, 11]].astype(np.int64)
-        return cls(integers[:, 0], integers[:, 1], table[:, 2:9], table[:, 9:11], integers[:, 2])
+        ids, classes, misses, hits = table[:, [0, 1, 11, 12]].astype(np.int64).T
+        return cls(ids, classes, table[:, 2:9], table[:, 9:11], misses, hits)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
         """Some of the tracks, by index or mask."""
-        return Tracks(self.ids[rows], self.classes[rows], self.boxes[rows], self.velocities[rows], self.misses[rows])
+        return Tracks(*(getattr(self, column.name)[rows] for column in fields(self)))
 
     def rows(self) -> Floats:
-        """(n, 12) table in the order of `COLUMNS`."""
-        return np.column_stack([self.ids, self.classes, self.boxes, self.velocities, self.misses])
+        """(n, 13) table in the order of `COLUMNS`."""
+        return np.column_stack([self.ids, self.classes, self.boxes, self.velocities, self.misses, self.hits])
 
 
 @dataclass(frozen=True)

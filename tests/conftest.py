@@ -28,9 +28,9 @@ def bullet():
 def tracks_at():
     """Makes tracks from (class name, x, y, vx, vy); ids count from `first_id`."""
 
-    def make(*objects, z=-1.0, size=(2.0, 1.0, 2.0), first_id=0):
+    def make(*objects, z=-1.0, size=(2.0, 1.0, 2.0), first_id=0, hits=2):
         rows = [
-            [first_id + n, CLASSES.index(name), x, y, z, *size, 0.0, vx, vy, 0]
+            [first_id + n, CLASSES.index(name), x, y, z, *size, 0.0, vx, vy, 0, hits]
             for n, (name, x, y, vx, vy) in enumerate(objects)
         ]
         return Tracks.from_rows(np.array(rows, dtype=float).reshape(-1, len(Tracks.COLUMNS)))

@@ -100,7 +100,7 @@ def test_the_lists(capsys):
     assert "care-sbf" in run(capsys, "policies")[1]
     out = run(capsys, "scenarios")[1]
     assert "dartout" in out
-    assert "vehicles=5" in out
+    assert "vehicles=7" in out
 
 
 def test_the_defaults_are_those_of_an_episode():

@@ -19,8 +19,10 @@ def controller(cruise=10.0, **rules):
 
 def objects(*rows, size=(2.0, 1.0, 1.5), yaw=0.0):
     """Tracks of `size` from (gap to the front bumper, y, vx, vy)."""
-    table = [[n, 0, gap + FRONT + size[0] / 2, y, 0, *size, yaw, vx, vy, 0] for n, (gap, y, vx, vy) in enumerate(rows)]
-    return Tracks.from_rows(np.array(table, dtype=float).reshape(-1, 12))
+    table = [
+        [n, 0, gap + FRONT + size[0] / 2, y, 0, *size, yaw, vx, vy, 0, 2] for n, (gap, y, vx, vy) in enumerate(rows)
+    ]
+    return Tracks.from_rows(np.array(table, dtype=float).reshape(-1, len(Tracks.COLUMNS)))
 
 
 def brakes(*rows, speed=10.0, **kwargs):

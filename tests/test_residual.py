@@ -95,7 +95,6 @@ def test_without_tracks_everything_is_residual_and_without_camera_nothing(tracks
     assert camera_layers(belief(seen(), tracks_at(("car", 20, 0, 0, 0))), RIG) == ([], [])
 
 
-@pytest.mark.xfail(strict=True, reason="all detections of a camera are turned by the first one's yaw change")
 def test_each_detection_is_turned_by_its_own_yaw_change(seen):
     """Two pictures of one camera, taken before and after a turn of 0.2 rad."""
     ahead, left = (155, 85, 165, 95), box_around((20 * np.cos(0.2), 20 * np.sin(0.2), 0))

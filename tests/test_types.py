@@ -10,7 +10,7 @@ GRID = AngularGrid()
 STANDING = Ego()
 values = st.floats(-1000, 1000, width=32)
 classes = st.integers(0, len(CLASSES) - 1)
-track_rows = st.lists(st.tuples(st.integers(0, 2**20), classes, *[values] * 9, st.integers(0, 100)), max_size=8)
+track_rows = st.lists(st.tuples(st.integers(0, 2**20), classes, *[values] * 9, *[st.integers(0, 100)] * 2), max_size=8)
 detection_rows = st.lists(
     st.tuples(classes, st.floats(0, 1, width=32), *[values] * 4, st.integers(0, 5), values, values), max_size=8
 )
@@ -48,11 +48,11 @@ def test_every_budget_survives_float32():
 
 
 def test_columns_keep_their_meaning():
-    row = [3, 4, 10, 11, 12, 1, 2, 3, 0.5, -1, 1, 2]
+    row = [3, 4, 10, 11, 12, 1, 2, 3, 0.5, -1, 1, 2, 6]
     tracks = belief([row]).tracks
     assert dict(zip(Tracks.COLUMNS, tracks.rows()[0].tolist(), strict=True)) == {
         "id": 3, "class": 4, "x": 10, "y": 11, "z": 12, "length": 1, "width": 2, "height": 3, "yaw": 0.5,
-        "vx": -1, "vy": 1, "misses": 2,
+        "vx": -1, "vy": 1, "misses": 2, "hits": 6,
     }  # fmt: skip
     assert tracks.velocities.tolist() == [[-1, 1]]
     assert tracks.ranges[0] == pytest.approx(np.hypot(10, 11))
@@ -62,8 +62,8 @@ def test_columns_keep_their_meaning():
 
 
 def test_padding_is_class_and_id_minus_one_and_float32():
-    observation = belief([[5, 0, *range(9), 0]], [[0, 1, *range(7)]]).to_observation()
-    assert observation["tracks"].shape == (MAX_TRACKS, 12)
+    observation = belief([[5, 0, *range(9), 0, 1]], [[0, 1, *range(7)]]).to_observation()
+    assert observation["tracks"].shape == (MAX_TRACKS, 13)
     assert observation["detections"].shape == (MAX_DETECTIONS, 9)
     assert set(observation["tracks"][1:, 0].tolist()) == {-1.0}
     assert set(observation["detections"][1:, 0].tolist()) == {-1.0}
@@ -77,16 +77,16 @@ def test_nothing_known_is_nothing_read():
 
 
 def test_more_than_the_table_holds_keeps_the_first_rows_and_the_shape():
-    tracks = [[n, 0, n, *[0] * 9] for n in range(70)]
+    tracks = [[n, 0, n, *[0] * 10] for n in range(70)]
     detections = [[0, 1, n, *[0] * 6] for n in range(70)]
     observation = belief(tracks, detections).to_observation()
     read = Belief.from_observation(observation)
-    assert observation["tracks"].shape == (64, 12)
+    assert observation["tracks"].shape == (64, 13)
     assert read.tracks.ids.tolist() == list(range(64))
     assert read.detections.boxes[:, 0].tolist() == list(range(64))
 
 
 def test_take_by_index_and_by_mask():
-    tracks = belief([[n, 0, n, *[0] * 9] for n in range(4)]).tracks
+    tracks = belief([[n, 0, n, *[0] * 10] for n in range(4)]).tracks
     assert tracks.take(np.array([2, 0])).ids.tolist() == [2, 0]
     assert tracks.take(np.array([True, False, False, True])).boxes[:, 0].tolist() == [0, 3]

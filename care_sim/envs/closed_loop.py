@@ -42,7 +42,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
     | `ego` | (3,) | speed m/s, yaw rate rad/s, acceleration m/s^2 |
     | `budget` | (1,) | B / N, the share of cells that may fire |
     | `detections` | (64, 9) | camera detections, columns `ImageDetections.COLUMNS`; class -1 pads |
-    | `tracks` | (64, 12) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
+    | `tracks` | (64, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
     ### Reward
@@ -188,7 +188,7 @@ class DartoutEnv(ClosedLoopEnv):
 
 
 class DenseEnv(ClosedLoopEnv):
-    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (5) tracked vehicles.
+    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (7) tracked ones, five in the camera's view.
 
     At 3% of the cells a reserve for every camera box starves the person; `care_sim.scenarios.dense`
     reckons why, cell by cell.

@@ -29,8 +29,8 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
     ]
     speed = MAX_SPEED_MPS
     tracks = [
-        [-1, 0, -far, -far, -far, 0, 0, 0, -turn, -speed, -speed, 0],
-        [MAX_COUNT, classes, far, far, far, size, size, size, turn, speed, speed, MAX_COUNT],
+        [-1, 0, -far, -far, -far, 0, 0, 0, -turn, -speed, -speed, 0, 0],
+        [MAX_COUNT, classes, far, far, far, size, size, size, turn, speed, speed, MAX_COUNT, MAX_COUNT],
     ]
     return spaces.Dict(
         {

@@ -30,7 +30,6 @@ class TrackMemory:
         self._keyframe_s = keyframe_s
         self._rules = rules
         self._tracks = _EMPTY
-        self._known_velocity = np.zeros(0, bool)
         self._next_id = 0
 
     def tracks(self, sensor: Frame) -> Tracks:
@@ -65,7 +64,7 @@ class TrackMemory:
         offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
         distance = np.hypot(offset[..., 0], offset[..., 1])
         elapsed = (tracks.misses + 1) * self._keyframe_s
-        slack = np.where(self._known_velocity, 0.0, self._rules.first_speed_mps * elapsed)
+        slack = np.where(tracks.hits > 1, 0.0, self._rules.first_speed_mps * elapsed)
         gate = self._rules.gate_m + slack
         possible = (distance <= gate[:, None]) & (tracks.classes[:, None] == classes[None, :])
         rows, columns = linear_sum_assignment(np.where(possible, distance, 1e6))
@@ -74,18 +73,18 @@ class TrackMemory:
 
     def _correct(self, rows: np.ndarray, seen: Floats) -> None:
         tracks = self._tracks
-        boxes, velocities, misses = tracks.boxes.copy(), tracks.velocities.copy(), tracks.misses + 1
+        boxes, velocities = tracks.boxes.copy(), tracks.velocities.copy()
+        misses, hits = tracks.misses + 1, tracks.hits.copy()
         elapsed = (misses[rows] * self._keyframe_s)[:, None]
         last_seen = boxes[rows, :2] - velocities[rows] * elapsed
         velocities[rows] = (seen[:, :2] - last_seen) / elapsed
         boxes[rows], misses[rows] = seen, 0
-        self._known_velocity[rows] = True
-        self._tracks = replace(tracks, boxes=boxes, velocities=velocities, misses=misses)
+        hits[rows] += 1
+        self._tracks = replace(tracks, boxes=boxes, velocities=velocities, misses=misses, hits=hits)
 
     def _forget(self) -> None:
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
         self._tracks = self._tracks.take(alive)
-        self._known_velocity = self._known_velocity[alive]
 
     def _start(self, classes: np.ndarray, boxes: Floats) -> None:
         count = len(classes)
@@ -98,5 +97,5 @@ class TrackMemory:
             np.concatenate([old.boxes, boxes]),
             np.concatenate([old.velocities, np.zeros((count, 2))]),
             np.concatenate([old.misses, np.zeros(count, np.int64)]),
+            np.concatenate([old.hits, np.ones(count, np.int64)]),
         )
-        self._known_velocity = np.concatenate([self._known_velocity, np.zeros(count, bool)])

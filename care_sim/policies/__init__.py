@@ -4,7 +4,8 @@ A package adds one through the entry-point group `care_sim.policies`: the entry'
 its object a `Policy` subclass (or any callable taking a `Rig` and parameters).
 """
 
-from collections.abc import Callable
+import inspect
+from collections.abc import Callable, Mapping
 from importlib import metadata
 
 import gymnasium
@@ -31,7 +32,7 @@ def policy_names() -> list[str]:
 
 def check_policy(name: str) -> None:
     """Raise InvalidInput for a name that is not a policy."""
-    if name not in policy_names():
+    if name not in BUILT_IN and name not in policy_names():
         raise unknown("policy", name, policy_names())
 
 
@@ -47,10 +48,17 @@ def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
     except AttributeError as error:
         raise InvalidInput(f"policy {name} needs an environment of CARE-Sim, got {env}") from error
     make = BUILT_IN[name] if name in BUILT_IN else _installed()[name].load()
-    try:
-        return make(rig, **parameters)
-    except TypeError as error:
-        raise InvalidInput(f"policy {name}: {error}") from error
+    _check_parameters(name, make, parameters)
+    return make(rig, **parameters)
+
+
+def _check_parameters(name: str, make: Callable[..., Policy], parameters: Mapping[str, object]) -> None:
+    _rig, *accepted = inspect.signature(make).parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
+        return
+    for parameter in parameters:
+        if parameter not in [known.name for known in accepted]:
+            raise unknown(f"parameter of policy {name}", parameter, [known.name for known in accepted])
 
 
 def _installed() -> metadata.EntryPoints:

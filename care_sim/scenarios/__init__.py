@@ -1,6 +1,8 @@
 """Seeded scenarios by name. A scenario is a frozen dataclass of its physics with a `build(rng)`."""
 
+import math
 from dataclasses import fields
+from typing import Any
 
 from care_sim.errors import InvalidInput, unknown
 from care_sim.scenarios.base import Scenario
@@ -19,11 +21,31 @@ def make_scenario(name: str, **parameters: object) -> Scenario:
     if name not in SCENARIOS:
         raise unknown("scenario", name, SCENARIOS)
     kind = SCENARIOS[name]
-    known = [field.name for field in fields(kind)]
-    for parameter in parameters:
-        if parameter not in known:
-            raise unknown(f"parameter of {name}", parameter, known)
-    try:
-        return kind(**parameters)  # type: ignore[arg-type]
-    except TypeError as error:
-        raise InvalidInput(f"{name}: {error}") from error
+    defaults = {field.name: field.default for field in fields(kind)}
+    for parameter, value in parameters.items():
+        if parameter not in defaults:
+            raise unknown(f"parameter of {name}", parameter, defaults)
+        _check(f"{parameter} of {name}", value, defaults[parameter])
+    return kind(**parameters)  # type: ignore[arg-type]
+
+
+def _check(parameter: str, value: Any, default: Any) -> None:
+    """A parameter takes what its default is: text, a flag, a whole number, a positive number, or a range of
+    numbers (low, high), positive where the default is."""
+    if isinstance(default, bool | str):
+        fits, expected = isinstance(value, type(default)), type(default).__name__
+    elif isinstance(default, int):
+        fits, expected = isinstance(value, int) and not isinstance(value, bool), "a whole number"
+    elif isinstance(default, float):
+        fits, expected = _is_number(value) and value > 0, "a positive number"
+    else:
+        (least, _), positive = default, default[0] > 0
+        fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(_is_number, value))
+        fits = fits and value[0] <= value[1] and (value[0] > 0 or not positive)
+        expected = "two numbers, low and high" + (", above 0" if positive else "")
+    if not fits:
+        raise InvalidInput(f"{parameter} must be {expected}, got {value!r}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

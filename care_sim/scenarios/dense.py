@@ -30,26 +30,23 @@ from care_sim.world.world import World
 DOUBLE_PARKED_Y = LANE_WIDTH_M
 KERBS = {"left": LEFT_PARKING_Y, "right": RIGHT_PARKING_Y, "oncoming": DOUBLE_PARKED_Y}
 
-IN_VIEW = (
+PLACES = (
     ("van", "left", -3.8),
     ("car", "left", 3.9),
     ("truck", "left", 11.0),
     ("van", "oncoming", 9.0),
     ("car", "left", -10.0),
-    ("car", "oncoming", 16.0),
-    ("car", "left", 17.5),
-    ("van", "oncoming", 23.0),
-    ("truck", "left", 24.5),
-    ("car", "oncoming", 30.0),
-    ("car", "left", 31.5),
-    ("car", "oncoming", 36.0),
+    ("car", "left", -16.5),
+    ("car", "right", -17.0),
+    ("car", "left", -23.0),
+    ("car", "right", -23.5),
+    ("van", "left", -30.0),
+    ("car", "right", -30.0),
+    ("car", "left", -36.5),
 )
-"""Kind, where it stands, and metres beyond the person's line, for vehicles that the camera sees at the
-encounter: a parked row with a gap to walk through, and a queue behind a double-parked van. The first
-`vehicles` are taken."""
-
-BESIDE = (("car", "left", -16.5), ("car", "right", -17.0))
-"""The rows go on beside and behind the ego, outside the camera's view but not the LiDAR's."""
+"""Kind, where it stands, and metres beyond the person's line. The first five are in the camera's view at
+the encounter: a parked row with a gap to walk through, and a double-parked van. The others go on beside
+and behind the ego, where only the LiDAR sees them. The first `vehicles` are taken."""
 
 FOLLOWER_M = -22.5
 """A driver follows the ego at the distance that highway-env's IDM keeps at 30 km/h: 10 m and 1.5 s."""
@@ -57,22 +54,21 @@ FOLLOWER_M = -22.5
 
 @dataclass(frozen=True)
 class Dense(CrossingScenario):
-    """The street of `CrossingScenario` with `vehicles` tracked vehicles in the camera's view, two parked
-    beside the ego, and a driver who follows it.
-    """
+    """The street of `CrossingScenario` lined with `vehicles` standing ones, five of which the camera sees
+    when the person appears, and a driver who follows the ego."""
 
-    vehicles: int = 5
+    vehicles: int = 7
     place_jitter_m: Range = (-0.4, 0.4)
     """How far a standing vehicle is off its place along the street; across, a quarter of that."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.vehicles <= len(IN_VIEW):
-            raise InvalidInput(f"vehicles must lie in 0..{len(IN_VIEW)}, got {self.vehicles}")
+        if not 0 <= self.vehicles <= len(PLACES):
+            raise InvalidInput(f"vehicles must lie in 0..{len(PLACES)}, got {self.vehicles}")
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""
-        for number, (kind, kerb, beyond) in enumerate((*BESIDE, *IN_VIEW[: self.vehicles])):
+        for number, (kind, kerb, beyond) in enumerate(PLACES[: self.vehicles]):
             along, across = draw(rng, self.place_jitter_m), draw(rng, self.place_jitter_m) / 4
             world.add(f"{kind} {number}", kind, (crossing_x + beyond + along, KERBS[kerb] + across, 0.0))
         follower = world.traffic.add_driver(FOLLOWER_M, 0, world.ego.speed, CATALOGUE["car"])

@@ -95,7 +95,7 @@ class CameraDetector:
         self._frames: deque[tuple[ImageDetections, float]] = deque(maxlen=faults.latency + 1)
 
     def detect(self, picture: Picture, heading: float) -> ImageDetections:
-        """The newest detections that are due, `picture` being the latest one taken at `heading`."""
+        """The newest detections that are due, the surest first; `picture` is the latest, taken at `heading`."""
         self._frames.append((self._look(picture), heading))
         if len(self._frames) <= self._faults.latency:
             return _NOTHING_SEEN
@@ -120,7 +120,7 @@ class CameraDetector:
             dtype=bool,
         )
         pixels, boxes = picture.pixels[seen], picture.boxes[seen]
-        order = np.argsort(boxes[:, 0], kind="stable")
+        order = np.lexsort((boxes[:, 0], -pixels))
         classes = np.array([self._labels[body] for body in picture.bodies[seen].tolist()], dtype=np.int64)
         zeros = np.zeros(len(classes))
         return ImageDetections(

@@ -13,7 +13,7 @@ import care_sim
 from care_sim.allocation import RESERVE_FRACTION
 from care_sim.envs import IDS
 from care_sim.errors import InvalidInput
-from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
+from care_sim.perception.detectors import MIN_RETURNS
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
 from care_sim.scenarios import make_scenario
@@ -57,7 +57,6 @@ class EpisodeConfig:
         if self.seed < 0 or self.seed != int(self.seed):
             raise InvalidInput(f"seed must be a whole number >= 0, got {self.seed}")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
-        ReturnsDetector({}, self.min_returns)
         with self.make_env() as env:
             self.make_policy(env)
 

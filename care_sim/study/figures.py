@@ -70,14 +70,14 @@ def budget_figure(rows: Sequence[Row], scenario: str) -> Figure:
 
 
 def crowding_figure(rows: Sequence[Row]) -> Figure:
-    """Median first-detection distance in metres against the vehicles in view, one panel a budget."""
+    """Median first-detection distance in metres against the standing vehicles, one panel a budget."""
     tagged = [{**row, crowding.COLUMN: crowding.vehicles_of(row)} for row in rows]
     budgets = sorted({row["budget"] for row in rows if row["policy"] != "full"})
     figure = Figure(figsize=(3.2 * len(budgets) + 0.8, 3.8), layout="constrained")
     panels = figure.subplots(1, len(budgets), sharey=True, squeeze=False)[0]
     for panel, budget in zip(panels, budgets, strict=True):
         _crowding_panel(panel, [row for row in tagged if row["policy"] == "full" or row["budget"] == budget])
-        _finish(panel, "vehicles in view", f"budget {percent(budget)}")
+        _finish(panel, "standing vehicles", f"budget {percent(budget)}")
     for panel in panels[1:]:
         panel.set_ylabel("")
     return figure

@@ -126,7 +126,7 @@ def collision_note(rows: Sequence[Row]) -> str:
 
 
 def crowding_table(rows: Sequence[Row]) -> Table:
-    """Median first detection of care and all-camera by vehicles in view and budget, and their difference."""
+    """Median first detection of care and all-camera by standing vehicles and budget, and their difference."""
     by_cell = _by_vehicles(rows)
     budgets = sorted({budget for _, policy, budget in by_cell if policy != "full"})
     counts = sorted({vehicles for vehicles, _, _ in by_cell})
@@ -139,7 +139,7 @@ def crowding_table(rows: Sequence[Row]) -> Table:
     note = (
         f"All-camera at least {COLLAPSE_M:.0f} m later than care on average, by budget, at these numbers of vehicles: "
     )
-    return Table("dense, by vehicles in the camera's view", columns, tuple(lines), (note + "; ".join(collapsed) + ".",))
+    return Table("dense, by standing vehicles", columns, tuple(lines), (note + "; ".join(collapsed) + ".",))
 
 
 CrowdingCells = dict[tuple[int, str, float], list[Row]]

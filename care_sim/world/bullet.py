@@ -133,8 +133,8 @@ class BulletWorld:
         return int(pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(parts)))
 
     def _no_look(self) -> int:
-        """A speck: without a visual shape PyBullet would draw the collision shape."""
-        return int(pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=[1e-4] * 3, physicsClientId=self._client))
+        """A speck deep below: without a visual shape PyBullet would draw the collision shape."""
+        return self._look([Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))])
 
 
 def _collision(parts: Sequence[Part]) -> dict[str, Any]:

@@ -141,7 +141,7 @@ def belief_of(tracks=(), ego_speed=0.0):
 
 
 def standing(number, x, y=0.0, vy=0.0):
-    return [number, CLASSES.index("car"), x, y, -1.0, 4.6, 1.95, 1.7, 0.0, 0.0, vy, 0]
+    return [number, CLASSES.index("car"), x, y, -1.0, 4.6, 1.95, 1.7, 0.0, 0.0, vy, 0, 2]
 
 
 def test_history_demands_the_hulls_nearest_first(environment):

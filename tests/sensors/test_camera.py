@@ -109,8 +109,8 @@ def test_a_low_wall_leaves_the_upper_half(bullet):
 def test_only_bodies_with_a_label_are_detected_with_their_class():
     seen = picture((3, 50, 20, 80, 60), (7, 100, 20, 130, 60), (5, 0, 0, 30, 30))
     found = detector({7: 0, 5: PEDESTRIAN}).detect(seen, 0.0)
-    assert found.classes.tolist() == [PEDESTRIAN, 0]
-    assert found.boxes.tolist() == [[0, 0, 30, 30], [100, 20, 130, 60]]
+    assert found.classes.tolist() == [0, PEDESTRIAN]
+    assert found.boxes.tolist() == [[100, 20, 130, 60], [0, 0, 30, 30]]
     assert found.cameras.tolist() == [0, 0]
     assert found.ages.tolist() == found.yaw_changes.tolist() == [0, 0]
 
