@@ -30,16 +30,14 @@ _FAR_M = 120.0
 class BulletWorld:
     """Bodies standing on a ground plane, in one DIRECT client. Not to be shared between processes.
 
-    What the sensors look through (the ground in the camera, the car that carries them) has no look, which
-    costs nothing to render; with `drawn` it has one, for pictures that people look at.
+    The ground and transparent bodies have no look: no camera needs their ids, and rendering them costs more
+    than everything else in the picture.
     """
 
-    def __init__(self, *, drawn: bool = False) -> None:
+    def __init__(self) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
-        self._drawn = drawn
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
-        look = -1 if drawn else self._no_look()
-        self.ground = pybullet.createMultiBody(0, plane, look, physicsClientId=self._client)
+        self.ground = pybullet.createMultiBody(0, plane, self._no_look(), physicsClientId=self._client)
         self._set_group(self.ground, _OPAQUE)
 
     def close(self) -> None:
@@ -50,11 +48,10 @@ class BulletWorld:
 
     def add(self, kind: BodyKind, pose: Pose, *, transparent: bool = False) -> int:
         """Place a body and return its id. A `transparent` one is neither hit by rays nor seen."""
-        seen = self._drawn or not transparent
         body = pybullet.createMultiBody(
             0,
             pybullet.createCollisionShapeArray(physicsClientId=self._client, **_collision(kind.parts)),
-            self._look(kind.parts) if seen else self._no_look(),
+            self._no_look() if transparent else self._look(kind.parts),
             physicsClientId=self._client,
         )
         self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
