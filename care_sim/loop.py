@@ -1,6 +1,7 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class ClosedLoop:
         index, time, speed = self.index, world.time, world.ego_motion.speed
 
         scan, bodies = self._lidar.fire(fired, sensor)
-        detections, detected = self._detector.detect(bodies, self._local_box)
+        detections, detected = self._detector.detect(bodies, partial(self._local_box, sensor))
         self._memory.update(detections, sensor)
         command = self._controller.command(self._memory.tracks(sensor), world.ego_motion)
 
@@ -111,8 +112,8 @@ class ClosedLoop:
         ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
 
-    def _local_box(self, body: int) -> Floats:
-        box: Floats = self.sensor.boxes_to_local(self.world.boxes([self._actors[body]]))[0]
+    def _local_box(self, sensor: Frame, body: int) -> Floats:
+        box: Floats = sensor.boxes_to_local(self.world.boxes([self._actors[body]]))[0]
         return box
 
     def _in_view(self) -> bool:

@@ -22,8 +22,6 @@ RAYS_A_CALL = 8192
 
 _SHAPES = {"box": pybullet.GEOM_BOX, "cylinder": pybullet.GEOM_CYLINDER, "sphere": pybullet.GEOM_SPHERE}
 _OPAQUE, _TRANSPARENT = 1, 2
-_ID_BITS = (1 << 24) - 1
-"""A pixel holds the body id in its low 24 bits and the link above."""
 _FAR_M = 120.0
 
 
@@ -90,8 +88,7 @@ class BulletWorld:
         ids = np.full((camera.height, camera.width), NOTHING, np.int64)
         if left < right and top < bottom:
             rendered = np.asarray(self._render(camera, sensor, (left, top, right, bottom))[4])
-            rendered = rendered.reshape(bottom - top, right - left)
-            ids[top:bottom, left:right] = np.where(rendered < 0, NOTHING, rendered & _ID_BITS)
+            ids[top:bottom, left:right] = rendered.reshape(bottom - top, right - left)
         return ids
 
     def colours(self, camera: PinholeCamera, sensor: Frame) -> NDArray[np.uint8]:
@@ -118,7 +115,6 @@ class BulletWorld:
             pybullet.computeProjectionMatrix(*across, *upward, NEAR_M, _FAR_M),
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
-            flags=pybullet.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX,
             physicsClientId=self._client,
         )
         return picture
