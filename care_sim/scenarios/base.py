@@ -38,9 +38,9 @@ def draw(rng: np.random.Generator, values: Range) -> float:
     return float(rng.uniform(*values))
 
 
-def line_with_buildings(world: World, right_y: float, left_y: float, starts: float, ends: float) -> None:
-    """Closed building fronts at y = `right_y` and y = `left_y`, from `starts` to `ends` along x."""
-    length, depth, _ = CATALOGUE["building"].size
-    for number, x in enumerate(np.arange(starts + length / 2, ends, length).tolist()):
-        world.add(f"building {number} right", "building", (x, right_y - depth / 2, 0.0))
-        world.add(f"building {number} left", "building", (x, left_y + depth / 2, 0.0))
+def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
+    """Closed house fronts at y = `right_y` and y = `left_y`, from behind the ego to beyond its view."""
+    length, depth, _ = CATALOGUE["terrace"].size
+    middle = length / 2 - 30.0
+    world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0))
+    world.add("terrace left", "terrace", (middle, left_y + depth / 2, 0.0))

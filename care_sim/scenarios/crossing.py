@@ -16,7 +16,7 @@ from care_sim.scenarios.base import (
     Range,
     Scenario,
     draw,
-    line_with_buildings,
+    line_with_terraces,
 )
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
@@ -68,7 +68,7 @@ class CrossingScenario(Scenario):
         self._add_person(world, self._add_occluder(world, crossing_x, rng), crossing_x, ego_speed, rng)
         self.furnish(world, crossing_x, rng)
         front = LEFT_PARKING_Y + PARKING_WIDTH_M / 2 + 2.5
-        line_with_buildings(world, LANE_WIDTH_M - front, front, -20.0, 90.0)
+        line_with_terraces(world, LANE_WIDTH_M - front, front)
         return world
 
     @abstractmethod

@@ -11,7 +11,7 @@ from care_sim.scenarios.base import (
     Range,
     Scenario,
     draw,
-    line_with_buildings,
+    line_with_terraces,
 )
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
@@ -52,5 +52,5 @@ class CutIn(Scenario):
         arrival = (rear_x - world.ego_kind.size[0] / 2) / ego_speed
         world.at(arrival - draw(rng, self.pull_out_s), lambda: driver.pull_out(0))
 
-        line_with_buildings(world, -LANE_WIDTH_M - 6.0, LANE_WIDTH_M + 3.0, -20.0, 110.0)
+        line_with_terraces(world, -LANE_WIDTH_M - 6.0, LANE_WIDTH_M + 3.0)
         return world

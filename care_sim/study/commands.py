@@ -94,7 +94,24 @@ class _Study:
     seeds: tuple[int, ...] = (5,)
     """One number: that many seeds, from 0. Several: these seeds."""
     workers: int = os.cpu_count() or 1
-    """Processes that play episodes."""
+    """Episodes that are played at the same time."""
+    cluster: str | None = None
+    """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
+
+    def conduct(self, configs: "Sequence[EpisodeConfig]", out: Path) -> int:
+        """Play the episodes, print their tables, name those that failed."""
+        from care_sim.study import executors
+        from care_sim.study.report import ROWS, conduct, print_report
+        from care_sim.study.rows import read_rows
+
+        make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
+        failures = conduct(configs, out, self.workers, make_executor)
+        if len(failures) < len(configs):
+            print_report(read_rows(out / ROWS), _console())
+            print(f"Results are in {out}")
+        for failure in failures:
+            print(f"care-sim: failed: {failure}", file=sys.stderr)
+        return FAILED if failures else DONE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +139,7 @@ class Sweep(_Study):
 
         axes = (self.scenarios, self.policies, self.budgets, _seeds(self.seeds))
         faults = (self.false_negative_rates, self.camera_latencies)
-        return _conduct(grid(*axes, *faults, **self.conditions.arguments()), self.out, self.workers)
+        return self.conduct(grid(*axes, *faults, **self.conditions.arguments()), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +153,7 @@ class Reproduce(_Study):
         """Run it."""
         from care_sim.study.paper import configurations
 
-        return _conduct(configurations(_seeds(self.seeds)), self.out, self.workers)
+        return self.conduct(configurations(_seeds(self.seeds)), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +167,7 @@ class Crowding(_Study):
         """Run it."""
         from care_sim.study.crowding import configurations
 
-        return _conduct(configurations(_seeds(self.seeds)), self.out, self.workers)
+        return self.conduct(configurations(_seeds(self.seeds)), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,19 +186,6 @@ class Report:
         print_report(rows, _console())
         write_report(rows, self.folder)
         return 0
-
-
-def _conduct(configs: "Sequence[EpisodeConfig]", out: Path, workers: int) -> int:
-    from care_sim.study.report import ROWS, conduct, print_report
-    from care_sim.study.rows import read_rows
-
-    failures = conduct(configs, out, workers)
-    if len(failures) < len(configs):
-        print_report(read_rows(out / ROWS), _console())
-        print(f"Results are in {out}")
-    for failure in failures:
-        print(f"care-sim: failed: {failure}", file=sys.stderr)
-    return FAILED if failures else DONE
 
 
 def _seeds(numbers: Sequence[int]) -> list[int]:

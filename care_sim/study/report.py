@@ -10,11 +10,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig, without_seeds
 from care_sim.study.episode import Row
+from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import save, study_figures
 from care_sim.study.journal import Journal
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import write_rows
-from care_sim.study.runner import ExecutorFactory, Failure, processes, run_all
+from care_sim.study.runner import Failure, run_all
 from care_sim.study.tables import CAPTION, collision_note, study_tables
 
 ROWS = "episodes.parquet"

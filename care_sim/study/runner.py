@@ -1,19 +1,15 @@
 """Runs episodes over processes; survives the death of a worker and finds the episode that killed it."""
 
-import signal
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
-from multiprocessing import get_context
 
 from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.episode import Row, run_episode
+from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import Journal
-
-ExecutorFactory = Callable[[int], Executor]
-"""Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +21,6 @@ class Failure:
 
     def __str__(self) -> str:
         return f"{self.config.label}: {self.reason}"
-
-
-def processes(workers: int) -> Executor:
-    """Worker processes on this machine, forked from a clean server that has imported the simulator."""
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["care_sim.study.episode", "care_sim.envs.closed_loop"])
-    # An interrupt is the main process's to handle.
-    return ProcessPoolExecutor(workers, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
 
 
 def run_all(
@@ -102,7 +90,9 @@ class _Run:
         error = future.exception()
         if isinstance(error, BrokenExecutor):
             return False
-        if error is None:
+        if error is None and future.result()["digest"] != config.digest():
+            self._fail(config, "the worker runs another version of care-sim")
+        elif error is None:
             self._journal.append(future.result())
             self._on_done()
         else:

@@ -107,6 +107,8 @@ CATALOGUE = {
         # Site hoarding: 2.4 m panels, as required for full-height hoardings by UK HSE HSG151.
         _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3)),
         _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
+        # A closed row of eight such buildings.
+        _block("terrace", None, (144.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
         # The recording car of nuScenes, a Renault Zoe: 4.08 x 1.73 x 1.56 (manufacturer's data sheet).
         BodyKind(
             "ego",
