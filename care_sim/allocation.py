@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, is_number
 from care_sim.grid import Cells, cell_set
 from care_sim.types import Action, Demand
 
@@ -15,8 +15,8 @@ RESERVE_FRACTION = 0.3
 
 def budget_cells(budget: float, cells: int) -> int:
     """B = round(beta * N) (Eq. 1). Raises InvalidInput for a fraction outside (0, 1] or without a cell."""
-    if not 0.0 < budget <= 1.0:
-        raise InvalidInput(f"budget must lie in (0, 1], got {budget}")
+    if not (is_number(budget) and 0.0 < budget <= 1.0):
+        raise InvalidInput(f"budget must lie in (0, 1], got {budget!r}")
     if round(budget * cells) < 1:
         raise InvalidInput(f"budget {budget} leaves no cell of {cells}; the least is {1 / cells:.2g}")
     return round(budget * cells)

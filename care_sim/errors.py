@@ -1,6 +1,10 @@
 """Errors a user can act on: one line that names the thing and what is allowed."""
 
+import math
 from collections.abc import Iterable
+from numbers import Real
+
+import numpy as np
 
 
 class InvalidInput(ValueError):
@@ -16,7 +20,22 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
     return InvalidInput(f"unknown {kind} {str(name)!r}; known: {', '.join(sorted(known)) or 'none'}")
 
 
-def check_rate(name: str, value: float) -> None:
-    """Raise InvalidInput unless `value` lies in [0, 1]."""
-    if not 0.0 <= value <= 1.0:
-        raise InvalidInput(f"{name} must lie in [0, 1], got {value}")
+def is_number(value: object) -> bool:
+    """Whether `value` is a real number, and no flag."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def check_number(name: str, value: object, least: float = -math.inf, most: float = math.inf) -> None:
+    """Raise InvalidInput unless `value` is a finite number within `least` and `most`."""
+    if not (is_number(value) and math.isfinite(value) and least <= value <= most):  # type: ignore[arg-type,operator]
+        if most < math.inf:
+            allowed = f"lie in [{least:g}, {most:g}]"
+        else:
+            allowed = f"be a finite number >= {least:g}" if least > -math.inf else "be a finite number"
+        raise InvalidInput(f"{name} must {allowed}, got {value!r}")
+
+
+def check_whole(name: str, value: object, least: int) -> None:
+    """Raise InvalidInput unless `value` is a whole number (of an integer type) of at least `least`."""
+    if not (isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= least):
+        raise InvalidInput(f"{name} must be a whole number >= {least}, got {value!r}")

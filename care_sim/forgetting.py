@@ -1,10 +1,11 @@
 """Algorithm 3 of the paper: safety-bounded forgetting (SBF) shrinks the hulls of harmless tracks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.errors import check_number
 from care_sim.frames import Floats
 from care_sim.grid import AZIMUTH_MARGIN, Cells
 from care_sim.types import Ego, Tracks
@@ -28,6 +29,10 @@ class ForgettingRules:
     """sigma_pos of Eq. 4: zero in simulation, 0.4 on the paper's vehicle."""
     decay_per_keyframe: float = 1.0
     """Columns of margin forgotten with each consecutive safe keyframe."""
+
+    def __post_init__(self) -> None:
+        for rule in fields(self):
+            check_number(rule.name, getattr(self, rule.name), 0)
 
     def guard_distance(self, ego_speed: float) -> float:
         """Eq. 3, metres: inside it nothing is ever forgotten."""

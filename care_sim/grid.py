@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from care_sim.errors import InvalidInput
 from care_sim.frames import Floats, box_corners, turned
 
 Cells = NDArray[np.int64]
@@ -164,6 +165,12 @@ def _footprints(boxes: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def cell_set(cells: Sequence[int] | Cells) -> Cells:
-    """`cells` as an ascending array without repeats."""
-    array = np.asarray(cells, dtype=np.int64)
+    """`cells` as an ascending array without repeats. Raises InvalidInput for what is no list of indices."""
+    array = np.asarray(cells)
+    if array.ndim != 1 or not (array.size == 0 or np.issubdtype(array.dtype, np.integer)):
+        raise InvalidInput(
+            f"a set of cells must be a list of cell indices, got {array.dtype} of shape {array.shape}"
+            " (of a mask take np.flatnonzero)"
+        )
+    array = array.astype(np.int64, copy=False)
     return array if np.all(array[1:] > array[:-1]) else np.unique(array)

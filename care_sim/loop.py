@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.control import BrakingController
-from care_sim.errors import InvalidInput
+from care_sim.errors import check_whole
 from care_sim.frames import Floats, Frame
 from care_sim.grid import Cells
 from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
@@ -30,8 +30,7 @@ class Sensing:
 
     def __post_init__(self) -> None:
         check_engine(self.engine)
-        if self.min_returns < 1 or self.min_returns != int(self.min_returns):
-            raise InvalidInput(f"min_returns must be a whole number >= 1, got {self.min_returns}")
+        check_whole("min_returns", self.min_returns, 1)
 
 
 class ClosedLoop:

@@ -37,7 +37,8 @@ def nothing(**changes):
     ],
 )
 def test_terms(frame, before, expected):
-    assert terms(keyframe(**frame), *before) == nothing(**expected)
+    now = keyframe(**frame)
+    assert terms(now, before[0] or now.in_view, before[1] or now.detected) == nothing(**expected)
 
 
 def test_a_weight_is_changed_by_name_and_the_rest_stays():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from care_sim import reward as rewards
 from care_sim.allocation import RESERVE_FRACTION, budget_cells, fired_cells
 from care_sim.envs.spaces import checked_scores, observation_space
-from care_sim.errors import InvalidInput, check_rate
+from care_sim.errors import InvalidInput, check_number
 from care_sim.evaluation.metrics import outcome
 from care_sim.grid import AngularGrid, Cells
 from care_sim.loop import ClosedLoop, Sensing
@@ -51,7 +51,8 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
 
     ### Episode end
     Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes). `info` has
-    `fired` (cells), `detected` (the first-sighting actor, at this keyframe), `in_view`, `braking`,
+    `fired` (cells; an array of B, with `floor=False` a list of at most B, because Gymnasium's vector
+    environments stack arrays of one length), `detected` (the first-sighting actor, at this keyframe), `in_view`, `braking`,
     `clearance_m`, `speed_mps`, `time_s`, `reward_terms`; at the end `info["outcome"]`, a dict of
     `care_sim.types.Outcome`.
 
@@ -83,7 +84,9 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         render_mode: str | None = None,
         **scenario_parameters: Any,
     ):
-        check_rate("reserve_fraction", reserve_fraction)
+        check_number("reserve_fraction", reserve_fraction, 0, 1)
+        if not isinstance(floor, bool):
+            raise InvalidInput(f"floor must be True or False, got {floor!r}")
         whole_steps(keyframe_s)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
@@ -114,27 +117,43 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed."""
+        """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed.
+
+        `info` holds the seed that repeats the episode; there are no `options`.
+        """
         super().reset(seed=seed)
         entropy = seed if seed is not None else int(self.np_random.integers(2**32))
-        scenario, camera, noise, self._floor_seed = np.random.SeedSequence(entropy).spawn(4)
+        scenario, camera, noise, floor = np.random.SeedSequence(entropy).spawn(4)
         self.close()
         world = self.scenario.build(np.random.default_rng(scenario))
         self._loop = ClosedLoop(world, self.rig, self.sensing, (camera, noise))
+        self._floor_rng = np.random.default_rng(floor)
+        self._in_view = self._detected = self._over = False
         self.keyframes = []
         return self._loop.belief.to_observation(), {"seed": entropy}
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe."""
+        """Fire the cells that `action` scores highest and go on to the next keyframe.
+
+        Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
+        gymnasium.error.ResetNeeded before `reset` and after the end.
+        """
         loop = self.loop
+        if self._over:
+            raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         scores = checked_scores(action, self.rig.grid.shape)
-        frame = loop.keyframe(fired_cells(scores, self.rig.budget, self._floor(loop.index)))
-        terms = rewards.terms(frame, any(f.in_view for f in self.keyframes), any(f.detected for f in self.keyframes))
+        # Drawn at every keyframe, so that it is the same for every policy.
+        floor = self._floor_rng.permutation(self.rig.grid.size)
+        frame = loop.keyframe(fired_cells(scores, self.rig.budget, floor if self._floor_on else None))
         self.keyframes.append(frame)
+        self._in_view |= frame.in_view
+        self._detected |= frame.detected
+        terms = rewards.terms(frame, self._in_view, self._detected)
         terminated = frame.impact_speed_mps is not None
         truncated = loop.world.time >= self.scenario.duration_s - 1e-9
-        info = _info(frame, terms)
-        if terminated or truncated:
+        self._over = terminated or truncated
+        info = self._info(frame, terms)
+        if self._over:
             info["outcome"] = asdict(outcome(self.keyframes))
         reward = sum(self._weights[name] * value for name, value in terms.items())
         return loop.belief.to_observation(), reward, terminated, truncated, info
@@ -153,25 +172,17 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
             self._loop.world.close()
             self._loop = None
 
-    def _floor(self, keyframe: int) -> Cells | None:
-        """The permutation of all cells shared by every policy at this keyframe."""
-        if not self._floor_on:
-            return None
-        state = self._floor_seed.generate_state(2)
-        return np.random.default_rng([*state.tolist(), keyframe]).permutation(self.rig.grid.size)
-
-
-def _info(frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
-    return {
-        "fired": frame.fired,
-        "detected": frame.detected,
-        "in_view": frame.in_view,
-        "braking": frame.braking,
-        "clearance_m": frame.clearance_m,
-        "speed_mps": frame.speed_mps,
-        "time_s": frame.time_s,
-        "reward_terms": terms,
-    }
+    def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
+        return {
+            "fired": frame.fired if self._floor_on else frame.fired.tolist(),
+            "detected": frame.detected,
+            "in_view": frame.in_view,
+            "braking": frame.braking,
+            "clearance_m": frame.clearance_m,
+            "speed_mps": frame.speed_mps,
+            "time_s": frame.time_s,
+            "reward_terms": terms,
+        }
 
 
 class DartoutEnv(ClosedLoopEnv):

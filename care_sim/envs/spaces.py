@@ -50,8 +50,8 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDAr
         raise InvalidInput(f"action must have shape {shape} (rows, columns), got {scores.shape}")
     if not (np.issubdtype(scores.dtype, np.number) or scores.dtype == bool):
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
-    if np.isnan(scores).any():
-        raise InvalidInput("action must not hold NaN; score a cell 0 to leave it out")
+    if not np.isfinite(scores).all():
+        raise InvalidInput("action must not hold NaN or infinity; score a cell 0 to leave it out")
     return scores.astype(np.float32, copy=False)
 
 

@@ -47,13 +47,28 @@ def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
         rig = env.get_wrapper_attr("rig")
     except AttributeError as error:
         raise InvalidInput(f"policy {name} needs an environment of CARE-Sim, got {env}") from error
-    make = BUILT_IN[name] if name in BUILT_IN else _installed()[name].load()
+    make = BUILT_IN[name] if name in BUILT_IN else _load(_installed()[name])
     _check_parameters(name, make, parameters)
-    return make(rig, **parameters)
+    try:
+        return make(rig, **parameters)
+    except InvalidInput:
+        raise
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"policy {name} refuses {parameters}: {error}") from error
+
+
+def _load(entry: metadata.EntryPoint) -> Callable[..., Policy]:
+    try:
+        make: Callable[..., Policy] = entry.load()
+    except Exception as error:
+        raise InvalidInput(f"policy {entry.name} ({entry.value}) cannot be loaded: {error}") from error
+    return make
 
 
 def _check_parameters(name: str, make: Callable[..., Policy], parameters: Mapping[str, object]) -> None:
-    _rig, *accepted = inspect.signature(make).parameters.values()
+    rig, *accepted = inspect.signature(make).parameters.values()
+    if rig.name in parameters:
+        raise InvalidInput(f"{rig.name} of policy {name} comes from the environment and is no parameter")
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return
     for parameter in parameters:

@@ -7,6 +7,7 @@ import numpy as np
 
 from care_sim.allocation import allocate, scores_of
 from care_sim.errors import InvalidInput
+from care_sim.grid import Cells
 from care_sim.types import Action, Belief, Demand, Observation, Rig
 
 
@@ -31,11 +32,19 @@ class Policy(ABC):
     def __call__(self, observation: Observation) -> Action:
         """The action (E, A) of the environments for an observation.
 
-        Raises InvalidInput when `demand` names a cell that the grid does not have.
+        Raises InvalidInput when `demand` returns no Demand, or a cell that the grid does not have.
         """
         belief = Belief.from_observation(observation)
-        cells = allocate(self.demand(belief), belief.budget, self.rig.reserve_fraction)
-        grid = self.rig.grid
-        if np.any((cells < 0) | (cells >= grid.size)):
-            raise InvalidInput(f"policy {self.name or type(self).__name__}: cells must lie in 0..{grid.size - 1}")
-        return scores_of(cells, grid.shape)
+        try:
+            return scores_of(self._cells(belief), self.rig.grid.shape)
+        except InvalidInput as error:
+            raise InvalidInput(f"policy {self.name or type(self).__name__}: {error}") from error
+
+    def _cells(self, belief: Belief) -> Cells:
+        demand = self.demand(belief)
+        if not isinstance(demand, Demand):
+            raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")
+        cells = allocate(demand, belief.budget, self.rig.reserve_fraction)
+        if np.any((cells < 0) | (cells >= self.rig.grid.size)):
+            raise InvalidInput(f"cells must lie in 0..{self.rig.grid.size - 1}")
+        return cells

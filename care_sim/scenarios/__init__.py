@@ -4,7 +4,7 @@ import math
 from dataclasses import fields
 from typing import Any
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, is_number, unknown
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout
@@ -37,15 +37,11 @@ def _check(parameter: str, value: Any, default: Any) -> None:
     elif isinstance(default, int):
         fits, expected = isinstance(value, int) and not isinstance(value, bool), "a whole number"
     elif isinstance(default, float):
-        fits, expected = _is_number(value) and value > 0, "a positive number"
+        fits, expected = is_number(value) and 0 < value < math.inf, "a positive number"
     else:
         (least, _), positive = default, default[0] > 0
-        fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(_is_number, value))
-        fits = fits and value[0] <= value[1] and (value[0] > 0 or not positive)
+        fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(is_number, value))
+        fits = fits and -math.inf < value[0] <= value[1] < math.inf and (value[0] > 0 or not positive)
         expected = "two numbers, low and high" + (", above 0" if positive else "")
     if not fits:
         raise InvalidInput(f"{parameter} must be {expected}, got {value!r}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

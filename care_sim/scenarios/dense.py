@@ -3,7 +3,7 @@
 The reckoning, from geometry and the shares of Algorithm 1 alone (full scan, perfect tracks, at the
 keyframe the person first returns three rays): eight tracked hulls compete for the exploitation share
 round-robin, six wedges for the reserve. The person's wedge is about 54 cells. Of those a reserve for
-every camera box fires, on average over seeds 0-7, 24 at 3%, 34 at 3.5%, 46 at 4% and all 54 at 5%.
+every camera box fires, on average over seeds 0-7, 24 at 3%, 34 at 3.5%, 45 at 4% and all 54 at 5%.
 Wedges fill from the top row down; the camera stands below the LiDAR, so that the first three rows of
 the wedge pass over the person's head, and three hits need four rows, about 32 cells. So at 3% (where
 six wedges share 148 cells) the all-camera reserve must be late, and from 4% on the two reserves agree.

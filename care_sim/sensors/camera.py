@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from care_sim.errors import InvalidInput, check_rate
+from care_sim.errors import check_number, check_whole
 from care_sim.frames import Floats
 from care_sim.pinhole import PinholeCamera
 from care_sim.types import ImageDetections
@@ -36,9 +36,8 @@ class CameraFaults:
     latency: int = 0
 
     def __post_init__(self) -> None:
-        check_rate("false_negative_rate", self.false_negative_rate)
-        if self.latency < 0 or self.latency != int(self.latency):
-            raise InvalidInput(f"camera_latency must be a whole number of keyframes >= 0, got {self.latency}")
+        check_number("false_negative_rate", self.false_negative_rate, 0, 1)
+        check_whole("camera_latency", self.latency, 0)
 
 
 def window_on(camera: PinholeCamera, boxes: Floats) -> Window:
@@ -92,7 +91,7 @@ class CameraDetector:
         self._faults = faults
         self._keyframe_s = keyframe_s
         self._rng = rng
-        self._frames: deque[tuple[ImageDetections, float]] = deque(maxlen=faults.latency + 1)
+        self._frames: deque[tuple[ImageDetections, float]] = deque(maxlen=int(faults.latency) + 1)
 
     def detect(self, picture: Picture, heading: float) -> ImageDetections:
         """The newest detections that are due, the surest first; `picture` is the latest, taken at `heading`."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, check_rate
+from care_sim.errors import check_number
 from care_sim.frames import Frame, turned
 from care_sim.grid import AngularGrid, Cells
 from care_sim.sensors.engines import RayEngine
@@ -15,6 +15,10 @@ LIDAR_POSITION = (-0.445, 0.0, 1.84)
 """Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault Zoe."""
 
 
+NEAREST_M = 0.01
+"""A noisy return stays this far from 0 m (not fired) and from the reach (no return)."""
+
+
 @dataclass(frozen=True)
 class LidarNoise:
     """Gaussian `range_sigma_m` on every return and the rate of returns lost (`dropout`)."""
@@ -23,9 +27,8 @@ class LidarNoise:
     dropout: float = 0.0
 
     def __post_init__(self) -> None:
-        check_rate("dropout", self.dropout)
-        if not self.range_sigma_m >= 0.0:
-            raise InvalidInput(f"range_sigma_m must not be negative, got {self.range_sigma_m}")
+        check_number("lidar_dropout", self.dropout, 0, 1)
+        check_number("lidar_range_sigma", self.range_sigma_m, 0)
 
 
 class Lidar:
@@ -48,7 +51,8 @@ class Lidar:
         ranges, ids = self._engine.cast(sensor.origin, directions, self.grid.range_m)
         if self._noise.range_sigma_m > 0:
             draws = self._rng.standard_normal(self.grid.size)[cells]
-            ranges = np.clip(ranges + self._noise.range_sigma_m * draws, 0.0, None)
+            noisy = np.clip(ranges + self._noise.range_sigma_m * draws, NEAREST_M, self.grid.range_m - NEAREST_M)
+            ranges = np.where(np.isinf(ranges), ranges, noisy)
         if self._noise.dropout > 0:
             lost = self._rng.random(self.grid.size)[cells] < self._noise.dropout
             ranges, ids = np.where(lost, np.inf, ranges), np.where(lost, NOTHING, ids)

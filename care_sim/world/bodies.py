@@ -1,8 +1,8 @@
 """The catalogue of bodies: what each looks like, how large it is, and where the size comes from.
 
 Body frame: x forward, y left, z up, origin on the ground under the centre. Sizes are length, width,
-height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as
-published with the anchors of Zhu et al., "Class-balanced Grouping and Sampling" (arXiv:1908.09492).
+height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as in the
+anchors of MMDetection3D's configurations for it.
 """
 
 from dataclasses import dataclass
@@ -96,15 +96,18 @@ CATALOGUE = {
     kind.name: kind
     for kind in (
         _two_box("car", "car", (4.61, 1.95, 1.72), 0.95, (0.18, 0.72), (0.15, 0.3, 0.65)),
-        # Class-N1 panel van, reported as a truck: ISO-typical 5.5 x 2.0 x 2.4 (e.g. VW T6.1 high roof).
+        # A panel van, reported as a truck: length and width of a Volkswagen Transporter with long wheelbase,
+        # and a raised roof.
         _two_box("van", "truck", (5.30, 1.90, 2.40), 2.00, (0.0, 0.85), (0.85, 0.85, 0.88)),
         _lorry("truck", "truck", (6.74, 2.46, 2.73), 1.7, 2.3, (0.75, 0.2, 0.15)),
         _block("bus", "bus", (11.19, 2.94, 3.47), (0.9, 0.75, 0.1)),
         _cyclist("bicycle", (1.68, 0.60, 1.27)),
         _person("pedestrian", (0.73, 0.66, 1.76), (0.85, 0.15, 0.2)),
         # Bodies that the five reported classes do not hold.
-        _block("trailer", None, (12.01, 2.50, 3.82), (0.55, 0.57, 0.6)),
-        # Site hoarding: 2.4 m panels, as required for full-height hoardings by UK HSE HSG151.
+        # A box trailer on its legs, side skirts down: length and height of nuScenes, the width that European
+        # roads allow (Directive 96/53/EC: 2.55 m).
+        _block("trailer", None, (12.01, 2.55, 3.82), (0.55, 0.57, 0.6)),
+        # Site hoarding of 2.4 m panels.
         _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3)),
         _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
         # A closed row of eight such buildings.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_number
 from care_sim.frames import Floats, Pose
 from care_sim.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
@@ -112,7 +112,7 @@ class World:
         self.ego.accelerate(acceleration, STEP_S)
         self.traffic.step(STEP_S)
         self._steps += 1
-        self.time = self._steps * STEP_S
+        self.time = round(self._steps * STEP_S, 9)
         for event in [event for due, event in self._events if due <= self.time]:
             event()
         self._events = [(due, event) for due, event in self._events if due > self.time]
@@ -143,6 +143,7 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 
 def whole_steps(duration: float) -> int:
     """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide it."""
+    check_number("keyframe_s", duration, STEP_S)
     steps = round(duration / STEP_S)
     if steps < 1 or abs(steps * STEP_S - duration) > 1e-9:
         raise InvalidInput(f"keyframe_s must be a multiple of the world step {STEP_S} s, got {duration}")

@@ -2,6 +2,7 @@
 
 import pickle
 import warnings
+from dataclasses import dataclass
 
 import gymnasium
 import numpy as np
@@ -11,12 +12,45 @@ from gymnasium.utils.env_checker import check_env
 import care_sim
 from care_sim.envs import IDS
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.loop import Sensing
 from care_sim.reward import WEIGHTS
+from care_sim.scenarios.base import Scenario
+from care_sim.sensors.camera import CameraFaults
+from care_sim.sensors.lidar import LidarNoise
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.traffic import Traffic
+from care_sim.world.world import World
 
 EXPLAINED = (
     "symmetric and normalized Box action space",  # a score is a share of attention: 0 to 1, not -1 to 1
     "unconventional shape",  # tables and the grid are 2D on purpose
 )
+
+NOTHING = np.zeros((32, 512), np.float32)
+EVERYTHING = np.ones((32, 512), np.float32)
+ONE_STREET = {
+    "ego_speed_mps": (8.3, 8.3),
+    "crossing_m": (39.0, 39.0),
+    "gap_m": (1.0, 1.0),
+    "run_mps": (2.7, 2.7),
+    "kerb_offset_m": (0.0, 0.0),
+    "encroachment_s": (0.45, 0.45),
+    "place_jitter_m": (0.0, 0.0),
+}
+"""A dense street that is the same for every seed."""
+
+
+@dataclass(frozen=True)
+class BusAhead(Scenario):
+    """A bus stands in the way of a car at 10 m/s, too near to stop for."""
+
+    gap_m: float = 6.85
+
+    def build(self, rng):
+        world = World(Traffic((1,), 0, 3.5, 14.0), ego_speed=10.0)
+        place = (CATALOGUE["ego"].size[0] + CATALOGUE["bus"].size[0]) / 2 + self.gap_m
+        world.first_sighting = world.add("bus", "bus", (place, 0.0, 0.0))
+        return world
 
 
 def make(name, **arguments):
@@ -121,6 +155,131 @@ def test_policies_meet_the_same_floor_world_and_misses():
         env.close()
     np.testing.assert_array_equal(fired[:5], fired[5:])
     np.testing.assert_array_equal(seen[:5], seen[5:])
+
+
+def floors(seed, *actions):
+    """What fires at three keyframes without a score, after the keyframes of `actions`."""
+    env = make("CARE-Dartout-v0", budget=0.01)
+    env.reset(seed=seed)
+    for action in actions:
+        env.step(action)
+    fired = [env.step(NOTHING)[-1]["fired"].tolist() for _ in range(3)]
+    env.close()
+    return fired
+
+
+def test_the_floor_is_another_at_every_keyframe_and_for_every_seed():
+    cells = [tuple(fired) for seed in (0, 1) for fired in floors(seed)]
+    assert len(set(cells)) == 6
+    assert all(len(set(fired)) == 164 for fired in cells)
+
+
+def test_the_floor_of_a_seed_and_keyframe_is_the_same_whatever_was_fired_before():
+    some = np.zeros((32, 512), np.float32)
+    some[5, :30] = 1.0
+    after_nothing = floors(4, NOTHING, NOTHING)
+    assert floors(4, some, EVERYTHING) == after_nothing
+    assert floors(4)[2] == after_nothing[0]
+
+
+def test_the_next_episode_of_an_environment_has_another_floor():
+    env = make("CARE-Dartout-v0", budget=0.01)
+    fired = []
+    for seed in (3, None, None, 3):
+        env.reset(seed=seed)
+        fired.append(env.step(NOTHING)[-1]["fired"].tolist())
+    env.close()
+    assert fired[0] == fired[3]
+    assert len({tuple(cells) for cells in fired}) == 3
+
+
+def seen_and_scanned(seed):
+    env = make("CARE-Dense-v0", budget=1.0, false_negative_rate=0.5, lidar_dropout=0.5, **ONE_STREET)
+    observation, _ = env.reset(seed=seed)
+    seen = [observation["detections"].tolist()]
+    for _ in range(2):
+        observation, *_ = env.step(EVERYTHING)
+        seen.append(observation["detections"].tolist())
+    env.close()
+    return seen, observation["ranges"].tolist()
+
+
+def test_misses_and_losses_are_the_seeds_own_even_where_the_street_is_not():
+    (seen, scan), (other_seen, other_scan) = (seen_and_scanned(seed) for seed in (0, 1))
+    assert seen != other_seen
+    assert scan != other_scan
+    assert seen_and_scanned(0) == (seen, scan)
+
+
+def test_arguments_of_the_sensing_arrive():
+    env = make(
+        "CARE-Dartout-v0",
+        min_returns=9,
+        false_negative_rate=0.2,
+        camera_latency=2,
+        lidar_range_sigma=0.03,
+        lidar_dropout=0.1,
+    ).unwrapped
+    assert env.sensing == Sensing("bullet", 9, CameraFaults(0.2, 2), LidarNoise(0.03, 0.1))
+
+
+def test_a_contact_ends_the_episode_with_the_speed_it_happened_at():
+    """Braking from 0.3 s on covers 3.65 m by 0.70 s and 4.05 m by 0.75 s, when 7.75 m/s are left."""
+    env = make("CARE-Dartout-v0", budget=1.0).unwrapped
+    env.scenario = BusAhead()
+    env.reset(seed=0)
+    steps = [env.step(EVERYTHING) for _ in range(8)]
+    env.close()
+    assert [step[2:4] for step in steps] == [(False, False)] * 7 + [(True, False)]
+    assert ["outcome" in step[4] for step in steps] == [False] * 7 + [True]
+    outcome = steps[-1][4]["outcome"]
+    assert (outcome["collision"], outcome["braked"]) == (True, True)
+    assert outcome["impact_speed_mps"] == pytest.approx(7.75)
+    assert outcome["rays_fired"] == 8 * 16384
+    assert [step[4]["reward_terms"]["collision"] < 0 for step in steps] == [False] * 7 + [True]
+
+
+def test_a_person_who_is_run_into_ends_the_episode():
+    env = make("CARE-Dartout-v0", min_returns=10**6, encroachment_s=(-0.3, -0.2), crossing_m=(20.0, 20.0))
+    env.reset(seed=0)
+    terminated = truncated = False
+    while not (terminated or truncated):
+        *_, terminated, truncated, info = env.step(NOTHING)
+    env.close()
+    assert (terminated, truncated) == (True, False)
+    assert 20.0 - 4.08 <= info["speed_mps"] * info["time_s"] + 2.04 <= 20.0 + 2.04
+    outcome = info["outcome"]
+    assert (outcome["collision"], outcome["braked"], outcome["detection_distance_m"]) == (True, False, None)
+    assert outcome["impact_speed_mps"] == pytest.approx(info["speed_mps"])
+    assert outcome["clearance_m"] <= 0.0
+
+
+@pytest.mark.parametrize(
+    ("duration", "keyframe", "steps"), [(0.1, 0.1, 1), (0.3, 0.1, 3), (0.7, 0.1, 7), (0.6, 0.2, 3), (0.25, 0.1, 3)]
+)
+def test_an_episode_is_cut_off_at_its_duration_and_not_a_step_later(duration, keyframe, steps):
+    env = make("CARE-Dartout-v0", budget=0.01, duration_s=duration, keyframe_s=keyframe)
+    env.reset(seed=0)
+    ends = [env.step(NOTHING)[2:] for _ in range(steps)]
+    env.close()
+    assert [(terminated, truncated) for terminated, truncated, _ in ends] == [(False, False)] * (steps - 1) + [
+        (False, True)
+    ]
+    assert ["outcome" in info for *_, info in ends] == [False] * (steps - 1) + [True]
+    assert ends[-1][2]["outcome"]["collision"] is False
+
+
+def test_a_vector_of_environments_without_a_floor_fires_what_each_was_told():
+    masks = np.zeros((2, 32, 512), np.float32)
+    masks[0, 10, :10] = masks[1, 10, :20] = 1.0
+    envs = gymnasium.make_vec(
+        "CARE-Dartout-v0", num_envs=2, vectorization_mode="sync", vector_kwargs={"copy": True}, floor=False
+    )
+    envs.reset(seed=0)
+    for _ in range(2):
+        observation, *_ = envs.step(masks)
+        assert [np.count_nonzero(scan) for scan in observation["ranges"]] == [10, 20]
+    envs.close()
 
 
 def test_rendering_changes_nothing():

@@ -133,8 +133,8 @@ def test_firing_nothing_returns_nothing(grid, street):
 
 @pytest.mark.parametrize(
     ("noise", "named"),
-    [({"dropout": 1.5}, "dropout"), ({"dropout": -0.1}, "dropout"), ({"range_sigma_m": -1}, "range_sigma_m"),
-     ({"range_sigma_m": float("nan")}, "range_sigma_m")],
+    [({"dropout": 1.5}, "dropout"), ({"dropout": -0.1}, "dropout"), ({"range_sigma_m": -1}, "lidar_range_sigma"),
+     ({"range_sigma_m": float("nan")}, "lidar_range_sigma")],
 )  # fmt: skip
 def test_impossible_noise_is_refused_by_name(noise, named):
     with pytest.raises(InvalidInput, match=named):

@@ -59,7 +59,7 @@ def test_a_body_can_be_hit_from_every_side(kind, bullet):
     for part in kind.parts:
         for axis in range(3):
             direction = -np.eye(3)[axis]
-            ranges, ids = bullet.cast(np.array(part.centre) - 20 * direction, direction[None], 30.0)
+            ranges, ids = bullet.cast(np.array(part.centre) - 90 * direction, direction[None], 100.0)
             assert ids.tolist() == [body]
-            assert ranges[0] <= 20 - part.size[axis] / 2 + 1e-3
-            assert ranges[0] >= 20 - kind.size[axis]
+            assert ranges[0] <= 90 - part.size[axis] / 2 + 1e-3
+            assert ranges[0] >= 90 - kind.size[axis]

@@ -11,6 +11,8 @@ from care_sim.world.bullet import NOTHING, BulletWorld
 
 FORWARD = np.array([[1.0, 0.0, 0.0]])
 BLOCK = CATALOGUE["trailer"]
+NEAR_SIDE = 20.0 - BLOCK.size[1] / 2
+"""Distance of a trailer that stands across the road 20 m away."""
 
 
 def test_a_box_at_a_known_distance(bullet):
@@ -21,11 +23,11 @@ def test_a_box_at_a_known_distance(bullet):
 
 
 def test_a_slanted_ray_onto_a_turned_box(bullet):
-    """A trailer across the road presents its 2.5 m width: its face lies 1.25 m before its centre."""
+    """A trailer across the road presents its width: its face lies half of it before its centre."""
     bullet.add(BLOCK, (20.0, 0.0, np.pi / 2))
     direction = np.array([[np.cos(0.1), np.sin(0.1), 0.0]])
     ranges, _ = bullet.cast([0.0, 0.0, 1.0], direction, 50.0)
-    assert ranges[0] == pytest.approx(18.75 / np.cos(0.1), abs=1e-6)
+    assert ranges[0] == pytest.approx(NEAR_SIDE / np.cos(0.1), abs=1e-6)
 
 
 def test_nothing_within_reach_is_infinitely_far(bullet):
@@ -50,7 +52,7 @@ def test_every_ray_of_any_number_is_answered_in_its_place(bullet, count):
     ahead = np.arange(count) % 2 == 0
     assert len(ranges) == len(ids) == count
     assert np.array_equal(ids, np.where(ahead, body, NOTHING))
-    assert np.allclose(ranges[ahead], 18.75)
+    assert np.allclose(ranges[ahead], NEAR_SIDE)
 
 
 def test_no_rays_no_answers(bullet):
