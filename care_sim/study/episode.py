@@ -62,7 +62,7 @@ class Seal:
     def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
         """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
         poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
-        for part in (fired, observation["ranges"], np.array(poses)):
+        for part in (np.asarray(fired), observation["ranges"], np.array(poses)):
             self._content.update(part.tobytes())
 
     def hexdigest(self) -> str:

@@ -71,7 +71,7 @@ def test_rays_pass_through_the_transparent_ego_and_keep_doing_so_when_it_moves(b
 def test_a_moved_body_is_where_it_was_put(bullet):
     body = bullet.add(BLOCK, (20.0, 0.0, 0.0))
     bullet.move(body, (30.0, 0.0, np.pi / 2))
-    assert bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)[0][0] == pytest.approx(28.75)
+    assert bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)[0][0] == pytest.approx(10 + NEAR_SIDE)
 
 
 def test_the_ground_returns_rays(bullet):
