@@ -1,11 +1,12 @@
 """The world of one episode: every body, who moves it, and what the scoring reads off it."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, check_number
+from care_sim.errors import InvalidInput, is_number
 from care_sim.frames import Floats, Pose
 from care_sim.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
@@ -143,8 +144,7 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 
 def whole_steps(duration: float) -> int:
     """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide it."""
-    check_number("keyframe_s", duration, 0)
-    steps = round(duration / STEP_S)
+    steps = round(duration / STEP_S) if is_number(duration) and math.isfinite(duration) else 0
     if steps < 1 or abs(steps * STEP_S - duration) > 1e-9:
-        raise InvalidInput(f"keyframe_s must be a multiple of the world step {STEP_S} s, got {duration}")
+        raise InvalidInput(f"keyframe_s must be a multiple of the world step {STEP_S} s, got {duration!r}")
     return steps

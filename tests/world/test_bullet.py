@@ -146,10 +146,10 @@ def test_clearance_between_bumpers(bullet, gap):
 
 
 def test_clearance_is_between_hulls_and_not_boxes(bullet):
-    """Corner to corner: a bus turned by 45 degrees beside the ego."""
+    """Corner to corner: a trailer ahead and to the side of the ego."""
     ego = bullet.add(CATALOGUE["ego"], (0.0, 0.0, 0.0))
     trailer = bullet.add(BLOCK, (10.0, 10.0, 0.0))
-    across, along = 10 - 1.25 - 0.865, 10 - 6.005 - 2.04
+    across, along = 10 - BLOCK.size[1] / 2 - 0.865, 10 - 6.005 - 2.04
     assert bullet.clearance(ego, trailer) == pytest.approx(np.hypot(across, along), abs=2e-3)
 
 
