@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -17,7 +18,7 @@ from care_sim.perception.detectors import MIN_RETURNS
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
 from care_sim.scenarios import make_scenario
-from care_sim.study.provenance import code_digest
+from care_sim.study.provenance import SESSION, code_digest, policy_digest
 
 Parameters = tuple[tuple[str, Any], ...]
 """Names and values, of a scenario's physics or of a policy."""
@@ -88,9 +89,19 @@ class EpisodeConfig:
         return flat | {f"policy.{name}": value for name, value in self.policy_parameters}
 
     def digest(self) -> str:
-        """Hash of the effective configuration, package version and code included."""
-        effective = [sorted(self.row().items()), care_sim.__version__, code_digest()]
+        """Hash of the effective configuration; package version, code and an installed policy's code included.
+
+        It never repeats in another run when an installed policy has no source to read.
+        """
+        installed = policy_digest(self.policy)
+        code = [code_digest(), self._session if installed is None else installed]
+        effective = [sorted(self.row().items()), care_sim.__version__, *code]
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
+
+    @cached_property
+    def _session(self) -> str:
+        """The run that first asked for the digest, which the workers keep."""
+        return SESSION
 
     @property
     def label(self) -> str:

@@ -5,20 +5,46 @@ import os
 import platform
 from functools import cache
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
+from uuid import uuid4
 
 import care_sim
+from care_sim.policies import BUILT_IN, ENTRY_POINTS
 
 LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numpy", "pyarrow", "pybullet", "scipy")
 
 
-@cache
+SESSION = uuid4().hex
+"""Names this run of the program; no other run has it."""
+
+
 def code_digest() -> str:
     """Hash of the package's sources, so that no row of an edited program passes for a new one."""
-    root = Path(care_sim.__file__).parent
+    return _content_digest(Path(care_sim.__file__).parent, "*.py")
+
+
+def policy_digest(policy: str) -> str | None:
+    """Hash of the files of the package that an installed policy comes from, or of its module when it lies in
+    no package; empty for a built-in policy, None where there are no files to read.
+    """
+    if policy in BUILT_IN:
+        return ""
+    (entry,) = metadata.entry_points(group=ENTRY_POINTS, name=policy)
+    spec = find_spec(entry.module.partition(".")[0])
+    if spec is None:
+        return None
+    roots = [Path(place) for place in spec.submodule_search_locations or [spec.origin or ""]]
+    return "".join(map(_content_digest, roots)) if all(root.name and root.exists() for root in roots) else None
+
+
+@cache
+def _content_digest(root: Path, pattern: str = "*") -> str:
+    """Hash of a file, or of the files below a folder and their names; once a process, which has them loaded."""
+    found = [root] if root.is_file() else [f for f in root.rglob(pattern) if f.is_file() and f.suffix != ".pyc"]
     content = hashlib.sha256()
-    for source in sorted(root.rglob("*.py")):
-        content.update(str(source.relative_to(root)).encode() + source.read_bytes())
+    for file in sorted(found):
+        content.update(str(file.relative_to(root)).encode() + file.read_bytes())
     return content.hexdigest()[:16]
 
 

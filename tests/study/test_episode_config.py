@@ -1,4 +1,7 @@
+import pickle
+import sys
 from dataclasses import replace
+from importlib.machinery import ModuleSpec
 
 import pytest
 
@@ -65,6 +68,45 @@ def test_the_digest_covers_the_code(monkeypatch):
     monkeypatch.setattr("care_sim.study.config.code_digest", lambda: "edited")
     assert GOOD.digest() != before
     assert len(provenance.code_digest()) == 16
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """An installed package with a policy in one module and a table beside it."""
+    info = tmp_path / "ours-1.0.dist-info"
+    (tmp_path / "ours_policy").mkdir()
+    info.mkdir()
+    (tmp_path / "ours_policy" / "__init__.py").touch()
+    (tmp_path / "ours_policy" / "near.py").write_text("from care_sim.policies.history import History as Near\n")
+    (tmp_path / "ours_policy" / "table.csv").write_text("1\n")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: ours\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[care_sim.policies]\nnear = ours_policy.near:Near\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    yield tmp_path / "ours_policy"
+    provenance._content_digest.cache_clear()
+    for name in [name for name in sys.modules if name.startswith("ours_policy")]:
+        del sys.modules[name]
+
+
+@pytest.mark.parametrize("edited", ["near.py", "table.csv"])
+def test_the_digest_covers_the_package_of_an_installed_policy(package, edited):
+    ours = EpisodeConfig("dense", "near")
+    before, built_in = ours.digest(), GOOD.digest()
+    assert before == EpisodeConfig("dense", "near").digest()
+    with (package / edited).open("a") as file:
+        file.write("# edited")
+    provenance._content_digest.cache_clear()
+    assert ours.digest() != before
+    assert GOOD.digest() == built_in
+
+
+def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers(package, monkeypatch):
+    monkeypatch.setattr(provenance, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
+    ours = EpisodeConfig("dense", "near")
+    before = ours.digest()
+    monkeypatch.setattr("care_sim.study.config.SESSION", "another run")
+    assert EpisodeConfig("dense", "near").digest() != before
+    assert pickle.loads(pickle.dumps(ours)).digest() == before
 
 
 def test_the_row_is_flat_and_the_label_names_what_is_unusual():
