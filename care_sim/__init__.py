@@ -11,17 +11,19 @@ from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.grid import AngularGrid
 from care_sim.policies import make_policy, policy_names
 from care_sim.policies.base import Policy
-from care_sim.types import Belief, Demand, Rig
+from care_sim.types import Belief, Demand, ImageDetections, Rig, Tracks
 
 __version__ = version("care-sim")
 __all__ = [
     "AngularGrid",
     "Belief",
     "Demand",
+    "ImageDetections",
     "InvalidInput",
     "MissingExtra",
     "Policy",
     "Rig",
+    "Tracks",
     "allocate",
     "make_policy",
     "policy_names",

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, is_number
+from care_sim.errors import InvalidInput, check_number, is_number
 from care_sim.grid import Cells, cell_set
 from care_sim.types import Action, Demand
 
@@ -30,6 +30,7 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
     are taken in ascending order, and a cell already taken costs the set no turn. rho = 0 keeps no
     reserve: layers then take only what exploitation leaves.
     """
+    check_number("reserve_fraction", reserve_fraction, 0, 1)
     chosen: dict[int, None] = {}
     _round_robin(demand.exploitation, round((1 - reserve_fraction) * budget), chosen)
     for layer in demand.layers:

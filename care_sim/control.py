@@ -6,9 +6,9 @@ ahead of the front bumper counts. A track seen once has no velocity and counts o
 
 The brake goes on when the gap to a counting track is at most the ego's stopping distance
 v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself,
-v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts `reaction_s` later with `b`. It stays on while
-any counting track is not faster than the ego, and for `release_s` after the last one; then the ego
-gains speed at `comfort` up to its cruising speed.
+v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with `b` at the first keyframe at least
+`reaction_s` later. It stays on while any counting track is not faster than the ego, and for `release_s`
+after the last one; then the ego gains speed at `comfort` up to its cruising speed.
 """
 
 from dataclasses import dataclass

@@ -21,6 +21,9 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
 
 _CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))])
 
+BOX_EDGES = np.array([(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)])
+"""(12, 2) the edges of a box, as pairs of `box_corners`."""
+
 
 def box_corners(boxes: Floats) -> Floats:
     """(n, 8, 3) corners of boxes (n, 7): four below, then the four above them."""

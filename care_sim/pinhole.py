@@ -10,13 +10,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from care_sim.frames import Floats, box_corners
+from care_sim.frames import BOX_EDGES, Floats, box_corners
 
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
-
-_EDGES = np.array([(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)])
-"""The twelve edges of a box, as pairs of `box_corners`."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,7 @@ class PinholeCamera:
         beyond it; NaN for a box wholly behind NEAR_M. A box that crosses that plane is cut there.
         """
         corners = (box_corners(boxes) - self.position) @ self.axes.T
-        starts, ends = corners[:, _EDGES[:, 0]], corners[:, _EDGES[:, 1]]
+        starts, ends = corners[:, BOX_EDGES[:, 0]], corners[:, BOX_EDGES[:, 1]]
         points = np.concatenate([_cut(starts, ends), _cut(ends, starts)], axis=1)
         depth, left, up = np.moveaxis(points, -1, 0)
         u, v = self.width / 2 - self.focal * left / depth, self.height / 2 - self.focal * up / depth

@@ -83,7 +83,7 @@ class ImageDetections:
 class Tracks:
     """Tracked objects as columns of one table; `len()` is their number n.
 
-    `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
+    Nearest first. `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
     `misses` (n,) keyframes since the object was last detected, `hits` (n,) keyframes at which it was; with
     fewer than two the velocity is not known and reads 0.
     """

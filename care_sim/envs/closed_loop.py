@@ -99,6 +99,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
             LidarNoise(lidar_range_sigma, lidar_dropout),
         )
         self.scenario = make_scenario(self.scenario_name, **scenario_parameters)
+        self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)

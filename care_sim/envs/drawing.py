@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from care_sim.frames import Floats, box_corners
+from care_sim.frames import BOX_EDGES, Floats, box_corners
 from care_sim.grid import AngularGrid
 from care_sim.pinhole import NEAR_M, PinholeCamera
 
@@ -16,9 +16,6 @@ Colour = tuple[int, int, int]
 INK, FAINT, PAPER = (235, 237, 240), (150, 155, 162), (24, 26, 30)
 NOT_FIRED, NO_RETURN = (44, 47, 53), (112, 116, 124)
 _RANGE_COLOURS = colormaps["plasma_r"]
-_EDGES = [(n, (n + 1) % 4) for n in range(4)]
-_EDGES += [(a + 4, b + 4) for a, b in _EDGES] + [(n, n + 4) for n in range(4)]
-"""The twelve edges of a box, as pairs of `box_corners`."""
 
 
 def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
@@ -40,7 +37,7 @@ def label(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour:
 def wireframe(draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int) -> None:
     """The edges of a sensor-frame box (7,) that lie wholly before the camera."""
     pixels, depth = camera.project(box_corners(box[None])[0])
-    for start, end in _EDGES:
+    for start, end in BOX_EDGES:
         if min(depth[start], depth[end]) > NEAR_M:
             draw.line([*pixels[start].tolist(), *pixels[end].tolist()], colour, width)
 

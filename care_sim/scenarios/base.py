@@ -12,11 +12,15 @@ Range = tuple[float, float]
 
 SPEED_LIMIT_MPS = 30 / 3.6
 """All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
+NO_LIMIT_MPS = 2 * SPEED_LIMIT_MPS
+"""What the lanes say to drivers who keep the ego's speed: a limit below it would slow them."""
 EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
 """30 km/h, give or take the 1 km/h by which a driver's speed varies."""
 LANE_WIDTH_M = 3.5
 PARKING_WIDTH_M = 2.5
 """Traffic lanes, and parking lanes that lorries may use (German RASt 06)."""
+PAVEMENT_WIDTH_M = 2.5
+"""Between parking lane and houses (RASt 06)."""
 RIGHT_PARKING_Y = -(LANE_WIDTH_M + PARKING_WIDTH_M) / 2
 LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
 """Middle of the parking lanes of a two-lane street, from the middle of the ego's lane."""

@@ -10,9 +10,10 @@ from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
     LANE_WIDTH_M,
     LEFT_PARKING_Y,
+    NO_LIMIT_MPS,
     PARKING_WIDTH_M,
+    PAVEMENT_WIDTH_M,
     RIGHT_PARKING_Y,
-    SPEED_LIMIT_MPS,
     Range,
     Scenario,
     draw,
@@ -23,6 +24,8 @@ from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk
 from care_sim.world.world import World
 
+SHADE_M = 0.4
+"""The person waits this far inside the occluder's shade: half a body's width and a little."""
 OCCLUDERS = ("trailer", "truck", "van", "hoarding")
 
 
@@ -63,11 +66,11 @@ class CrossingScenario(Scenario):
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
         ego_speed, crossing_x = draw(rng, self.ego_speed_mps), draw(rng, self.crossing_m)
-        traffic = Traffic((1, -1), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=2 * SPEED_LIMIT_MPS)
+        traffic = Traffic((1, -1), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, ego_speed)
         self._add_person(world, self._add_occluder(world, crossing_x, rng), crossing_x, ego_speed, rng)
         self.furnish(world, crossing_x, rng)
-        front = LEFT_PARKING_Y + PARKING_WIDTH_M / 2 + 2.5
+        front = LEFT_PARKING_Y + PARKING_WIDTH_M / 2 + PAVEMENT_WIDTH_M
         line_with_terraces(world, LANE_WIDTH_M - front, front)
         return world
 
@@ -81,7 +84,7 @@ class CrossingScenario(Scenario):
         y = RIGHT_PARKING_Y + draw(rng, self.kerb_offset_m)
         x = crossing_x - draw(rng, self.gap_m) - length / 2
         world.add("occluder", self.occluder, (x, y, 0.0), reported=self.occluder_reported)
-        return y - width / 2 + 0.4
+        return y - width / 2 + SHADE_M
 
     def _add_person(
         self, world: World, start_y: float, crossing_x: float, ego_speed: float, rng: np.random.Generator

@@ -3,9 +3,7 @@
 import gymnasium
 import numpy as np
 
-from care_sim.world.bullet import NOTHING
-
-BEHIND, AHEAD = (-15.0, 1.0, 0.0), (12.0, 3.0, 0.0)
+BEHIND = (-15.0, 1.0, 0.0)
 
 
 def observe(pose, mask):
@@ -61,5 +59,4 @@ def test_the_observation_holds_no_body_id():
     tracks = env.loop.belief.tracks
     assert len(tracks) > 3
     np.testing.assert_array_equal(np.sort(tracks.ids), np.arange(len(tracks)))
-    assert NOTHING == -1
     env.close()
