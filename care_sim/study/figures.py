@@ -1,12 +1,13 @@
 """Figures of a study, as pure functions of its rows."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from care_sim.scenarios import SCENARIOS
 from care_sim.study import crowding
 from care_sim.study.episode import Row
 from care_sim.study.summary import Cell, summarise
@@ -23,6 +24,18 @@ STYLES = {
 _OTHER = ("#56B4E9", "P")
 _DODGE = 0.015
 """Share of the axis by which neighbouring policies are moved apart, so that equal curves stay visible."""
+
+
+NAMES = (*(f"{scenario}-budget" for scenario in SCENARIOS), "crowding")
+"""Every figure that a study can draw."""
+_FORMATS = (".png", ".svg")
+
+
+def remove_others(folder: Path, kept: Container[str]) -> None:
+    """Remove the figures of an earlier study from a folder, all but those of the names `kept`."""
+    for name in NAMES:
+        for suffix in _FORMATS if name not in kept else ():
+            (folder / f"{name}{suffix}").unlink(missing_ok=True)
 
 
 def save(figure: Figure, stem: Path) -> None:

@@ -1,6 +1,7 @@
 """A study from configurations to a folder of results, and a report of what lies in one."""
 
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig, without_seeds
 from care_sim.study.episode import Row
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.figures import save, study_figures
+from care_sim.study.figures import remove_others, save, study_figures
 from care_sim.study.journal import Journal
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import write_rows
@@ -29,13 +30,14 @@ def conduct(
 
     Writes `journal.jsonl` as episodes finish, then `config.json`, `episodes.parquet` with the rows of
     `configs` in their order, `tables.md` and the figures. Raises InvalidInput for no episode or no worker,
-    and OSError when the folder cannot be written.
+    and when the folder cannot be written.
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
     if workers < 1:
         raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
-    with Journal(folder / JOURNAL) as journal:
+    with _journal(folder) as journal:
+        _say_what_is_found(configs, journal, folder)
         settings = {"versions": versions(), "machine": machine(), "configurations": without_seeds(configs)}
         (folder / "config.json").write_text(json.dumps(settings, indent=1) + "\n")
         failures = _run_with_progress(configs, journal, workers, make_executor)
@@ -47,10 +49,12 @@ def conduct(
 
 
 def write_report(rows: Sequence[Row], folder: Path) -> None:
-    """Write tables and figures into a folder."""
+    """Write tables and figures into a folder; figures of an earlier study are removed."""
     tables = [table.markdown() for table in study_tables(rows)]
     (folder / "tables.md").write_text("\n".join([f"{CAPTION}\n\n{collision_note(rows)}\n", *tables]))
-    for name, figure in study_figures(rows).items():
+    figures = study_figures(rows)
+    remove_others(folder, figures)
+    for name, figure in figures.items():
         save(figure, folder / name)
 
 
@@ -61,6 +65,24 @@ def print_report(rows: Sequence[Row], console: Console) -> None:
         console.print()
     console.print(CAPTION, markup=False)
     console.print(collision_note(rows), markup=False)
+
+
+def _journal(folder: Path) -> Journal:
+    if folder.is_file():
+        raise InvalidInput(f"{folder} is a file, --out wants a folder")
+    try:
+        return Journal(folder / JOURNAL)
+    except OSError as error:
+        raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
+
+
+def _say_what_is_found(configs: Sequence[EpisodeConfig], journal: Journal, folder: Path) -> None:
+    """One line when episodes will not be played again, or others share the journal."""
+    found = sum(config.digest() in journal for config in configs)
+    others = len(journal) - found
+    if found or others:
+        rest = f"; {others} of other studies stay in its journal" if others else ""
+        print(f"{found} of {len(configs)} episodes found in {folder}{rest}", file=sys.stderr)
 
 
 def _run_with_progress(

@@ -97,6 +97,18 @@ def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
     assert len(read_rows(tmp_path / ROWS)) == 3
 
 
+def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):
+    first, second = short(["history"], budgets=(0.05, 0.1)), short(["history", "random"])
+    conduct(first, tmp_path, workers=1)
+    assert "found" not in capsys.readouterr().err
+    (tmp_path / "dartout-budget.png").touch()
+    (tmp_path / "my-budget.png").touch()
+    conduct(second, tmp_path, workers=1)
+    line = f"1 of 2 episodes found in {tmp_path}; 1 of other studies stay in its journal\n"
+    assert line in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {"my-budget.png"}
+
+
 def test_any_executor_will_do(tmp_path):
     with Journal(tmp_path / JOURNAL) as journal:
         done = []
