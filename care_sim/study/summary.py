@@ -63,9 +63,9 @@ class Cell:
     """A policy at a budget in a setting. Distances in metres.
 
     `detection` ranks the `never` detected at 0 m; `closest_pass` and `clearance` are over the episodes
-    in which the actor came into the camera's view, None when there are none. `beyond_full` is this
-    policy's mean detection distance minus that of `full`, `behind_care` that of `care` minus this one's,
-    paired by seed; None without shared seeds.
+    in which the actor came into the camera's view, None when there are none. `vs_full` and `vs_care` are
+    this policy's mean detection distance minus that of `full` or `care`, paired by seed: positive when this
+    one detects earlier, None without shared seeds.
     """
 
     setting: Setting
@@ -78,8 +78,8 @@ class Cell:
     closest_pass: Quartiles | None
     clearance: Quartiles | None
     collisions: int
-    beyond_full: Interval | None
-    behind_care: Interval | None
+    vs_full: Interval | None
+    vs_care: Interval | None
 
 
 def setting_of(row: Row) -> Setting:
@@ -136,8 +136,8 @@ def _cell(key: tuple[Setting, str, float], groups: dict[tuple[Setting, str, floa
         closest_pass=quartiles([row["min_distance_m"] for row in rows if row["min_distance_m"] is not None]),
         clearance=quartiles([row["clearance_m"] for row in rows if row["clearance_m"] is not None]),
         collisions=sum(row["collision"] for row in rows),
-        beyond_full=None if policy == "full" else difference(rows, full),
-        behind_care=None if policy == "care" else difference(care, rows),
+        vs_full=None if policy == "full" else difference(rows, full),
+        vs_care=None if policy == "care" else difference(rows, care),
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from rich.table import Table as RichTable
 from rich.text import Text
@@ -9,15 +10,27 @@ from rich.text import Text
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.study import crowding
 from care_sim.study.episode import Row
-from care_sim.study.paper import NO_COLLISION, Published, published
-from care_sim.study.summary import Cell, Quartiles, Setting, detection_distance, difference, quartiles, summarise
+from care_sim.study.paper import NO_COLLISION, Published, configurations, published
+from care_sim.study.summary import (
+    Cell,
+    Quartiles,
+    Setting,
+    detection_distance,
+    difference,
+    policy_of,
+    quartiles,
+    setting_of,
+    summarise,
+)
 
 CAPTION = (
     "First detection: planar distance in metres from the sensor to the first-sighting actor at the first keyframe it "
     "is detected; median [quartiles]. An actor never detected ranks as 0 m, later than any detection, and is counted "
     "under 'never'. Pass: least distance of the centres, clearance: hull to hull, both from the moment it is in view; "
-    "medians. Differences: mean first-detection distance in metres, paired by seed, with 95% percentile bootstrap "
-    "intervals (10,000 resamples); positive is earlier."
+    "medians. k/n: k of n episodes, one a seed. 'vs full' and 'vs care': mean first-detection distance of this policy "
+    "minus that one, in metres, paired by seed, with 95% percentile bootstrap intervals (10,000 resamples); positive: "
+    "this policy detects earlier. The ego covers 0.8 m of road a keyframe, so differences come in such steps; with "
+    "fewer than 10 seeds an interval shows the spread of the seeds rather than certainty."
 )
 COLUMNS = (
     "budget",
@@ -28,38 +41,52 @@ COLUMNS = (
     "pass m",
     "clearance m",
     "collisions",
-    "minus full m",
-    "care minus it m",
+    "vs full m",
+    "vs care m",
     "paper",
 )
+WIDE_ONLY = ("clearance m", "collisions", "vs full m")
+"""Columns that 80 characters of a terminal leave no room for."""
 COLLAPSE_M = 3.0
 """All-camera counts as collapsed where CARE detects this much earlier."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Cells of text under a title, with notes below."""
+    """Cells of text under a title, with notes below; `quotes` are for files only."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    quotes: tuple[str, ...] = ()
 
     def rich(self) -> RichTable:
-        """For a terminal."""
+        """For a terminal of 80 characters: without the columns that are for files or that say nothing."""
         caption = Text("\n".join(self.notes))
-        table = RichTable(
-            *self.columns, title=Text(self.title), title_justify="left", caption=caption, caption_justify="left"
-        )
+        table = RichTable(box=None, padding=(0, 1, 0, 0), title=Text(self.title), title_justify="left")
+        table.caption, table.caption_justify = caption, "left"
+        shown = [n for n, name in enumerate(self.columns) if name not in WIDE_ONLY and self._says_something(n)]
+        for n in shown:
+            name = self.columns[n]
+            heading = name.replace("pass m", "pass\nm").replace("budget", "at")
+            table.add_column(
+                Text(heading), no_wrap=name in COLUMNS and name != "policy", overflow="fold", vertical="bottom"
+            )
         for row in self.rows:
-            table.add_row(*(Text(cell) for cell in row))
+            table.add_row(*(Text(row[n]) for n in shown))
         return table
+
+    def _says_something(self, column: int) -> bool:
+        return any(
+            row[column] and not (self.columns[column] == "never" and row[column][:2] == "0/") for row in self.rows
+        )
 
     def markdown(self) -> str:
         """For a file."""
         lines = [self.columns, tuple("---" for _ in self.columns), *self.rows]
         body = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-        return "\n\n".join([f"## {self.title}", body, *self.notes]) + "\n"
+        return "\n\n".join([f"## {self.title}", body, *self.notes, *self.quotes]) + "\n"
 
 
 def study_tables(rows: Sequence[Row]) -> list[Table]:
@@ -75,14 +102,21 @@ def _setting_table(setting: Setting, cells: Sequence[Cell]) -> Table:
     sayings = [_published(cell) for cell in cells]
     sentences = dict.fromkeys(f'Paper: "{saying.sentence}"' for saying in sayings if saying)
     lines = (_line(cell, saying) for cell, saying in zip(cells, sayings, strict=True))
-    return Table(setting.label, COLUMNS, tuple(lines), tuple(sentences))
+    notes = () if any(cell.vs_full for cell in cells) else ("vs full: full not run.",)
+    return Table(setting.label, COLUMNS, tuple(lines), notes, tuple(sentences))
 
 
 def _published(cell: Cell) -> Published | None:
-    physics = [name for name, _ in cell.setting.conditions if not name.startswith(("false_negative", "camera_"))]
-    if physics:
+    if (cell.setting, cell.policy, cell.budget) not in paper_cells():
         return None
     return published(cell.setting.scenario, cell.policy, cell.budget, cell.setting.faults)
+
+
+@cache
+def paper_cells() -> frozenset[tuple[Setting, str, float]]:
+    """Setting, policy and budget of every cell of the paper's study."""
+    rows = [config.row() for config in configurations([0])]
+    return frozenset((setting_of(row), policy_of(row), row["budget"]) for row in rows)
 
 
 def _line(cell: Cell, saying: Published | None) -> tuple[str, ...]:
@@ -95,8 +129,8 @@ def _line(cell: Cell, saying: Published | None) -> tuple[str, ...]:
         _median(cell.closest_pass, cell),
         _median(cell.clearance, cell),
         _share(cell.collisions, cell),
-        _interval(cell.beyond_full),
-        _interval(cell.behind_care),
+        _interval(cell.vs_full),
+        _interval(cell.vs_care),
         saying.figure if saying else "",
     )
 
@@ -117,7 +151,7 @@ def _median(values: Quartiles | None, cell: Cell) -> str:
 
 
 def _interval(interval: Interval | None) -> str:
-    return f"{interval.mean:+.1f} [{interval.low:+.1f}, {interval.high:+.1f}]" if interval else ""
+    return f"{interval.mean:+z.1f} [{interval.low:+z.1f}, {interval.high:+z.1f}]" if interval else ""
 
 
 def collision_note(rows: Sequence[Row]) -> str:
@@ -134,12 +168,13 @@ def crowding_table(rows: Sequence[Row]) -> Table:
         (str(n), _plain_median(by_cell.get((n, "full", 1.0))), *(_contrast(by_cell, n, budget) for budget in budgets))
         for n in counts
     ]
-    columns = ("vehicles", "full m", *(f"{percent(budget)}: care / all-camera m" for budget in budgets))
+    columns = ("vehicles", "full m", *map(percent, budgets))
     collapsed = [f"{percent(budget)}: {_collapsed(by_cell, counts, budget)}" for budget in budgets]
+    reading = "At each budget: medians of care/all-camera in metres, and all-camera vs care."
     note = (
         f"All-camera at least {COLLAPSE_M:.0f} m later than care on average, by budget, at these numbers of vehicles: "
     )
-    return Table("dense, by standing vehicles", columns, tuple(lines), (note + "; ".join(collapsed) + ".",))
+    return Table("dense, by standing vehicles", columns, tuple(lines), (reading, note + "; ".join(collapsed) + "."))
 
 
 CrowdingCells = dict[tuple[int, str, float], list[Row]]
@@ -159,9 +194,9 @@ def _plain_median(rows: Sequence[Row] | None) -> str:
 
 def _contrast(cells: CrowdingCells, vehicles: int, budget: float) -> str:
     care, camera = cells.get((vehicles, "care", budget)), cells.get((vehicles, "all-camera", budget))
-    return f"{_plain_median(care)} / {_plain_median(camera)}  {_interval(difference(care, camera))}".rstrip()
+    return f"{_plain_median(care)}/{_plain_median(camera)} {_interval(difference(camera, care))}".rstrip()
 
 
 def _collapsed(cells: CrowdingCells, counts: Sequence[int], budget: float) -> str:
-    gaps = {n: difference(cells.get((n, "care", budget)), cells.get((n, "all-camera", budget))) for n in counts}
-    return ", ".join(str(n) for n, gap in gaps.items() if gap and gap.mean >= COLLAPSE_M) or "none"
+    gaps = {n: difference(cells.get((n, "all-camera", budget)), cells.get((n, "care", budget))) for n in counts}
+    return ", ".join(str(n) for n, gap in gaps.items() if gap and gap.mean <= -COLLAPSE_M) or "none"

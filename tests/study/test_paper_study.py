@@ -21,7 +21,7 @@ def test_every_published_figure_belongs_to_a_cell_that_is_run():
     }
     for entry in paper.PUBLISHED:
         assert any(entry.covers(*cell) for cell in cells), entry
-    assert paper.published("dartout", "history", 0.1, False).figure.startswith("11.9 m")
+    assert paper.published("dartout", "history", 0.1, False).figure.startswith("11.9")
     assert paper.published("dartout", "history", 0.03, False) is None
 
 
