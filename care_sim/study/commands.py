@@ -137,6 +137,9 @@ class Sweep(_Study):
         """Run it."""
         from care_sim.study.config import grid
 
+        for axis in ("scenarios", "policies", "budgets", "seeds", "false_negative_rates", "camera_latencies"):
+            if not getattr(self, axis):
+                raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
         axes = (self.scenarios, self.policies, self.budgets, _seeds(self.seeds))
         faults = (self.false_negative_rates, self.camera_latencies)
         return self.conduct(grid(*axes, *faults, **self.conditions.arguments()), self.out)

@@ -17,6 +17,7 @@ from care_sim.study.journal import Journal
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import write_rows
 from care_sim.study.runner import Failure, run_all
+from care_sim.study.statements import statements
 from care_sim.study.tables import CAPTION, collision_note, study_tables
 
 ROWS = "episodes.parquet"
@@ -51,7 +52,9 @@ def conduct(
 def write_report(rows: Sequence[Row], folder: Path) -> None:
     """Write tables and figures into a folder; figures of an earlier study are removed."""
     tables = [table.markdown() for table in study_tables(rows)]
-    (folder / "tables.md").write_text("\n".join([f"{CAPTION}\n\n{collision_note(rows)}\n", *tables]))
+    closing = [f"- {statement}\n" for statement in statements(rows)]
+    closing_list = ["## The paper's statements\n\n" + "".join(closing)] if closing else []
+    (folder / "tables.md").write_text("\n".join([f"{CAPTION}\n\n{collision_note(rows)}\n", *tables, *closing_list]))
     figures = study_figures(rows)
     remove_others(folder, figures)
     for name, figure in figures.items():
@@ -59,12 +62,14 @@ def write_report(rows: Sequence[Row], folder: Path) -> None:
 
 
 def print_report(rows: Sequence[Row], console: Console) -> None:
-    """Print the tables."""
+    """Print the tables, then the paper's statements when the rows are its study."""
     for table in study_tables(rows):
         console.print(table.rich())
         console.print()
     console.print(CAPTION, markup=False)
     console.print(collision_note(rows), markup=False)
+    for statement in statements(rows):
+        console.print(str(statement), markup=False)
 
 
 def _journal(folder: Path) -> Journal:
