@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from importlib import metadata
 from typing import Any, NoReturn
 
 import tyro
@@ -26,7 +27,7 @@ class Policies:
         from care_sim.policies import BUILT_IN, policy_names
 
         for name in policy_names():
-            print(f"{name:12} {_summary(BUILT_IN[name]) if name in BUILT_IN else 'From an installed package.'}")
+            print(f"{name:12} {_summary(BUILT_IN[name]) if name in BUILT_IN else _installed(name)}")
         return 0
 
 
@@ -37,10 +38,17 @@ class Scenarios:
     def __call__(self) -> int:
         """Run it."""
         from care_sim.scenarios import SCENARIOS
+        from care_sim.scenarios.crossing import OCCLUDERS
 
+        choices = {"occluder": f" (of {', '.join(OCCLUDERS)})"}
         for name, scenario in SCENARIOS.items():
             print(f"{name:12} {_summary(scenario)}")
-            print("".join(f"    {field.name}={field.default!r}\n" for field in fields(scenario)))
+            print(
+                "".join(
+                    f"    {field.name}={_rounded(field.default)}{choices.get(field.name, '')}\n"
+                    for field in fields(scenario)
+                )
+            )
         return 0
 
 
@@ -61,6 +69,9 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "bench": Bench,
 }
 
+STUDIES = ("reproduce", "sweep", "crowding")
+"""Commands that keep what they have finished."""
+
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit: 0 done, 1 some episode failed, 2 bad input, 130 interrupted."""
@@ -73,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
-        _complain("interrupted; finished episodes are kept, the same command goes on from there", INTERRUPTED)
+        kept = "; finished episodes are kept, the same command goes on from there"
+        _complain(f"interrupted{kept if arguments[:1] and arguments[0] in STUDIES else ''}", INTERRUPTED)
 
 
 def _command(arguments: list[str]) -> int:
@@ -112,6 +124,26 @@ def _summary(thing: object) -> str:
     """The line that the module of a policy or scenario begins with."""
     module = inspect.getmodule(thing)
     return (inspect.getdoc(module) or "").partition("\n")[0]
+
+
+def _installed(name: str) -> str:
+    """What an installed package says of its policy, and which package it is; or why it cannot be loaded."""
+    from care_sim.policies import ENTRY_POINTS
+
+    (entry,) = metadata.entry_points(group=ENTRY_POINTS, name=name)
+    package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.module
+    try:
+        said = (inspect.getdoc(entry.load()) or "").partition("\n")[0]
+    except Exception as error:
+        said = f"Cannot be loaded: {type(error).__name__}: {' '.join(str(error).split())}"
+    return f"{said} [{package}]".lstrip()
+
+
+def _rounded(value: object) -> str:
+    """A default as people write it; numbers to two decimals."""
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_rounded, value))})"
+    return str(round(value, 2)) if isinstance(value, float) else repr(value)
 
 
 def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:

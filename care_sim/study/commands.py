@@ -85,6 +85,8 @@ class Run:
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         faults = ([self.false_negative_rate], [self.camera_latency])
         (config,) = grid(*axes, *faults, **self.conditions.arguments())
+        if config.budget != self.budget:
+            print("full fires every cell, whatever the budget", file=sys.stderr)
         print_timeline(config, *trace(config), _console())
         return 0
 
