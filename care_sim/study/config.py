@@ -13,7 +13,7 @@ import gymnasium
 import care_sim
 from care_sim.allocation import RESERVE_FRACTION
 from care_sim.envs import IDS
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.perception.detectors import MIN_RETURNS
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
@@ -26,8 +26,11 @@ Parameters = tuple[tuple[str, Any], ...]
 ENVIRONMENTS = {name.split("-")[1].lower(): name for name in IDS}
 """Environment id of every scenario."""
 
-FULL_BUDGET = 1.0
-"""`full` fires every cell, whatever the budget of the policies it bounds."""
+FULL_CONDITIONS = (1.0, 0.0, 0)
+"""`full` fires every cell and asks no camera, whatever budget, misses and latency of the policies it bounds."""
+
+LARGEST_SEED = 2**63 - 1
+"""What a column of a results file holds."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,9 @@ class EpisodeConfig:
     policy_parameters: Parameters = ()
 
     def __post_init__(self) -> None:
-        if self.seed < 0 or self.seed != int(self.seed):
-            raise InvalidInput(f"seed must be a whole number >= 0, got {self.seed}")
+        check_whole("seed", self.seed, 0)
+        if self.seed > LARGEST_SEED:
+            raise InvalidInput(f"seed must be at most {LARGEST_SEED}, got {self.seed}")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
         with self.make_env() as env:
             self.make_policy(env)
@@ -125,19 +129,13 @@ def grid(
     camera_latencies: Sequence[int] = (0,),
     **common: Any,
 ) -> list[EpisodeConfig]:
-    """All combinations, without repeats; `full` runs once for all budgets. `common` are further fields."""
-    combinations = product(scenarios, policies, budgets, false_negative_rates, camera_latencies, seeds)
+    """All combinations, without repeats; `full` runs once for all conditions. `common` are further fields."""
+    conditions = list(product(budgets, false_negative_rates, camera_latencies))
     configs = (
-        EpisodeConfig(
-            scenario,
-            policy,
-            FULL_BUDGET if policy == "full" else budget,
-            seed,
-            false_negative_rate=rate,
-            camera_latency=latency,
-            **common,
-        )
-        for scenario, policy, budget, rate, latency, seed in combinations
+        EpisodeConfig(scenario, policy, budget, seed, false_negative_rate=rate, camera_latency=latency, **common)
+        for scenario, policy in product(scenarios, policies)
+        for budget, rate, latency in ([FULL_CONDITIONS] if policy == "full" else conditions)
+        for seed in seeds
     )
     return list(dict.fromkeys(configs))
 

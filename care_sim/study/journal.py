@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Self
 
 from care_sim.study.episode import Row
+from care_sim.study.rows import with_tuples
 
 
 class Journal:
@@ -42,7 +43,7 @@ class Journal:
         self._file.close()
 
     def append(self, row: Row) -> None:
-        """Keep a finished episode; on disk when this returns."""
+        """Keep a finished episode; with the operating system when this returns."""
         self._write(json.dumps(row) + "\n")
         self._rows[row["digest"]] = row
 
@@ -56,4 +57,4 @@ def _parsed(line: str) -> Row | None:
         row = json.loads(line)
     except json.JSONDecodeError:
         return None
-    return row if isinstance(row, dict) and "digest" in row else None
+    return with_tuples(row) if isinstance(row, dict) and "digest" in row else None

@@ -28,12 +28,17 @@ def write_rows(rows: Sequence[Row], path: Path) -> None:
     unfinished.replace(path)
 
 
+def with_tuples(row: Row) -> Row:
+    """The row with ranges as tuples again, which Parquet and JSON hold as lists."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in row.items()}
+
+
 def read_rows(path: Path) -> list[Row]:
     """Read rows back. Raises InvalidInput for a file that is damaged or holds no episodes."""
     if not path.is_file():
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote, or its Parquet file")
     try:
-        rows: list[Row] = pq.read_table(path).to_pylist()
+        rows = [with_tuples(row) for row in pq.read_table(path).to_pylist()]
     except (pa.ArrowException, OSError) as error:
         raise InvalidInput(f"{path} is not a readable Parquet file: {str(error).splitlines()[0]}") from error
     missing = REQUIRED - set(rows[0] if rows else ())

@@ -1,8 +1,9 @@
 """Runs episodes over processes; survives the death of a worker and finds the episode that killed it."""
 
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 
 from care_sim.errors import InvalidInput
@@ -61,7 +62,7 @@ class _Run:
             try:
                 while waiting or flying:
                     while waiting and len(flying) < self._workers:
-                        flying[executor.submit(run_episode, waiting[0])] = waiting[0]
+                        flying[_submit(executor, waiting[0])] = waiting[0]
                         waiting.popleft()
                     self._land(flying)
             except BrokenExecutor:
@@ -71,7 +72,7 @@ class _Run:
     def alone(self, config: EpisodeConfig) -> None:
         """Run one episode in a worker of its own."""
         with self._make_executor(1) as executor:
-            future = executor.submit(run_episode, config)
+            future = _submit(executor, config)
             wait([future])
         if isinstance(future.exception(), BrokenExecutor):
             self._fail(config, "the worker process died")
@@ -102,3 +103,13 @@ class _Run:
     def _fail(self, config: EpisodeConfig, reason: str) -> None:
         self.failures.append(Failure(config, reason))
         self._on_done()
+
+
+def _submit(executor: Executor, config: EpisodeConfig) -> Future[Row]:
+    """Hand an episode over; a fork server that does not answer at once on a busy machine is asked again."""
+    for patience_s in (0.5, 2.0):
+        try:
+            return executor.submit(run_episode, config)
+        except ConnectionError:
+            time.sleep(patience_s)
+    return executor.submit(run_episode, config)

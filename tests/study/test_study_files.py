@@ -3,6 +3,7 @@ from dataclasses import asdict
 
 import pytest
 
+from care_sim.cli import main
 from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.journal import Journal
@@ -20,7 +21,7 @@ def test_rows_come_back_as_written(tmp_path):
     write_rows(rows, tmp_path / "episodes.parquet")
     first, second = read_rows(tmp_path / "episodes.parquet")
     assert first == rows[0] | {"scenario.gap_m": None}
-    assert second == rows[1] | {"scenario.vehicles": None, "scenario.gap_m": [0.5, 0.6]}
+    assert second == rows[1] | {"scenario.vehicles": None, "scenario.gap_m": (0.5, 0.6)}
     assert [path.name for path in tmp_path.iterdir()] == ["episodes.parquet"]
 
 
@@ -69,3 +70,13 @@ def test_the_journal_survives_rubbish(tmp_path):
         journal.append({"digest": "b"})
     with Journal(path) as journal:
         assert "b" in journal
+
+
+def test_a_sweep_over_a_range_is_reported_and_resumed(tmp_path, capsys):
+    sweep = ["sweep", "--scenarios", "dartout", "--policies", "care", "--seeds", "1", "--out", str(tmp_path)]
+    sweep += ["--scenario-parameters", "duration_s=0.2", "gap_m=(0.9,1.0)", "--workers", "1"]
+    for command in (sweep, sweep, ["report", str(tmp_path)]):
+        with pytest.raises(SystemExit) as end:
+            main(command)
+        assert end.value.code == 0
+        assert "gap m (0.9, 1.0)" in capsys.readouterr().out
