@@ -133,3 +133,21 @@ def test_help_is_quick_and_complete(command):
     assert time.perf_counter() - started < 5
     assert "--help" in done.stdout
     assert "pyarrow" not in done.stderr
+
+
+def test_a_picture_of_the_braking_car(capsys, tmp_path):
+    from PIL import Image
+
+    picture = tmp_path / "deep" / "keyframe.png"
+    with pytest.raises(SystemExit) as end:
+        main(["run", "dartout", "--policy", "care", "--seed", "0", "--picture", str(picture)])
+    assert end.value.code == 0
+    assert Image.open(picture).size == (960, 720)
+
+
+def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
+    picture = tmp_path / "keyframe.png"
+    with pytest.raises(SystemExit):
+        main(["run", "dartout", "--picture", str(picture), "--scenario-parameters", "duration_s=0.2"])
+    assert "no picture" in capsys.readouterr().err
+    assert not picture.exists()

@@ -73,6 +73,8 @@ class Run:
     """Rate at which the camera misses a detection, 0 to 1."""
     camera_latency: int = 0
     """Age of the camera's detections in whole keyframes."""
+    picture: Path | None = None
+    """PNG file for a picture of the first keyframe at which the brake is on."""
     conditions: Annotated[Conditions, tyro.conf.arg(name="")] = Conditions()
     """Further conditions."""
 
@@ -80,6 +82,7 @@ class Run:
         """Run it."""
         from care_sim.study.config import grid
         from care_sim.study.episode import trace
+        from care_sim.study.photo import Photographer
         from care_sim.study.timeline import print_timeline
 
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
@@ -87,7 +90,9 @@ class Run:
         (config,) = grid(*axes, *faults, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        print_timeline(config, *trace(config), _console())
+        photographer = Photographer(self.picture)
+        print_timeline(config, *trace(config, photographer), _console())
+        photographer.report()
         return 0
 
 

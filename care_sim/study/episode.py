@@ -4,11 +4,13 @@ import hashlib
 import resource
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import care_sim
+from care_sim.loop import ClosedLoop
 from care_sim.study.config import EpisodeConfig
 from care_sim.types import Keyframe, Observation
 from care_sim.world.world import World
@@ -26,8 +28,13 @@ def run_episode(config: EpisodeConfig) -> Row:
     return trace(config)[0]
 
 
-def trace(config: EpisodeConfig) -> tuple[Row, list[Keyframe]]:
-    """Play an episode; its row and the record of every keyframe (scoring only: it holds truth)."""
+def trace(
+    config: EpisodeConfig, watch: Callable[[ClosedLoop, Keyframe], None] = lambda _loop, _frame: None
+) -> tuple[Row, list[Keyframe]]:
+    """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
+
+    `watch` is called after every keyframe.
+    """
     started = time.perf_counter()
     seal = Seal()
     with config.make_env() as env:
@@ -38,6 +45,7 @@ def trace(config: EpisodeConfig) -> tuple[Row, list[Keyframe]]:
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
             seal.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
+            watch(env.unwrapped.loop, env.unwrapped.keyframes[-1])  # type: ignore[attr-defined]
             ended = terminated or truncated
         keyframes: list[Keyframe] = env.unwrapped.keyframes  # type: ignore[attr-defined]
     row = {
