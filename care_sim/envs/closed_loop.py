@@ -14,7 +14,7 @@ from care_sim.allocation import RESERVE_FRACTION, budget_cells, fired_cells
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.errors import InvalidInput, check_number
 from care_sim.evaluation.metrics import outcome
-from care_sim.grid import AngularGrid, Cells
+from care_sim.grid import AngularGrid
 from care_sim.loop import ClosedLoop, Sensing
 from care_sim.perception.detectors import MIN_RETURNS
 from care_sim.scenarios import make_scenario
@@ -52,9 +52,9 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
     ### Episode end
     Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes). `info` has
     `fired` (cells; an array of B, with `floor=False` a list of at most B, because Gymnasium's vector
-    environments stack arrays of one length), `detected` (the first-sighting actor, at this keyframe), `in_view`, `braking`,
-    `clearance_m`, `speed_mps`, `time_s`, `reward_terms`; at the end `info["outcome"]`, a dict of
-    `care_sim.types.Outcome`.
+    environments stack arrays of one length), `detected` (the first-sighting actor, at this keyframe),
+    `in_view`, `braking`, `clearance_m`, `speed_mps`, `time_s`, `reward_terms`; at the end
+    `info["outcome"]`, a dict of `care_sim.types.Outcome`.
 
     ### Arguments
     `budget` beta in (0, 1]; `reserve_fraction` rho of the shared allocator; `false_negative_rate` and

@@ -9,6 +9,8 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
 Range = tuple[float, float]
+SIGNED = {"signed": True}
+"""Metadata of a range whose values may be negative although the default's are not."""
 
 SPEED_LIMIT_MPS = 30 / 3.6
 """All scenarios take place in a 30 km/h zone, the residential default of many European cities."""

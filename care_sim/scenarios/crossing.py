@@ -1,7 +1,7 @@
 """A person who runs across the ego's lane from behind an occluder: the physics of two scenarios."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from care_sim.scenarios.base import (
     PARKING_WIDTH_M,
     PAVEMENT_WIDTH_M,
     RIGHT_PARKING_Y,
+    SIGNED,
     Range,
     Scenario,
     draw,
@@ -53,9 +54,10 @@ class CrossingScenario(Scenario):
     """Full speed after half a second and 0.7 m, all of it in the occluder's shade."""
     kerb_offset_m: Range = (-0.2, 0.2)
     """How far the occluder stands off the middle of the parking lane."""
-    encroachment_s: Range = (0.3, 0.6)
+    encroachment_s: Range = field(default=(0.3, 0.6), metadata=SIGNED)
     """Post-encroachment time of an ego that never brakes. Under 1 s is a serious conflict (Hydén 1987);
-    above 0 nobody is hit by a car that does nothing, so a collision can only come from the braking."""
+    above 0 nobody is hit by a car that does nothing, so a collision can only come from the braking. Below 0
+    is a collision course."""
 
     def __post_init__(self) -> None:
         if self.occluder not in OCCLUDERS:

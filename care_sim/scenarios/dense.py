@@ -55,7 +55,8 @@ FOLLOWER_M = -22.5
 @dataclass(frozen=True)
 class Dense(CrossingScenario):
     """The street of `CrossingScenario` lined with `vehicles` standing ones, five of which the camera sees
-    when the person appears, and a driver who follows the ego."""
+    when the person appears, and a driver who follows the ego.
+    """
 
     vehicles: int = 7
     place_jitter_m: Range = (-0.4, 0.4)

@@ -189,3 +189,7 @@ def test_an_impossible_value_is_refused_in_one_line(name, parameters, named):
 def test_an_impossible_range_is_refused_before_an_episode(parameters):
     with pytest.raises(InvalidInput):
         make_scenario("dartout", **parameters)
+
+
+def test_a_collision_course_can_be_asked_for():
+    assert make_scenario("dartout", encroachment_s=(-0.5, -0.2)).encroachment_s == (-0.5, -0.2)
