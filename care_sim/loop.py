@@ -16,6 +16,7 @@ from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture, windo
 from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar, LidarNoise
 from care_sim.types import Belief, Keyframe, Rig, Scan
+from care_sim.world.bullet import Integers
 from care_sim.world.world import World
 
 
@@ -67,7 +68,7 @@ class ClosedLoop:
         index, time, speed = self.index, world.time, world.ego_motion.speed
 
         scan, bodies = self._lidar.fire(fired, sensor)
-        detections, detected = self._detector.detect(bodies, partial(self._local_box, sensor))
+        detections, detected = self._detector.detect(bodies, partial(self._local_boxes, sensor))
         self._memory.update(detections, sensor)
         command = self._controller.command(self._memory.tracks(sensor), world.ego_motion)
 
@@ -97,7 +98,7 @@ class ClosedLoop:
         sensor = self.sensor
         camera = self.rig.cameras[0]
         window = window_on(camera, sensor.boxes_to_local(self.world.boxes(self._reported)))
-        self.picture = Picture.of(self.world.bullet.body_ids(camera, sensor, window))
+        self.picture = Picture.of(self.world.bullet.body_ids(camera, sensor, window), window)
         self.belief = Belief(
             self.world.ego_motion,
             self.rig.budget,
@@ -111,9 +112,8 @@ class ClosedLoop:
         ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
 
-    def _local_box(self, sensor: Frame, body: int) -> Floats:
-        box: Floats = sensor.boxes_to_local(self.world.boxes([self._actors[body]]))[0]
-        return box
+    def _local_boxes(self, sensor: Frame, bodies: Integers) -> Floats:
+        return sensor.boxes_to_local(self.world.boxes([self._actors[body] for body in bodies.tolist()]))
 
     def _in_view(self) -> bool:
         target = self.world.first_sighting

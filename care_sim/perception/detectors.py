@@ -23,20 +23,12 @@ class ReturnsDetector:
         self._labels = labels
         self._min_returns = min_returns
 
-    def detect(self, hits: Integers, box_of: Callable[[int], Floats]) -> tuple[Detections, Integers]:
+    def detect(self, hits: Integers, boxes_of: Callable[[Integers], Floats]) -> tuple[Detections, Integers]:
         """Detections from the body id behind every fired ray, and the detected ids for the scoring.
 
-        `box_of` gives the (7,) sensor-frame box of a body.
+        `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
         """
         bodies, counts = np.unique(hits, return_counts=True)
-        kept = [
-            (body, count)
-            for body, count in zip(bodies.tolist(), counts.tolist(), strict=True)
-            if count >= self._min_returns and body in self._labels
-        ]
-        detections = Detections(
-            np.array([self._labels[body] for body, _ in kept], dtype=np.int64),
-            np.array([box_of(body) for body, _ in kept]).reshape(-1, 7),
-            np.array([count for _, count in kept], dtype=np.int64),
-        )
-        return detections, np.array([body for body, _ in kept], dtype=np.int64)
+        labels = np.array([self._labels.get(body, -1) for body in bodies.tolist()], dtype=np.int64)
+        kept = (labels >= 0) & (counts >= self._min_returns)
+        return Detections(labels[kept], boxes_of(bodies[kept]), counts[kept]), bodies[kept]

@@ -48,5 +48,5 @@ def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
     """Closed house fronts at y = `right_y` and y = `left_y`, from behind the ego to beyond its view."""
     length, depth, _ = CATALOGUE["terrace"].size
     middle = length / 2 - 30.0
-    world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0))
-    world.add("terrace left", "terrace", (middle, left_y + depth / 2, 0.0))
+    world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0), backdrop=True)
+    world.add("terrace left", "terrace", (middle, left_y + depth / 2, 0.0), backdrop=True)

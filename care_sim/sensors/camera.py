@@ -62,13 +62,15 @@ class Picture:
     pixels: Integers
 
     @classmethod
-    def of(cls, ids: Integers) -> "Picture":
-        """Read the box of every body off a picture of ids (height, width)."""
-        found = ndimage.find_objects(ids + 1)
-        visible = np.bincount((ids + 1).ravel())
+    def of(cls, ids: Integers, window: Window | None = None) -> "Picture":
+        """Read the box of every body off a picture of ids (height, width), or off a window of it."""
+        left, top, right, bottom = window if window is not None else (0, 0, *ids.shape[::-1])
+        labels = ids[top:bottom, left:right] + 1
+        visible = np.bincount(labels.ravel())
+        found = ndimage.find_objects(labels) if labels.size else []
         rows = [
-            (body, s[1].start, s[0].start, s[1].stop, s[0].stop, visible[body + 1])
-            for body, s in enumerate(found, start=0)
+            (body, s[1].start + left, s[0].start + top, s[1].stop + left, s[0].stop + top, visible[body + 1])
+            for body, s in enumerate(found)
             if s is not None
         ]
         table = np.array(rows, dtype=np.int64).reshape(-1, 6)

@@ -28,8 +28,8 @@ _FAR_M = 120.0
 class BulletWorld:
     """Bodies standing on a ground plane, in one DIRECT client. Not to be shared between processes.
 
-    The ground and transparent bodies have no look: no camera needs their ids, and rendering them costs more
-    than everything else in the picture.
+    The ground, transparent bodies and backdrops have no look: no camera needs their ids, and rendering them
+    costs more than everything else in the picture.
     """
 
     def __init__(self) -> None:
@@ -44,12 +44,15 @@ class BulletWorld:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = -1
 
-    def add(self, kind: BodyKind, pose: Pose, *, transparent: bool = False) -> int:
-        """Place a body and return its id. A `transparent` one is neither hit by rays nor seen."""
+    def add(self, kind: BodyKind, pose: Pose, *, transparent: bool = False, backdrop: bool = False) -> int:
+        """Place a body and return its id. A `transparent` one is neither hit by rays nor seen.
+
+        A `backdrop` stands behind all that perception reports: rays hit it, cameras need not render it.
+        """
         body = pybullet.createMultiBody(
             0,
             pybullet.createCollisionShapeArray(physicsClientId=self._client, **_collision(kind.parts)),
-            self._no_look() if transparent else self._look(kind.parts),
+            self._no_look() if transparent or backdrop else self._look(kind.parts),
             physicsClientId=self._client,
         )
         self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
@@ -75,8 +78,8 @@ class BulletWorld:
             hits += pybullet.rayTestBatch(sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client)
         if len(hits) != len(targets):
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
-        ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
-        shares = np.fromiter((hit[2] for hit in hits), np.float64, len(hits))
+        columns = list(zip(*hits, strict=True)) if hits else [(), (), ()]
+        ids, shares = np.array(columns[0], np.int64), np.array(columns[2], np.float64)
         return np.where(ids == NOTHING, np.inf, shares * reach), ids
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window | None = None) -> Integers:

@@ -70,13 +70,22 @@ class World:
         self._ego_motion = Ego(ego_speed)
         self._steps = 0
 
-    def add(self, name: str, kind: str, pose: Pose | Motion | RoadVehicle, *, reported: bool = True) -> Actor:
+    def add(
+        self,
+        name: str,
+        kind: str,
+        pose: Pose | Motion | RoadVehicle,
+        *,
+        reported: bool = True,
+        backdrop: bool = False,
+    ) -> Actor:
         """Add a body that stands at a pose, follows a function of time, or drives in the traffic.
 
-        `reported=False` keeps perception silent about it, whatever its kind.
+        `reported=False` keeps perception silent about it, whatever its kind. A `backdrop` stands behind all
+        that perception reports, so that the camera need not render it.
         """
         pose_at = _motion(pose)
-        body = self.bullet.add(CATALOGUE[kind], pose_at(0.0))
+        body = self.bullet.add(CATALOGUE[kind], pose_at(0.0), backdrop=backdrop)
         actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
         self.actors.append(actor)
         if not isinstance(pose, tuple):

@@ -8,12 +8,12 @@ from care_sim.perception.detectors import ReturnsDetector
 LABELS = {4: 0, 9: 4}
 
 
-def box_of(body):
-    return np.array([body, 0, 0, 1, 1, 1, 0], dtype=float)
+def boxes_of(bodies):
+    return np.array([[body, 0, 0, 1, 1, 1, 0] for body in bodies.tolist()], dtype=float).reshape(-1, 7)
 
 
 def detect(hits, **rules):
-    return ReturnsDetector(LABELS, **rules).detect(np.array(hits, dtype=np.int64), box_of)
+    return ReturnsDetector(LABELS, **rules).detect(np.array(hits, dtype=np.int64), boxes_of)
 
 
 @pytest.mark.parametrize(("min_returns", "found"), [(1, [4, 9]), (2, [4, 9]), (3, [4]), (4, [])])
@@ -26,7 +26,7 @@ def test_three_returns_by_default_with_class_true_box_and_count():
     detections, bodies = detect([9, 4, 9, 4, 9, 9])
     assert bodies.tolist() == [9]
     assert (detections.classes.tolist(), detections.returns.tolist()) == ([4], [4])
-    assert detections.boxes.tolist() == [box_of(9).tolist()]
+    assert detections.boxes.tolist() == boxes_of(np.array([9])).tolist()
 
 
 def test_what_is_not_reported_is_not_detected():
