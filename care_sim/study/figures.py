@@ -125,10 +125,9 @@ def _line(axes: Axes, places: Sequence[float], cells: Sequence[Cell]) -> tuple[f
     )
     for place, cell in zip(places, cells, strict=True):
         if cell.never:
-            note = f"{cell.never} never"
-            axes.annotate(
-                note, (place, cell.detection.median), (6, 6), textcoords="offset points", color=colour, size=8
-            )
+            at = (place, cell.detection.median)
+            upright: dict[str, Any] = {"rotation": 90, "ha": "center", "va": "bottom", "size": 8, "color": colour}
+            axes.annotate(f"{cell.never} never", at, (0, 6), textcoords="offset points", **upright)
     return medians[-1], policy, colour
 
 
