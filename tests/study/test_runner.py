@@ -129,11 +129,18 @@ def test_a_dead_worker_costs_only_its_own_episode(third_party, tmp_path):
     assert conduct(configs[:1], tmp_path, workers=1) == []
 
 
+def listen_to_interrupts():
+    """What is started in the background inherits deaf ears."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def test_an_interrupt_keeps_what_was_computed(tmp_path):
     sweep = ["sweep", "--scenarios", "dartout", "--policies", "random", "--seeds", "500", "--workers", "1"]
     options = ["--out", str(tmp_path), "--scenario-parameters", "duration_s=0.1"]
     command = [sys.executable, "-c", "import sys; from care_sim.cli import main; main(sys.argv[1:])", *sweep, *options]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=listen_to_interrupts
+    )
     journal = tmp_path / JOURNAL
     deadline = time.monotonic() + 40
     while not (journal.exists() and journal.read_text().count("\n") >= 2) and time.monotonic() < deadline:
