@@ -22,3 +22,12 @@ def test_the_policy_has_twenty_lines_at_most():
     (policy,) = (block for block in BLOCKS if "class Corridor" in block)
     body = policy[policy.index("class Corridor") : policy.index("env = ")]
     assert len([line for line in body.splitlines() if line.strip()]) <= 20
+
+
+@pytest.mark.parametrize("page", ["README.md", "results/README.md"])
+def test_links_lead_somewhere(page):
+    here = pathlib.Path(__file__).parents[1] / page
+    targets = re.findall(r"\]\((?!http)([^)#]+)", here.read_text())
+    assert targets
+    for target in targets:
+        assert (here.parent / target).exists(), target
