@@ -22,7 +22,7 @@ FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAME
 
 MIN_PIXELS = 12
 """Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360, and
-an unoccluded adult at about 45 m."""
+an unoccluded adult at about 40 m."""
 FULL_CONFIDENCE = 3 * MIN_PIXELS
 """Visible pixels at which n / (n + FULL_CONFIDENCE) is one half; the least box then has confidence
 0.25, the detector threshold of the paper."""

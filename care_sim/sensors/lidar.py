@@ -13,8 +13,6 @@ from care_sim.world.bullet import NOTHING, Integers
 
 LIDAR_POSITION = (-0.445, 0.0, 1.84)
 """Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault Zoe."""
-
-
 NEAREST_M = 0.01
 """A noisy return stays this far from 0 m (not fired) and from the reach (no return)."""
 

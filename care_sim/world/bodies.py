@@ -66,8 +66,8 @@ def _block(name: str, label: str | None, size: Triple, colour: Triple) -> BodyKi
 
 
 def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
-    """Two legs one stride apart, torso and head, in the proportions of an adult: hip at 0.47 of the
-    height and chin at 0.87 (Drillis and Contini 1966, body segment lengths).
+    """Two legs one stride apart up to 0.47 of the height (an inseam), torso, and head above the chin at 0.87 of
+    it (Drillis and Contini 1966, body segment parameters).
     """
     length, width, height = size
     hip, chin = 0.47 * height, 0.87 * height

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.frames import Frame, Pose, turned
+from care_sim.frames import Floats, Frame, Pose, turned
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.quiet_pybullet import pybullet
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Window = tuple[int, int, int, int]
 """Left, top, right, bottom in whole pixels."""
