@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.frames import turned
-from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, Cells
+from care_sim.grid import Cells
 from care_sim.pinhole import PinholeCamera
 from care_sim.types import Belief, ImageDetections, Rig, Tracks
 
@@ -28,28 +28,18 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
     return result
 
 
-def wedges(
-    detections: ImageDetections,
-    rig: Rig,
-    azimuth_margin: int = AZIMUTH_MARGIN,
-    elevation_margin: int = ELEVATION_MARGIN,
-) -> list[Cells]:
+def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:
     """The depth-free wedge W(d) of every detection, turned by the yaw change since its picture."""
     bundles = np.empty((len(detections), 9, 3))
     for rows, camera in _cameras(detections, rig):
         bundles[rows] = camera.box_rays(detections.boxes[rows])
-    return rig.grid.wedges(turned(bundles, -detections.yaw_changes[:, None]), azimuth_margin, elevation_margin)
+    return rig.wedges(turned(bundles, -detections.yaw_changes[:, None]))
 
 
-def camera_layers(
-    belief: Belief,
-    rig: Rig,
-    azimuth_margin: int = AZIMUTH_MARGIN,
-    elevation_margin: int = ELEVATION_MARGIN,
-) -> tuple[list[Cells], list[Cells]]:
+def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
     """(U, M): the wedges of unexplained and of explained detections, in the order observed."""
     known = explained(belief.detections, belief.tracks, rig)
-    cells = wedges(belief.detections, rig, azimuth_margin, elevation_margin)
+    cells = wedges(belief.detections, rig)
     unexplained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if not is_known]
     explained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if is_known]
     return unexplained_wedges, explained_wedges

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.errors import check_number, check_whole
 from care_sim.frames import Floats
-from care_sim.grid import AngularGrid, Cells
+from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
@@ -192,7 +193,8 @@ class Rig:
     """What is fixed about the sensing task and known to a policy in advance.
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` the time between
-    two decisions.
+    two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and `elevation_margin` rows.
+    The LiDAR stands `sensor_height_m` above the road.
     """
 
     grid: AngularGrid = field(default_factory=AngularGrid)
@@ -200,6 +202,23 @@ class Rig:
     budget: int = 1638
     reserve_fraction: float = 0.3
     keyframe_s: float = 0.1
+    azimuth_margin: int = AZIMUTH_MARGIN
+    elevation_margin: int = ELEVATION_MARGIN
+    sensor_height_m: float = 1.84
+
+    def __post_init__(self) -> None:
+        check_number("reserve_fraction", self.reserve_fraction, 0, 1)
+        check_whole("azimuth_margin", self.azimuth_margin, 0)
+        check_whole("elevation_margin", self.elevation_margin, 0)
+
+    def hulls(self, boxes: Floats, azimuth_margins: Cells | None = None) -> list[Cells]:
+        """The cells of sensor-frame boxes (n, 7), dilated by the rig's margins or by `azimuth_margins` (n,)."""
+        azimuth = self.azimuth_margin if azimuth_margins is None else azimuth_margins
+        return self.grid.hulls(boxes, azimuth, self.elevation_margin)
+
+    def wedges(self, bundles: Floats) -> list[Cells]:
+        """The cells of bundles of rays (n, k, 3), middle first, dilated by the rig's margins."""
+        return self.grid.wedges(bundles, self.azimuth_margin, self.elevation_margin)
 
 
 @dataclass(frozen=True)
@@ -238,6 +257,7 @@ class Outcome:
     """The result of an episode; see `care_sim.evaluation.metrics.outcome` for the definitions."""
 
     detection_distance_m: float | None
+    undetected_to_m: float | None
     braked: bool
     min_distance_m: float | None
     clearance_m: float | None

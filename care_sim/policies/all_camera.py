@@ -14,5 +14,5 @@ class AllCamera(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the wedges of all detections."""
-        hulls = self.rig.grid.hulls(belief.tracks.boxes)
+        hulls = self.rig.hulls(belief.tracks.boxes)
         return Demand(hulls, [wedges(belief.detections, self.rig)])

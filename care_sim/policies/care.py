@@ -15,4 +15,4 @@ class Care(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the wedges of the residual."""
         unexplained, _ = camera_layers(belief, self.rig)
-        return Demand(self.rig.grid.hulls(belief.tracks.boxes), [unexplained])
+        return Demand(self.rig.hulls(belief.tracks.boxes), [unexplained])

@@ -29,12 +29,12 @@ class CareSbf(Policy):
 
     def reset(self) -> None:
         """Forget the streaks."""
-        self._forgetting = Forgetting(self._rules, self.rig.grid.column_width)
+        self._forgetting = Forgetting(self._rules, self.rig.grid.column_width, self.rig.azimuth_margin)
 
     def demand(self, belief: Belief) -> Demand:
         """Full hulls, shrunk hulls, then the layers (U, M)."""
         margins, low = self._forgetting.margins(belief.tracks, belief.ego)
-        hulls = self.rig.grid.hulls(belief.tracks.boxes, margins)
+        hulls = self.rig.hulls(belief.tracks.boxes, margins)
         full = [hull for hull, is_low in zip(hulls, low, strict=True) if not is_low]
         shrunk = [hull for hull, is_low in zip(hulls, low, strict=True) if is_low]
         return Demand([*full, *shrunk], camera_layers(belief, self.rig))

@@ -13,4 +13,4 @@ class History(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls of all forecasts."""
-        return Demand(self.rig.grid.hulls(belief.tracks.boxes))
+        return Demand(self.rig.hulls(belief.tracks.boxes))
