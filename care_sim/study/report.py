@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig, without_seeds
@@ -14,9 +13,10 @@ from care_sim.study.episode import Row
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import remove_others, save, study_figures
 from care_sim.study.journal import Journal
+from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import write_rows
-from care_sim.study.runner import Failure, run_all
+from care_sim.study.runner import Failure
 from care_sim.study.statements import statements
 from care_sim.study.tables import CAPTION, collision_note, study_tables
 
@@ -41,7 +41,7 @@ def conduct(
         _say_what_is_found(configs, journal, folder)
         settings = {"versions": versions(), "machine": machine(), "configurations": without_seeds(configs)}
         (folder / "config.json").write_text(json.dumps(settings, indent=1) + "\n")
-        failures = _run_with_progress(configs, journal, workers, make_executor)
+        failures = run_with_progress(configs, journal, workers, make_executor)
         rows = [journal[digest] for digest in (config.digest() for config in configs) if digest in journal]
     if rows:
         write_rows(rows, folder / ROWS)
@@ -88,13 +88,3 @@ def _say_what_is_found(configs: Sequence[EpisodeConfig], journal: Journal, folde
     if found or others:
         rest = f"; {others} of other studies stay in its journal" if others else ""
         print(f"{found} of {len(configs)} episodes found in {folder}{rest}", file=sys.stderr)
-
-
-def _run_with_progress(
-    configs: Sequence[EpisodeConfig], journal: Journal, workers: int, make_executor: ExecutorFactory
-) -> list[Failure]:
-    done = sum(config.digest() in journal for config in configs)
-    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("", total=len(configs), completed=done)
-        return run_all(configs, journal, workers, make_executor, lambda: progress.advance(task))
