@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from care_sim.frames import Floats, Frame, turned
+from care_sim.grid import Cells
 from care_sim.types import MAX_TRACKS, Detections, Tracks
 
 _EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
@@ -50,16 +51,23 @@ class TrackMemory:
         boxes[:, :2] += self._tracks.velocities * self._keyframe_s
         self._tracks = replace(self._tracks, boxes=boxes)
 
-    def update(self, detections: Detections, sensor: Frame) -> None:
-        """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones."""
+    def update(self, detections: Detections, sensor: Frame) -> Cells:
+        """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
+
+        Returns (n,) the id of the track of every detection.
+        """
         seen = sensor.boxes_to_world(detections.boxes)
         matched, found = self._assign(detections.classes, seen)
+        new = np.setdiff1d(np.arange(len(detections)), found)
+        ids = np.empty(len(detections), np.int64)
+        ids[found] = self._tracks.ids[matched]
+        ids[new] = self._next_id + np.arange(len(new))
         self._correct(matched, seen[found])
         self._forget()
-        new = np.setdiff1d(np.arange(len(detections)), found)
-        self._start(detections.classes[new], seen[new])
+        self._start(ids[new], detections.classes[new], seen[new])
+        return ids
 
-    def _assign(self, classes: np.ndarray, seen: Floats) -> tuple[np.ndarray, np.ndarray]:
+    def _assign(self, classes: Cells, seen: Floats) -> tuple[Cells, Cells]:
         tracks = self._tracks
         offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
         distance = np.hypot(offset[..., 0], offset[..., 1])
@@ -71,7 +79,7 @@ class TrackMemory:
         kept = possible[rows, columns]
         return rows[kept], columns[kept]
 
-    def _correct(self, rows: np.ndarray, seen: Floats) -> None:
+    def _correct(self, rows: Cells, seen: Floats) -> None:
         tracks = self._tracks
         boxes, velocities = tracks.boxes.copy(), tracks.velocities.copy()
         misses, hits = tracks.misses + 1, tracks.hits.copy()
@@ -86,9 +94,8 @@ class TrackMemory:
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
         self._tracks = self._tracks.take(alive)
 
-    def _start(self, classes: np.ndarray, boxes: Floats) -> None:
-        count = len(classes)
-        ids = np.arange(self._next_id, self._next_id + count)
+    def _start(self, ids: Cells, classes: Cells, boxes: Floats) -> None:
+        count = len(ids)
         self._next_id += count
         old = self._tracks
         self._tracks = Tracks(

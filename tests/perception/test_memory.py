@@ -97,6 +97,20 @@ def test_an_undetected_track_dies_after_a_second_and_a_half(keyframe_s, kept):
     assert [len(tracks) for tracks in history] == [1] * (kept + 1) + [0]
 
 
+def test_an_update_names_the_track_of_every_detection():
+    """A track that goes on, one that dies in the same keyframe, and two that begin, in any order."""
+    memory = TrackMemory(DT)
+    follow(memory, [[("car", 10, 0)], *[[("truck", 30, 0)]] * 14])
+    memory.predict()
+    seen = detections(("pedestrian", 5, 5), ("truck", 30, 0), ("bicycle", 20, -8))
+    assert memory.update(seen, STILL).tolist() == [2, 1, 3]
+    memory.predict()
+    assert memory.update(detections(("truck", 30, 0), ("pedestrian", 5, 5)), STILL).tolist() == [1, 2]
+    tracks = memory.tracks(STILL)
+    places = {number: box[0] for number, box in zip(tracks.ids.tolist(), tracks.boxes.tolist(), strict=True)}
+    assert places == pytest.approx({1: 30, 2: 5, 3: 20})
+
+
 def test_a_dead_tracks_id_is_not_used_again():
     history = follow(TrackMemory(DT), [[("car", 10, 0)], *[[]] * 16, [("car", 10, 0)]])
     assert history[-1].ids.tolist() == [1]
