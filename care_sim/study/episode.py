@@ -10,12 +10,26 @@ from typing import Any
 import numpy as np
 
 import care_sim
+from care_sim.errors import InvalidInput
 from care_sim.loop import ClosedLoop
 from care_sim.study.config import EpisodeConfig
 from care_sim.types import Keyframe, Observation
 from care_sim.world.world import World
 
 Row = dict[str, Any]
+
+
+def attempt(config: EpisodeConfig) -> Row | str:
+    """What a worker does: play an episode; its row, or in one line why there is none.
+
+    An exception stays in the worker, which alone may know its class.
+    """
+    try:
+        return run_episode(config)
+    except InvalidInput as error:
+        return _one_line(str(error))
+    except (Exception, SystemExit) as error:
+        return _one_line(f"{type(error).__name__}: {error}")
 
 
 def run_episode(config: EpisodeConfig) -> Row:
@@ -76,6 +90,10 @@ class Seal:
     def hexdigest(self) -> str:
         """The hash so far."""
         return self._content.hexdigest()[:16]
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split()).removesuffix(":")
 
 
 def peak_rss_mb() -> float:

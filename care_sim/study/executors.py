@@ -1,14 +1,27 @@
 """Who plays the episodes: processes of this machine, or the workers of a dask cluster."""
 
+import logging
 import signal
 from collections.abc import Callable
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from care_sim.errors import InvalidInput, MissingExtra
 
+if TYPE_CHECKING:
+    from dask.distributed import Client
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
 ExecutorFactory = Callable[[int], Executor]
 """Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
+
+
+class ClusterLost(OSError):
+    """The scheduler of a cluster is gone in mid-run."""
 
 
 def processes(workers: int) -> Executor:
@@ -20,16 +33,76 @@ def processes(workers: int) -> Executor:
 
 
 def cluster(address: str) -> ExecutorFactory:
-    """The workers behind a dask scheduler, which need this package too.
+    """The workers behind a dask scheduler, which need this package too; the scheduler says how many there are.
 
     Raises MissingExtra without dask, InvalidInput when nobody answers at `address`.
     """
+    _connect(address).close()
+    return lambda _workers: ClusterExecutor(_connect(address))
+
+
+def places(executor: Executor, workers: int) -> int:
+    """How many episodes are played at the same time: `workers`, or as many as a cluster has threads now."""
+    return executor.threads() if isinstance(executor, ClusterExecutor) else workers
+
+
+class ClusterExecutor(Executor):
+    """Dask's own executor, which ends in the terms of `concurrent.futures`.
+
+    Dask runs the episodes of a killed worker again elsewhere. One whose workers keep dying ends in
+    BrokenExecutor; when the scheduler is gone, all end in ClusterLost.
+    """
+
+    def __init__(self, client: "Client"):
+        self._client = client
+        self._address: str = client.scheduler.address
+        self._executor = client.get_executor(pure=False)
+
+    def threads(self) -> int:
+        """Threads of all workers that are connected now. Raises ClusterLost."""
+        try:
+            return sum(self._client.nthreads().values())
+        except OSError as error:
+            raise self._lost() from error
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Hand a call over."""
+        ours: Future[T] = Future()
+        self._executor.submit(fn, *args, **kwargs).add_done_callback(partial(self._hand_on, ours))
+        return ours
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Leave the cluster; what has not ended is cancelled."""
+        self._executor.shutdown(wait=False)
+        self._client.close()
+
+    def _hand_on(self, ours: Future[Any], theirs: Future[Any]) -> None:
+        error = self._lost() if theirs.cancelled() else theirs.exception()
+        if error is None:
+            ours.set_result(theirs.result())
+        else:
+            ours.set_exception(BrokenExecutor(str(error)) if _is_death(error) else error)
+
+    def _lost(self) -> ClusterLost:
+        return ClusterLost(
+            f"the dask scheduler at {self._address} is gone; "
+            "finished episodes are kept, the same command goes on from there"
+        )
+
+
+def _connect(address: str) -> "Client":
     try:
         from dask.distributed import Client
     except ImportError as error:
         raise MissingExtra("a cluster needs the extra 'cluster': pip install 'care-sim[cluster]'") from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout="10s")
+        return Client(address, timeout="10s")
     except (OSError, ValueError) as error:
         raise InvalidInput(f"no dask scheduler answers at {address}; one looks like tcp://HOST:8786") from error
-    return lambda _workers: client.get_executor(pure=False)
+
+
+def _is_death(error: BaseException) -> bool:
+    from dask.distributed import KilledWorker
+
+    return isinstance(error, KilledWorker)

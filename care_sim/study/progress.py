@@ -1,22 +1,120 @@
-"""How far a study has come."""
+"""How far a study has come: a bar on a terminal, a line from time to time elsewhere."""
 
-from collections.abc import Sequence
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from care_sim.study.config import EpisodeConfig
+from care_sim.study.episode import Row
 from care_sim.study.executors import ExecutorFactory
+from care_sim.study.forecast import Forecast
 from care_sim.study.journal import Journal
-from care_sim.study.runner import Failure, run_all
+from care_sim.study.runner import Audience, Failure, run_all
+
+EARLY = 0.05
+"""Share of the episodes after which the prediction is kept, and after which a line is due."""
+FIRST_LINE_S = 10.0
+LINE_S = 60.0
+
+Show = Callable[[int, str], None]
+"""Shows how many episodes are done and, in words, what is left."""
 
 
 def run_with_progress(
     configs: Sequence[EpisodeConfig], journal: Journal, workers: int, make_executor: ExecutorFactory
 ) -> list[Failure]:
-    """Run the episodes that the journal does not hold yet, with a progress bar; returns those that failed."""
-    done = sum(config.digest() in journal for config in configs)
-    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        task = progress.add_task("", total=len(configs), completed=done)
-        return run_all(configs, journal, workers, make_executor, lambda: progress.advance(task))
+    """Run the episodes that the journal does not hold yet, and show on stderr how far they are.
+
+    Returns those that failed; see `care_sim.study.runner.run_all`.
+    """
+    found = [(config, journal[config.digest()]["wall_s"]) for config in configs if config.digest() in journal]
+    forecast = Forecast((config for config in configs if config.digest() not in journal), found)
+    with bar(len(configs)) if sys.stderr.isatty() else nullcontext(Lines(len(configs))) as show:
+        reporter = Reporter(forecast, show, len(configs))
+        failures = run_all(configs, journal, workers, make_executor, reporter)
+    if len(found) < len(configs):
+        print(reporter.summary(), file=sys.stderr)
+    return failures
+
+
+class Reporter(Audience):
+    """Keeps the forecast and shows it."""
+
+    def __init__(self, forecast: Forecast, show: Show, total: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._forecast = forecast
+        self._show = show
+        self._total = total
+        self._clock = clock
+        self._new = forecast.waiting
+        self._started = clock()
+        self._workers = 0
+        self._end = math.nan
+        self._predicted_s = math.nan
+
+    def playing(self, workers: int) -> None:
+        """Show what is left with so many workers."""
+        if workers != self._workers:
+            self._workers = workers
+            self._predict()
+        self._tell()
+
+    def finished(self, config: EpisodeConfig, row: Row | None) -> None:
+        """Learn how long an episode took."""
+        self._forecast.finished(config, row["wall_s"] if row else 0.0)
+        self._predict()
+        if math.isnan(self._predicted_s) and self._new - self._forecast.waiting >= EARLY * self._new:
+            self._predicted_s = self._end - self._started
+        self._tell()
+
+    def summary(self) -> str:
+        """How long it took, and how long it should have."""
+        took = f"{self._new} episodes took {spoken(self._clock() - self._started)}"
+        many = self._new >= 1 / EARLY
+        return f"{took}; {spoken(self._predicted_s)} predicted after {EARLY:.0%}" if many else took
+
+    def _predict(self) -> None:
+        self._end = self._clock() + self._forecast.remaining_s(self._workers)
+
+    def _tell(self) -> None:
+        left = "" if math.isnan(self._end) else f"{spoken(max(self._end - self._clock(), 0.0))} left"
+        waits = self._workers == 0 and self._forecast.waiting > 0
+        self._show(self._total - self._forecast.waiting, "no worker is connected" if waits else left)
+
+
+@contextmanager
+def bar(total: int) -> Iterator[Show]:
+    """A bar on a terminal."""
+    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[left]}"), console=Console(stderr=True)) as progress:
+        task = progress.add_task("", total=total, left="")
+        yield lambda done, left: progress.update(task, completed=done, left=left)
+
+
+class Lines:
+    """A line after ten seconds, then every minute, or sooner when another twentieth is done."""
+
+    def __init__(self, total: int, clock: Callable[[], float] = time.monotonic):
+        self._total = total
+        self._clock = clock
+        self._last_s, self._last_done = clock(), -total
+
+    def __call__(self, done: int, left: str) -> None:
+        """Print a line when it is due."""
+        quiet_s = self._clock() - self._last_s
+        much = done - self._last_done >= EARLY * self._total
+        if quiet_s >= LINE_S or (quiet_s >= FIRST_LINE_S and much):
+            self._last_s, self._last_done = self._clock(), done
+            print(", ".join(filter(None, (f"episodes {done}/{self._total}", left))), file=sys.stderr, flush=True)
+
+
+def spoken(seconds: float) -> str:
+    """A duration as people say it, rounded: 45 s, 12 min, 3 h 20 min."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"

@@ -1,31 +1,191 @@
-"""Episodes on a dask cluster: the same rows as here, and one line when there is none."""
+"""Episodes on a dask cluster of real processes: the same rows as here; deaths cost a retry, and are one line."""
 
 import builtins
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
 
 import pytest
 
 from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.study.config import EpisodeConfig
+from care_sim.study.config import EpisodeConfig, grid
 from care_sim.study.episode import run_episode
-from care_sim.study.executors import cluster
+from care_sim.study.executors import ClusterLost, cluster
 from care_sim.study.journal import Journal
-from care_sim.study.runner import run_all
+from care_sim.study.runner import Audience, run_all
 
+MEASURED = {"wall_s", "peak_rss_mb"}
 SHORT = (("duration_s", 0.5),)
+LONG = (("duration_s", 3.0),)
 CONFIGS = [EpisodeConfig("dartout", policy, scenario_parameters=SHORT) for policy in ("care", "history")]
+
+THIRD_PARTY = """
+import os
+from care_sim.policies.history import History
+
+class Dies(History):
+    def demand(self, belief):
+        os._exit(3)
+"""
+
+
+class Watching(Audience):
+    """Notes how many workers played."""
+
+    def __init__(self):
+        self.workers = []
+
+    def playing(self, workers):
+        self.workers.append(workers)
+
+
+class Cluster:
+    """A scheduler and its workers, each a process of its own on a free port."""
+
+    def __init__(self, folder):
+        self.processes = []
+        self._file = folder / "scheduler.json"
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show", "--no-dashboard")
+
+    def wait(self):
+        until(self._file.exists)
+        self.address = json.loads(self._file.read_text())["address"]
+
+    def worker(self, *options, **environment):
+        usual = ("--nthreads", "1", "--no-nanny")
+        return self._start("worker", *(options or usual), "--no-dashboard", "--death-timeout", "60", **environment)
+
+    def _start(self, role, *options, **environment):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", "--scheduler-file", str(self._file), *options]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        process = subprocess.Popen(command, env=os.environ | environment, start_new_session=True, **quiet)
+        self.processes.append(process)
+        return process
+
+    def stop(self):
+        for process in reversed(self.processes):
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+@contextmanager
+def watched(address):
+    """A client that only looks on."""
+    from dask.distributed import Client
+
+    with Client(address, timeout="30s") as client:
+        yield client
+
+
+@pytest.fixture
+def dask_cluster(tmp_path, monkeypatch):
+    pytest.importorskip("dask.distributed")
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "1")
+    started = Cluster(tmp_path)
+    try:
+        started.wait()
+        yield started
+    finally:
+        started.stop()
+
+
+@contextmanager
+def running(configs, journal, address, audience=None):
+    """A run in the background; yields what it returns or raises, once it has ended."""
+    ending = {}
+
+    def run():
+        try:
+            ending["failures"] = run_all(configs, journal, 1, cluster(address), audience)
+        except Exception as error:
+            ending["error"] = error
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    yield ending
+    thread.join(60)
+    assert not thread.is_alive()
+
+
+def until(condition, seconds=40):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def steady(row):
+    return {name: value for name, value in row.items() if name not in MEASURED}
 
 
 @pytest.mark.slow
-def test_a_dask_cluster_plays_the_same_episodes(tmp_path):
-    distributed = pytest.importorskip("dask.distributed")
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local,
-        Journal(tmp_path / "journal.jsonl") as journal,
-    ):
-        failures = run_all(CONFIGS, journal, 2, cluster(local.scheduler_address))
-        assert failures == []
-        for config in CONFIGS:
-            assert journal[config.digest()]["episode_hash"] == run_episode(config)["episode_hash"]
+def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask_cluster, tmp_path):
+    configs = grid(["dartout"], ["history", "care"], [0.1], range(6), scenario_parameters=LONG)
+    doomed, _ = dask_cluster.worker(), dask_cluster.worker()
+    audience, path = Watching(), tmp_path / "journal.jsonl"
+    with watched(dask_cluster.address) as client, Journal(path) as journal:
+        client.wait_for_workers(2, timeout=40)
+        (address,) = (where for where, pid in client.run(os.getpid).items() if pid == doomed.pid)
+        with running(configs, journal, dask_cluster.address, audience) as ending:
+            until(lambda: len(journal) >= 2)
+            doomed.send_signal(signal.SIGSTOP)
+            time.sleep(0.3)
+            until(lambda: client.processing()[address])
+            doomed.kill()
+        assert ending == {"failures": []}
+        assert len(path.read_text().splitlines()) == len(configs)
+        assert [steady(journal[config.digest()]) for config in configs] == [steady(run_episode(c)) for c in configs]
+    assert set(audience.workers) == {1, 2}
+
+
+@pytest.mark.slow
+def test_a_lost_scheduler_is_one_line_and_keeps_what_was_played(dask_cluster, tmp_path, capfd):
+    configs = grid(["dartout"], ["history"], [0.1], range(200), scenario_parameters=SHORT)
+    dask_cluster.worker()
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        with running(configs, journal, dask_cluster.address) as ending:
+            until(lambda: len(journal) >= 2)
+            dask_cluster.scheduler.kill()
+        assert isinstance(ending["error"], ClusterLost)
+        assert str(ending["error"]).startswith(f"the dask scheduler at {dask_cluster.address} is gone; finished")
+        assert 2 <= len(journal) < 200
+    assert capfd.readouterr().err == ""
+
+
+def installed(site):
+    """A package, perhaps missing on the workers, with a policy that kills its process."""
+    info = site / "deadly-1.0.dist-info"
+    info.mkdir(parents=True)
+    (site / "deadly.py").write_text(THIRD_PARTY)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: deadly\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[care_sim.policies]\ndies = deadly:Dies\n")
+
+
+@pytest.mark.slow
+def test_a_policy_that_the_workers_lack_fails_and_one_that_kills_them_does_too(dask_cluster, tmp_path, monkeypatch):
+    site = tmp_path / "site"
+    installed(site)
+    monkeypatch.syspath_prepend(site)
+    configs = grid(["dartout"], ["history", "dies", "care"], [0.1], [0], scenario_parameters=SHORT)
+    lacking = dask_cluster.worker()
+    with Journal(tmp_path / "lacking.jsonl") as journal:
+        (failure,) = run_all(configs, journal, 1, cluster(dask_cluster.address))
+        assert str(failure).startswith(
+            "dartout dies 0.1 seed 0 scenario.duration_s=0.5: unknown policy 'dies'; known: "
+        )
+        assert len(journal) == 2
+    lacking.kill()
+    dask_cluster.worker("--nthreads", "2", "--nanny", PYTHONPATH=str(site))
+    with Journal(tmp_path / "deadly.jsonl") as journal:
+        (failure,) = run_all(configs, journal, 1, cluster(dask_cluster.address))
+        assert (failure.config.policy, failure.reason) == ("dies", "the worker process died")
+        assert len(journal) == 2
 
 
 def test_nobody_at_the_address_is_one_line():

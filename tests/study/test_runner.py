@@ -1,5 +1,6 @@
 """Real episodes in real processes, short ones."""
 
+import json
 import os
 import signal
 import subprocess
@@ -14,7 +15,7 @@ from care_sim.study.episode import run_episode, trace
 from care_sim.study.journal import Journal
 from care_sim.study.report import JOURNAL, ROWS, conduct
 from care_sim.study.rows import read_rows
-from care_sim.study.runner import run_all
+from care_sim.study.runner import Audience, run_all
 from care_sim.types import Outcome
 
 SHORT = (("duration_s", 0.3),)
@@ -109,13 +110,28 @@ def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys)
     assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {"my-budget.png"}
 
 
+class Counting(Audience):
+    def __init__(self):
+        self.ended = []
+
+    def finished(self, config, row):
+        self.ended.append((config, row is not None))
+
+
 def test_any_executor_will_do(tmp_path):
+    audience = Counting()
     with Journal(tmp_path / JOURNAL) as journal:
-        done = []
-        assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, lambda: done.append(1)) == []
-        assert done == [1]
-        assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, lambda: done.append(1)) == []
-        assert done == [1]
+        for _ in range(2):
+            assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, audience) == []
+            assert audience.ended == [(short(["history"])[0], True)]
+
+
+def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_path):
+    configs = short(["history", "random"], seeds=(0, 1, 2))
+    conduct(configs, tmp_path, workers=1)
+    played = [json.loads(line)["seed"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
+    assert played == [0, 0, 1, 1, 2, 2]
+    assert [row["digest"] for row in read_rows(tmp_path / ROWS)] == [config.digest() for config in configs]
 
 
 def test_a_dead_worker_costs_only_its_own_episode(third_party, tmp_path):

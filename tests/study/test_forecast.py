@@ -1,0 +1,146 @@
+"""Predictions for runs of synthetic episodes whose durations are known."""
+
+import heapq
+import math
+
+import numpy as np
+import pytest
+
+from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.forecast import Forecast
+from care_sim.study.progress import Lines, Reporter, spoken
+
+POLICIES = ["history", "all-camera", "care", "care-sbf", "random", "full"]
+SEEDS = 20
+
+
+def sweep():
+    configs = grid(["dartout", "dense", "cutin"], POLICIES, [0.05, 0.1], range(SEEDS))
+    return sorted(configs, key=lambda config: config.seed)
+
+
+def seconds(config, random):
+    """A street takes half as long again, a full scan ten times as long; a fifth more or less by chance."""
+    base = (10.0 if config.policy == "full" else 1.0) * (1.5 if config.scenario == "dense" else 1.0)
+    return base * random.uniform(0.8, 1.2)
+
+
+def play(configs, workers, forecast=None):
+    """Play on a synthetic clock; the truth and, at every landing, when it was and what was predicted then."""
+    random = np.random.default_rng(0)
+    forecast = forecast or Forecast(configs)
+    flying, predictions, waiting, now = [], [], list(reversed(configs)), 0.0
+    while waiting or flying:
+        while waiting and len(flying) < workers:
+            took = seconds(waiting[-1], random)
+            heapq.heappush(flying, (now + took, len(waiting), took, waiting.pop()))
+        now, _, took, config = heapq.heappop(flying)
+        forecast.finished(config, took)
+        predictions.append((now, now + forecast.remaining_s(workers)))
+    return now, predictions
+
+
+@pytest.mark.parametrize(("workers", "share"), [(1, 0.05), (2, 0.05), (8, 0.1)])
+def test_soon_the_whole_is_known_to_a_tenth(workers, share):
+    """Many workers still fly the first slow episodes when the quick ones of a twentieth have landed."""
+    configs = sweep()
+    truth, predictions = play(configs, workers)
+    for _, predicted in predictions[round(share * len(configs)) :]:
+        assert predicted == pytest.approx(truth, rel=0.1)
+    assert predictions[-1][1] == truth
+
+
+def test_the_mean_of_all_would_be_far_off():
+    """The same run when the slow policy comes last and likeness is not looked at: why the forecast looks."""
+    configs = sorted(sweep(), key=lambda config: config.policy == "full")
+    truth, predictions = play(configs, 1)
+    now, _ = predictions[len(configs) // 2]
+    assert now / (len(configs) // 2) * len(configs) < 0.6 * truth
+
+
+def test_an_earlier_run_tells_before_the_first_episode_and_then_gives_way():
+    configs = sweep()
+    earlier = [(config, 3 * seconds(config, np.random.default_rng(1))) for config in configs if config.seed < 2]
+    rest = [config for config in configs if config.seed >= 2]
+    forecast = Forecast(rest, earlier)
+    assert forecast.remaining_s(4) == pytest.approx(3 * play(rest, 4)[0], rel=0.25)
+    truth, predictions = play(rest, 4, forecast)
+    assert predictions[len(rest) // 10][1] == pytest.approx(truth, rel=0.1)
+
+
+def test_the_closest_likeness_counts():
+    few, many, half, slow = (
+        EpisodeConfig("dense", "care", scenario_parameters=(("vehicles", 0),)),
+        EpisodeConfig("dense", "care", scenario_parameters=(("vehicles", 7),)),
+        EpisodeConfig("dartout", "care", budget=0.05),
+        EpisodeConfig("cutin", "history"),
+    )
+    forecast = Forecast([few, many, half, slow, EpisodeConfig("dense", "care", seed=1)])
+    assert math.isnan(forecast.remaining_s(1))
+    forecast.finished(few, 1.0)
+    forecast.finished(many, 5.0)
+    assert forecast.remaining_s(1) == 3 * 3.0
+    forecast.finished(slow, 9.0)
+    assert forecast.remaining_s(1) == 2 * 3.0
+    assert forecast.waiting == 2
+
+
+def test_the_longest_episode_bounds_what_many_workers_can_do():
+    forecast = Forecast([EpisodeConfig("cutin", "full", budget=1.0, seed=seed) for seed in range(4)])
+    forecast.finished(EpisodeConfig("cutin", "full", budget=1.0), 10.0)
+    assert (forecast.remaining_s(100), forecast.remaining_s(2)) == (10.0, 15.0)
+    assert forecast.remaining_s(0) == 30.0
+
+
+class Clock:
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_lines_come_after_ten_seconds_then_each_minute_or_twentieth(capsys):
+    clock = Clock()
+    lines = Lines(1000, clock)
+    for now, done in [(1, 0), (9, 5), (10, 6), (15, 500), (21, 501), (40, 510), (80, 520), (81, 530), (100, 579)]:
+        clock.now = now
+        lines(done, "6 min left" if now > 10 else "")
+    assert capsys.readouterr().err.splitlines() == [
+        "episodes 6/1000",
+        "episodes 501/1000, 6 min left",
+        "episodes 530/1000, 6 min left",
+    ]
+
+
+def test_the_reporter_counts_down_and_says_how_good_it_was():
+    clock, shown = Clock(), []
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(40)]
+    reporter = Reporter(Forecast(configs), lambda done, left: shown.append((done, left)), 50, clock)
+    reporter.playing(0)
+    reporter.playing(2)
+    for config in configs:
+        clock.now += 1.0
+        reporter.finished(config, {"wall_s": 2.0})
+    clock.now += 0.5
+    reporter.playing(2)
+    assert shown[:3] == [(10, "no worker is connected"), (10, ""), (11, "39 s left")]
+    assert shown[-1] == (50, "0 s left")
+    assert reporter.summary() == "40 episodes took 40 s; 40 s predicted after 5%"
+
+
+def test_an_episode_that_fails_is_counted_and_takes_no_time():
+    shown = []
+    configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
+    reporter = Reporter(Forecast(configs), lambda done, left: shown.append((done, left)), 3, Clock())
+    reporter.playing(1)
+    reporter.finished(configs[0], None)
+    assert shown[-1] == (1, "0 s left")
+    assert reporter.summary() == "3 episodes took 0 s"
+
+
+@pytest.mark.parametrize(
+    ("duration", "text"), [(0.4, "0 s"), (89.4, "89 s"), (90, "2 min"), (3600, "60 min"), (12000, "3 h 20 min")]
+)
+def test_durations_as_people_say_them(duration, text):
+    assert spoken(duration) == text
