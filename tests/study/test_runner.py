@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -22,16 +23,45 @@ SHORT = (("duration_s", 0.3),)
 MEASURED = {"wall_s", "peak_rss_mb"}
 
 THIRD_PARTY = """
-import os
+import os, signal
+from pathlib import Path
 from care_sim.policies.history import History
 
 class Dies(History):
     def demand(self, belief):
         os._exit(3)
 
+class KilledOnce(History):
+    def demand(self, belief):
+        mark = Path(__file__).with_name("killed")
+        if not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().demand(belief)
+
 class Raises(History):
     def demand(self, belief):
-        raise RuntimeError("no idea")
+        raise RuntimeError("no idea," + chr(10) + " at all")
+
+class Odd(Exception):
+    def __init__(self, one, two):
+        super().__init__(f"{one} {two}")
+
+class RaisesOddly(History):
+    def demand(self, belief):
+        raise Odd("hard to", "unpickle")
+
+class Exits(History):
+    def demand(self, belief):
+        raise SystemExit(4)
+"""
+ENTRY_POINTS = """
+[care_sim.policies]
+dies = misbehaving:Dies
+killed-once = misbehaving:KilledOnce
+raises = misbehaving:Raises
+raises-oddly = misbehaving:RaisesOddly
+exits = misbehaving:Exits
 """
 
 
@@ -43,10 +73,9 @@ def third_party(tmp_path, monkeypatch):
     info.mkdir(parents=True)
     (site / "misbehaving.py").write_text(THIRD_PARTY)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: misbehaving\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        "[care_sim.policies]\ndies = misbehaving:Dies\nraises = misbehaving:Raises\n"
-    )
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
     monkeypatch.syspath_prepend(site)
+    return site
 
 
 def short(policies, seeds=(0,), budgets=(0.1,)):
@@ -134,15 +163,56 @@ def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_pat
     assert [row["digest"] for row in read_rows(tmp_path / ROWS)] == [config.digest() for config in configs]
 
 
-def test_a_dead_worker_costs_only_its_own_episode(third_party, tmp_path):
-    configs = short(["history", "dies", "care", "raises", "random"])
-    failures = conduct(configs, tmp_path, workers=2)
-    reasons = {failure.config.policy: str(failure) for failure in failures}
-    assert set(reasons) == {"dies", "raises"}
-    assert reasons["dies"] == "dartout dies 0.1 seed 0 scenario.duration_s=0.3: the worker process died"
-    assert reasons["raises"].endswith("RuntimeError: no idea")
-    assert [row["policy"] for row in read_rows(tmp_path / ROWS)] == ["history", "care", "random"]
-    assert conduct(configs[:1], tmp_path, workers=1) == []
+def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
+    configs = short(["history", "dies", "care", "raises", "raises-oddly", "exits", "random"])
+    audience = Counting()
+    with Journal(tmp_path / JOURNAL) as journal:
+        failures = run_all(configs, journal, 2, audience=audience)
+        kept = {config for config in configs if config.digest() in journal}
+    assert {failure.config.policy: failure.reason for failure in failures} == {
+        "dies": "the worker process died",
+        "raises": "RuntimeError: no idea, at all",
+        "raises-oddly": "Odd: hard to unpickle",
+        "exits": "SystemExit: 4",
+    }
+    assert str(failures[0]).startswith(f"dartout {failures[0].config.policy} 0.1 seed 0 scenario.duration_s=0.3: ")
+    assert {config.policy for config in kept} == {"history", "care", "random"}
+    assert Counter(audience.ended) == Counter((config, config in kept) for config in configs)
+
+
+def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
+    configs = short(["history", "killed-once", "care", "random"])
+    audience = Counting()
+    with Journal(tmp_path / JOURNAL) as journal:
+        assert run_all(configs, journal, 2, audience=audience) == []
+        assert len(journal) == 4
+    assert (third_party / "killed").exists()
+    assert len((tmp_path / JOURNAL).read_text().splitlines()) == 4
+    assert Counter(audience.ended) == Counter((config, True) for config in configs)
+
+
+def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):
+    (failure,) = conduct(short(["history", "raises", "care"]), tmp_path, workers=1)
+    assert failure.config.policy == "raises"
+    assert [row["policy"] for row in read_rows(tmp_path / ROWS)] == ["history", "care"]
+    assert conduct(short(["history"]), tmp_path, workers=1) == []
+
+
+def test_a_worker_imports_nothing_of_tables_and_commands():
+    import_as_a_worker = "import sys, care_sim.study.episode, care_sim.envs.closed_loop; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", import_as_a_worker], capture_output=True, text=True, check=True)
+    needless = {"rich", "tyro", "torch", "dask", "open3d", "care_sim.study.report", "care_sim.study.figures"}
+    assert not needless & set(loaded.stdout.split())
+
+
+@pytest.mark.slow
+def test_the_memory_of_a_worker_stays_flat(tmp_path):
+    """Episode after episode in one process: what the twentieth needs, the fifth did already."""
+    configs = grid(["dense"], ["care", "full"], [0.1], range(20), scenario_parameters=SHORT)
+    with Journal(tmp_path / JOURNAL) as journal:
+        assert run_all(configs, journal, 1) == []
+        peaks = [journal[config.digest()]["peak_rss_mb"] for config in sorted(configs, key=lambda c: c.seed)]
+    assert peaks[-1] < peaks[9] + 5
 
 
 def listen_to_interrupts():
