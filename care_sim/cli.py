@@ -7,7 +7,6 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from importlib import metadata
 from typing import Any, NoReturn
 
 import tyro
@@ -20,14 +19,13 @@ BAD_INPUT, INTERRUPTED = 2, 130
 
 @dataclass(frozen=True)
 class Policies:
-    """List the policies."""
+    """List the policies with their tags, parameters and sources."""
 
     def __call__(self) -> int:
         """Run it."""
-        from care_sim.policies import BUILT_IN, policy_names
+        from care_sim.policies.listing import listing
 
-        for name in policy_names():
-            print(f"{name:12} {_summary(BUILT_IN[name]) if name in BUILT_IN else _installed(name)}")
+        print(*listing(), sep="\n")
         return 0
 
 
@@ -121,22 +119,9 @@ def _one_line(box: str) -> str:
 
 
 def _summary(thing: object) -> str:
-    """The line that the module of a policy or scenario begins with."""
+    """The line that the module of a scenario begins with."""
     module = inspect.getmodule(thing)
     return (inspect.getdoc(module) or "").partition("\n")[0]
-
-
-def _installed(name: str) -> str:
-    """What an installed package says of its policy, and which package it is; or why it cannot be loaded."""
-    from care_sim.policies import ENTRY_POINTS
-
-    (entry,) = metadata.entry_points(group=ENTRY_POINTS, name=name)
-    package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.module
-    try:
-        said = (inspect.getdoc(entry.load()) or "").partition("\n")[0]
-    except Exception as error:
-        said = f"Cannot be loaded: {type(error).__name__}: {' '.join(str(error).split())}"
-    return f"{said} [{package}]".lstrip()
 
 
 def _rounded(value: object) -> str:

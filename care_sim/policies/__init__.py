@@ -1,33 +1,52 @@
-"""Policies by name: the built-in ones and those that installed packages add.
+"""Policies by name: the built-in ones and those that installed packages add (`care_sim.policies.installed`)."""
 
-A package adds one through the entry-point group `care_sim.policies`: the entry's name is the policy's,
-its object a `Policy` subclass (or any callable taking a `Rig` and parameters).
-"""
-
-import inspect
-from collections.abc import Callable, Mapping
-from importlib import metadata
+from collections.abc import Iterable
 
 import gymnasium
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, MissingExtra, unknown
 from care_sim.policies.all_camera import AllCamera
 from care_sim.policies.base import Policy
+from care_sim.policies.beam_reduce import BeamReduce
 from care_sim.policies.care import Care
+from care_sim.policies.care_priority import CarePriority
 from care_sim.policies.care_sbf import CareSbf
+from care_sim.policies.farthest_points import FarthestPoints
 from care_sim.policies.full import Full
 from care_sim.policies.history import History
+from care_sim.policies.history_oracle import HistoryOracle
+from care_sim.policies.history_uniform import HistoryUniform
+from care_sim.policies.installed import ENTRY_POINTS, entries, load
+from care_sim.policies.parameters import Maker, check_parameters, is_privileged
 from care_sim.policies.random import Random
+from care_sim.policies.random_points import RandomPoints
+from care_sim.policies.uncertainty import Uncertainty
 
-ENTRY_POINTS = "care_sim.policies"
-BUILT_IN: dict[str, Callable[..., Policy]] = {
-    policy.name: policy for policy in (Full, Random, History, AllCamera, Care, CareSbf)
+__all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "make_policy", "policy_names", "tags_of", "usable"]
+
+BUILT_IN: dict[str, Maker] = {
+    policy.name: policy
+    for policy in (
+        Full,
+        Random,
+        History,
+        HistoryUniform,
+        Uncertainty,
+        BeamReduce,
+        AllCamera,
+        Care,
+        CarePriority,
+        CareSbf,
+        HistoryOracle,
+        RandomPoints,
+        FarthestPoints,
+    )
 }
 
 
 def policy_names() -> list[str]:
     """Names that `make_policy` knows: the built-in ones, then those of installed packages."""
-    return [*BUILT_IN, *sorted(set(_installed().names) - set(BUILT_IN))]
+    return [*BUILT_IN, *sorted(set(entries()) - set(BUILT_IN))]
 
 
 def check_policy(name: str) -> None:
@@ -36,45 +55,68 @@ def check_policy(name: str) -> None:
         raise unknown("policy", name, policy_names())
 
 
-def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
-    """A policy for an environment of CARE-Sim.
+def usable(names: Iterable[str]) -> tuple[list[str], dict[str, str]]:
+    """The names whose policies load, and for each of the others the reason why it does not.
 
-    Raises InvalidInput for an unknown name or parameter, an environment without a rig, or one that the
-    policy refuses.
+    Raises InvalidInput for an unknown name.
+    """
+    made, broken = [], {}
+    for name in names:
+        check_policy(name)
+        try:
+            maker(name)
+            made.append(name)
+        except InvalidInput as error:
+            broken[name] = str(error)
+    return made, broken
+
+
+def tags_of(name: str) -> tuple[str, ...]:
+    """What the policy is (of `care_sim.policies.base.TAGS`); nothing for one that cannot be loaded."""
+    try:
+        tags: tuple[str, ...] = getattr(maker(name), "tags", Policy.tags)
+    except InvalidInput:
+        return ()
+    return tags
+
+
+def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
+    """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its rig alone.
+
+    Raises InvalidInput for an unknown name or parameter, an environment without a rig, a policy that cannot
+    be loaded, or an environment that the policy refuses; MissingExtra for one whose library is not installed.
     """
     check_policy(name)
     try:
-        rig = env.get_wrapper_attr("rig")
-    except AttributeError as error:
-        raise InvalidInput(f"policy {name} needs an environment of CARE-Sim, got {env}") from error
-    make = BUILT_IN[name] if name in BUILT_IN else _load(_installed()[name])
-    _check_parameters(name, make, parameters)
+        make = maker(name)
+    except InvalidInput as error:
+        raise InvalidInput(f"policy {name} cannot be loaded: {error}") from error
+    given = [_of_environment(name, env, "rig")]
+    check_parameters(name, make, parameters)
+    if is_privileged(make):
+        given.append(_of_environment(name, env, "truth"))
     try:
-        return make(rig, **parameters)
-    except InvalidInput:
+        policy = make(*given, **parameters)
+    except (InvalidInput, MissingExtra):
         raise
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"policy {name} refuses {parameters}: {error}") from error
-
-
-def _load(entry: metadata.EntryPoint) -> Callable[..., Policy]:
-    try:
-        make: Callable[..., Policy] = entry.load()
     except Exception as error:
-        raise InvalidInput(f"policy {entry.name} ({entry.value}) cannot be loaded: {error}") from error
-    return make
+        raise InvalidInput(f"policy {name} refuses {parameters}: {type(error).__name__}: {error}") from error
+    if not isinstance(policy, Policy):
+        raise InvalidInput(f"policy {name} is no Policy but of type {type(policy).__name__}")
+    return policy
 
 
-def _check_parameters(name: str, make: Callable[..., Policy], parameters: Mapping[str, object]) -> None:
-    rig, *accepted = inspect.signature(make).parameters.values()
-    if rig.name in parameters:
-        raise InvalidInput(f"{rig.name} of policy {name} comes from the environment and is no parameter")
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
-        return
-    for parameter in parameters:
-        if parameter not in [known.name for known in accepted]:
-            raise unknown(f"parameter of policy {name}", parameter, [known.name for known in accepted])
+def maker(name: str) -> Maker:
+    """What makes the policy. Raises InvalidInput with the reason for one that cannot be loaded."""
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    if name not in entries():
+        raise unknown("policy", name, policy_names())
+    return load(entries()[name])
 
 
-def _installed() -> metadata.EntryPoints:
-    return metadata.entry_points(group=ENTRY_POINTS)
+def _of_environment(name: str, env: gymnasium.Env, attribute: str) -> object:
+    try:
+        return env.get_wrapper_attr(attribute)
+    except AttributeError as error:
+        raise InvalidInput(f"policy {name} needs an environment of CARE-Sim with a {attribute}, got {env}") from error

@@ -11,6 +11,7 @@ class AllCamera(Policy):
     """
 
     name = "all-camera"
+    source = "CARE paper, Sec. 5.1"
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the wedges of all detections."""

@@ -10,14 +10,20 @@ from care_sim.errors import InvalidInput
 from care_sim.grid import Cells
 from care_sim.types import Action, Belief, Demand, Observation, Rig
 
+TAGS = ("causal", "privileged", "non-causal", "learned")
+"""What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan, learned."""
+
 
 class Policy(ABC):
     """A scripted policy. Subclasses state the idea and its source, and implement `demand`.
 
-    `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction, keyframe.
+    `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction, keyframe. `tags` are
+    some of `TAGS`, `source` is the citation in one line.
     """
 
     name: ClassVar[str] = ""
+    tags: ClassVar[tuple[str, ...]] = ("causal",)
+    source: ClassVar[str] = ""
 
     def __init__(self, rig: Rig):
         self.rig = rig

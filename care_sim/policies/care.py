@@ -11,6 +11,7 @@ class Care(Policy):
     """
 
     name = "care"
+    source = "CARE paper, Sec. 4.2, Algorithm 2"
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the wedges of the residual."""

@@ -1,8 +1,7 @@
 """CARE with safety-bounded forgetting."""
 
-from dataclasses import fields
+from inspect import Parameter, Signature, signature
 
-from care_sim.errors import unknown
 from care_sim.forgetting import Forgetting, ForgettingRules
 from care_sim.policies.base import Policy
 from care_sim.residual import camera_layers
@@ -17,15 +16,18 @@ class CareSbf(Policy):
     """
 
     name = "care-sbf"
+    source = "CARE paper, Sec. 4.3, Algorithm 3"
 
     def __init__(self, rig: Rig, **rules: float):
         super().__init__(rig)
-        known = [field.name for field in fields(ForgettingRules)]
-        for rule in rules:
-            if rule not in known:
-                raise unknown("parameter of policy care-sbf", rule, known)
         self._rules = ForgettingRules(**rules)
         self.reset()
+
+    # The listing and the check of parameters read the rules and their defaults here.
+    __init__.__signature__ = Signature(  # type: ignore[attr-defined]
+        [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("self", "rig")]
+        + [rule.replace(kind=Parameter.KEYWORD_ONLY) for rule in signature(ForgettingRules).parameters.values()]
+    )
 
     def reset(self) -> None:
         """Forget the streaks."""

@@ -11,6 +11,7 @@ class Full(Policy):
     """Fires every cell. Belongs in an environment made with `budget=1.0` and refuses another."""
 
     name = "full"
+    source = "CARE paper, Sec. 5.2 (full-scan bound)"
 
     def __init__(self, rig: Rig):
         super().__init__(rig)

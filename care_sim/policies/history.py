@@ -10,6 +10,7 @@ class History(Policy):
     """
 
     name = "history"
+    source = "CARE paper, Sec. 4.1, after adaptive LiDAR scanning (2026)"
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls of all forecasts."""

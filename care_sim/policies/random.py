@@ -8,6 +8,7 @@ class Random(Policy):
     """Asks for nothing, so that the shared random floor spends the whole budget."""
 
     name = "random"
+    source = "CARE paper, Sec. 4.1, Algorithm 1 (the floor alone)"
 
     def demand(self, belief: Belief) -> Demand:
         """Nothing."""

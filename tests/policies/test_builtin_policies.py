@@ -179,7 +179,7 @@ def test_parameters_of_forgetting_reach_the_rules(environment):
 @pytest.mark.parametrize(
     ("name", "parameters", "named"),
     [
-        ("clairvoyant", {}, r"policy 'clairvoyant'; known: all-camera, care, care-sbf, full, history, random"),
+        ("clairvoyant", {}, r"policy 'clairvoyant'; known: all-camera, beam-reduce, care, care-priority"),
         ("care", {"boldness": 2}, "boldness"),
         ("care-sbf", {"k_save": 2}, r"'k_save'.*k_safe"),
     ],

@@ -1,0 +1,65 @@
+"""The policies as people read them: name, tags, what it does, parameters, source."""
+
+import inspect
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+from textwrap import wrap
+
+from care_sim.errors import InvalidInput
+from care_sim.policies import BUILT_IN, maker, policy_names, tags_of
+from care_sim.policies.installed import all_entries, entries, package_of
+from care_sim.policies.parameters import Maker, settable
+
+WIDTH = 80
+
+
+def listing() -> Iterator[str]:
+    """A paragraph a policy, then the entries of packages that another policy of their name hides."""
+    for name in policy_names():
+        yield _paragraph(name)
+    counting: dict[str, EntryPoint] = {}
+    for entry in all_entries():
+        first = counting.setdefault(entry.name, entry)
+        if entry.name in BUILT_IN:
+            yield _hidden(entry, "the built-in one")
+        elif first is not entry:
+            yield _hidden(entry, f"that of {package_of(first)}")
+
+
+def parameters_of(make: Maker) -> list[str]:
+    """The parameters as NAME=DEFAULT; a bare name must be given."""
+    return [
+        parameter.name if parameter.default is parameter.empty else f"{parameter.name}={parameter.default!r}"
+        for parameter in settable(make)
+        if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+    ]
+
+
+def _paragraph(name: str) -> str:
+    try:
+        make = maker(name)
+    except InvalidInput as error:
+        return _lines(f"{name} (broken)", f"{error} [{package_of(entries()[name])}]")
+    return _lines(
+        f"{name} ({', '.join(tags_of(name))})",
+        _summary(name, make),
+        " ".join(parameters_of(make)),
+        getattr(make, "source", ""),
+    )
+
+
+def _summary(name: str, make: Maker) -> str:
+    """The line that the module of a built-in policy begins with; of another its own, and its package."""
+    if name in BUILT_IN:
+        return (inspect.getdoc(inspect.getmodule(make)) or "").partition("\n")[0]
+    said = (make.__doc__ or "").strip().partition("\n")[0]
+    return f"{said} [{package_of(entries()[name])}]".strip()
+
+
+def _hidden(entry: EntryPoint, winner: str) -> str:
+    return _lines(f"{entry.name} (hidden)", f"Not used: {winner} has its name. [{package_of(entry)}]")
+
+
+def _lines(title: str, *texts: str) -> str:
+    indented = (line for text in texts for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    "))
+    return "\n".join([title, *indented])

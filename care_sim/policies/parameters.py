@@ -1,0 +1,40 @@
+"""What of a policy's arguments a user may set, and what comes from the environment."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+from care_sim.errors import InvalidInput, unknown
+from care_sim.policies.base import Policy
+from care_sim.policies.privileged import PrivilegedPolicy
+
+Maker: TypeAlias = Callable[..., Policy]
+"""A policy class, or another callable that takes a rig and parameters."""
+
+
+def is_privileged(make: Maker) -> bool:
+    """Whether truth is handed to it, after the rig."""
+    return inspect.isclass(make) and issubclass(make, PrivilegedPolicy)
+
+
+def settable(make: Maker) -> list[inspect.Parameter]:
+    """The parameters that follow the rig (and the truth)."""
+    return list(inspect.signature(make).parameters.values())[_given(make) :]
+
+
+def check_parameters(name: str, make: Maker, parameters: Mapping[str, object]) -> None:
+    """Raise InvalidInput for a parameter that the policy does not have or that is not the user's to set."""
+    for given in list(inspect.signature(make).parameters)[: _given(make)]:
+        if given in parameters:
+            raise InvalidInput(f"{given} of policy {name} comes from the environment and is no parameter")
+    accepted = settable(make)
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
+        return
+    known = [parameter.name for parameter in accepted]
+    for parameter in parameters:
+        if parameter not in known:
+            raise unknown(f"parameter of policy {name}", parameter, known)
+
+
+def _given(make: Maker) -> int:
+    return 2 if is_privileged(make) else 1

@@ -1,0 +1,36 @@
+"""Random point sampling of the full scan: saves no sensing."""
+
+import numpy as np
+
+from care_sim.errors import check_whole
+from care_sim.frames import Floats
+from care_sim.grid import Cells
+from care_sim.policies.matched_fraction import MatchedFraction
+from care_sim.truth import Truth
+from care_sim.types import Rig
+
+
+class RandomPoints(MatchedFraction):
+    """The first reference of the paper (Sec. 5.1): a matched fraction of the full cloud, drawn at random.
+
+    `seed` and the number of the keyframe decide the draw.
+    """
+
+    name = "random-points"
+    source = "CARE paper, Sec. 5.1 (random point sampling)"
+
+    def __init__(self, rig: Rig, truth: Truth, seed: int = 0):
+        super().__init__(rig, truth)
+        check_whole("seed", seed, 0)
+        self._seed = seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin to count the keyframes."""
+        self._keyframe = 0
+
+    def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
+        """`count` cells at random."""
+        rng = np.random.default_rng((self._seed, self._keyframe))
+        self._keyframe += 1
+        return rng.choice(cells, count, replace=False)
