@@ -95,7 +95,8 @@ def _connect(address: str) -> "Client":
         from dask.distributed import Client
     except ImportError as error:
         raise MissingExtra("a cluster needs the extra 'cluster': pip install 'care-sim[cluster]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for logger in ("distributed", "distributed.client"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout="10s")
     except (OSError, ValueError) as error:

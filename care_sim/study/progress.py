@@ -5,6 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from datetime import timedelta
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -73,9 +74,9 @@ class Reporter(Audience):
 
     def summary(self) -> str:
         """How long it took, and how long it should have."""
-        took = f"{self._new} episodes took {spoken(self._clock() - self._started)}"
+        took = f"{self._new} episodes took {_exact(self._clock() - self._started)}"
         many = self._new >= 1 / EARLY
-        return f"{took}; {spoken(self._predicted_s)} predicted after {EARLY:.0%}" if many else took
+        return f"{took}; {_exact(self._predicted_s)} predicted after {EARLY:.0%}" if many else took
 
     def _predict(self) -> None:
         self._end = self._clock() + self._forecast.remaining_s(self._workers)
@@ -118,3 +119,7 @@ def spoken(seconds: float) -> str:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def _exact(seconds: float) -> str:
+    return str(timedelta(seconds=round(seconds)))

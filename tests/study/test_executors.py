@@ -15,8 +15,9 @@ import pytest
 from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.config import EpisodeConfig, grid
 from care_sim.study.episode import run_episode
-from care_sim.study.executors import ClusterLost, cluster
+from care_sim.study.executors import cluster
 from care_sim.study.journal import Journal
+from care_sim.study.report import JOURNAL
 from care_sim.study.runner import Audience, run_all
 
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -145,17 +146,22 @@ def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask
 
 
 @pytest.mark.slow
-def test_a_lost_scheduler_is_one_line_and_keeps_what_was_played(dask_cluster, tmp_path, capfd):
-    configs = grid(["dartout"], ["history"], [0.1], range(200), scenario_parameters=SHORT)
+def test_a_lost_scheduler_is_one_line_and_keeps_what_was_played(dask_cluster, tmp_path):
     dask_cluster.worker()
-    with Journal(tmp_path / "journal.jsonl") as journal:
-        with running(configs, journal, dask_cluster.address) as ending:
-            until(lambda: len(journal) >= 2)
-            dask_cluster.scheduler.kill()
-        assert isinstance(ending["error"], ClusterLost)
-        assert str(ending["error"]).startswith(f"the dask scheduler at {dask_cluster.address} is gone; finished")
-        assert 2 <= len(journal) < 200
-    assert capfd.readouterr().err == ""
+    journal = tmp_path / "out" / JOURNAL
+    grid_of_200 = ["--scenarios", "dartout", "--policies", "history", "--seeds", "200"]
+    options = ["--out", str(journal.parent), "--cluster", dask_cluster.address]
+    command = [sys.executable, "-c", "from care_sim.cli import main; main()", "sweep", *grid_of_200, *options]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as sweep:
+        until(lambda: journal.exists() and journal.read_text().count("\n") >= 2)
+        dask_cluster.scheduler.kill()
+        _, complaint = sweep.communicate(timeout=40)
+    gone = f"care-sim: the dask scheduler at {dask_cluster.address} is gone; finished episodes are kept, "
+    assert complaint.splitlines()[-1] == f"{gone}the same command goes on from there"
+    assert all(line.startswith("episodes ") for line in complaint.splitlines()[:-1])
+    assert sweep.returncode == 2
+    with Journal(journal) as kept:
+        assert 2 <= len(kept) < 200
 
 
 def installed(site):

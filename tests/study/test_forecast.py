@@ -126,7 +126,7 @@ def test_the_reporter_counts_down_and_says_how_good_it_was():
     reporter.playing(2)
     assert shown[:3] == [(10, "no worker is connected"), (10, ""), (11, "39 s left")]
     assert shown[-1] == (50, "0 s left")
-    assert reporter.summary() == "40 episodes took 40 s; 40 s predicted after 5%"
+    assert reporter.summary() == "40 episodes took 0:00:40; 0:00:40 predicted after 5%"
 
 
 def test_an_episode_that_fails_is_counted_and_takes_no_time():
@@ -136,7 +136,7 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
     reporter.playing(1)
     reporter.finished(configs[0], None)
     assert shown[-1] == (1, "0 s left")
-    assert reporter.summary() == "3 episodes took 0 s"
+    assert reporter.summary() == "3 episodes took 0:00:00"
 
 
 @pytest.mark.parametrize(
