@@ -1,5 +1,6 @@
 """Paired bootstrap: how sure a difference is between two policies that met the same episodes."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -34,21 +35,24 @@ def paired_difference(
     """
     a, b = np.atleast_1d(np.asarray(ours, float)), np.atleast_1d(np.asarray(theirs, float))
     differences = _differences(a, b)
-    mean = float(differences.mean())
     if np.ptp(differences) <= 1e-12 * max(1.0, float(np.abs(a).max())):
+        mean = float(differences.mean())
         return Interval(mean, mean, mean)
+    return _resampled(tuple(differences.tolist()), confidence, resamples, seed)
+
+
+@lru_cache(maxsize=10_000)
+def _resampled(differences: tuple[float, ...], confidence: float, resamples: int, seed: int) -> Interval:
     result = stats.bootstrap(
-        (a, b),
-        lambda x, y, axis: np.mean(x - y, axis=axis),
-        paired=True,
-        vectorized=True,
+        (np.array(differences),),
+        np.mean,
         n_resamples=resamples,
         confidence_level=confidence,
         method="percentile",
         rng=np.random.default_rng(seed),
     )
     low, high = result.confidence_interval
-    return Interval(mean, float(low), float(high))
+    return Interval(float(np.mean(differences)), float(low), float(high))
 
 
 def _differences(ours: Floats, theirs: Floats) -> Floats:

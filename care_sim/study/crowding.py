@@ -1,16 +1,33 @@
 """Where the all-camera reserve collapses as the number of tracked vehicles in the dense street grows."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
+from care_sim.evaluation.censoring import quartiles
 from care_sim.scenarios.dense import PLACES, Dense
 from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
+from care_sim.study.entries import interval, mean, median, percent
 from care_sim.study.episode import Row
+from care_sim.study.table import Table
 
-BUDGETS = (0.02, 0.03, 0.04, 0.05)
+BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
 VEHICLES = range(len(PLACES) + 1)
 POLICIES = ("all-camera", "care", "full")
 COLUMN = "scenario.vehicles"
 """The column of the rows that the study varies."""
+COLLAPSE_M = 3.0
+"""All-camera counts as collapsed where CARE detects this much earlier and the interval excludes zero."""
+
+
+def configurations(seeds: Sequence[int]) -> list[EpisodeConfig]:
+    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221 configurations a seed."""
+    return [
+        config
+        for vehicles in VEHICLES
+        for config in grid(["dense"], POLICIES, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),))
+    ]
 
 
 def vehicles_of(row: Row) -> int:
@@ -19,10 +36,77 @@ def vehicles_of(row: Row) -> int:
     return Dense.vehicles if vehicles is None else int(vehicles)
 
 
-def configurations(seeds: Sequence[int]) -> list[EpisodeConfig]:
-    """The dense street with 0 to 12 standing vehicles, at 2, 3, 4 and 5%: 117 configurations a seed."""
+@dataclass(frozen=True)
+class Crowd:
+    """The rows of a crowding study by vehicles, policy and budget."""
+
+    rows: Sequence[Row]
+
+    @cached_property
+    def cells(self) -> dict[tuple[int, str, float], list[Row]]:
+        """The rows of every cell."""
+        cells: dict[tuple[int, str, float], list[Row]] = {}
+        for row in self.rows:
+            cells.setdefault((vehicles_of(row), row["policy"], row["budget"]), []).append(row)
+        return cells
+
+    @cached_property
+    def budgets(self) -> list[float]:
+        """Budgets of the policies that have one."""
+        return sorted({budget for _, policy, budget in self.cells if policy != "full"})
+
+    @cached_property
+    def counts(self) -> list[int]:
+        """Numbers of standing vehicles."""
+        return sorted({vehicles for vehicles, _, _ in self.cells})
+
+    def gap(self, vehicles: int, budget: float) -> Contrast | None:
+        """First detection of all-camera minus CARE, metres; negative where all-camera is later."""
+        camera, care = (self.cells.get((vehicles, policy, budget)) for policy in ("all-camera", "care"))
+        return contrast(DETECTION, camera, care)
+
+    def median(self, vehicles: int, policy: str, budget: float) -> str:
+        """A median first detection, as text."""
+        return median(quartiles([detection(row) for row in self.cells.get((vehicles, policy, budget), ())]))
+
+    def collapsed(self, budget: float) -> list[int]:
+        """Numbers of vehicles at which all-camera has collapsed."""
+        gaps = {vehicles: self.gap(vehicles, budget) for vehicles in self.counts}
+        return [n for n, gap in gaps.items() if gap and gap.excludes_zero and gap.mean <= -COLLAPSE_M]
+
+
+def crowding_tables(rows: Sequence[Row]) -> list[Table]:
+    """All-camera minus CARE by standing vehicles and budget, its intervals, and the medians behind them."""
+    crowd = Crowd(rows)
+    gaps = [(str(n), *(mean(crowd.gap(n, budget)) for budget in crowd.budgets)) for n in crowd.counts]
+    intervals = [(str(n), *(interval(crowd.gap(n, budget)) for budget in crowd.budgets)) for n in crowd.counts]
+    columns = ("vehicles", *map(percent, crowd.budgets))
+    title = "dense, by standing vehicles: "
     return [
-        config
-        for vehicles in VEHICLES
-        for config in grid(["dense"], POLICIES, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),))
+        Table(f"{title}first detection of all-camera minus care, m", columns, tuple(gaps), (_collapse_note(crowd),)),
+        Table(f"{title}the same with intervals", columns, tuple(intervals), terminal=False),
+        _medians_table(f"{title}median first detection, care/all-camera, m", crowd),
     ]
+
+
+def _medians_table(title: str, crowd: Crowd) -> Table:
+    lines = [
+        (str(n), *(_pair(crowd, n, budget) for budget in crowd.budgets), crowd.median(n, "full", 1.0))
+        for n in crowd.counts
+    ]
+    columns = ("vehicles", *map(percent, crowd.budgets), "full")
+    return Table(title, columns, tuple(lines), ("n.d.: not detected.",), terminal=False)
+
+
+def _pair(crowd: Crowd, vehicles: int, budget: float) -> str:
+    medians = (crowd.median(vehicles, policy, budget) for policy in ("care", "all-camera"))
+    return "/".join(medians).replace("not detected", "n.d.")
+
+
+def _collapse_note(crowd: Crowd) -> str:
+    found = [(percent(budget), crowd.collapsed(budget)) for budget in crowd.budgets]
+    listed = "; ".join(f"{budget}: {', '.join(map(str, counts)) or 'none'}" for budget, counts in found)
+    return (
+        f"All-camera has collapsed (at least {COLLAPSE_M:.0f} m later than care on average, interval without zero), by "
+        f"budget, at these numbers of vehicles: {listed}."
+    )

@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.summary import Key, policy_of, setting_of
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sbf")
 BUDGETED = ("history", *CAMERA_POLICIES)
@@ -23,6 +25,13 @@ def configurations(seeds: Sequence[int]) -> list[EpisodeConfig]:
         *grid(["dartout"], BUDGETED, (0.10,), seeds, false_negative_rates=(0.2, 0.4)),
         *grid(["dartout"], CAMERA_POLICIES, (0.10,), seeds, camera_latencies=(1, 2)),
     ]
+
+
+@cache
+def paper_cells() -> frozenset[Key]:
+    """Setting, policy and budget of every cell of the study."""
+    rows = [config.row() for config in configurations([0])]
+    return frozenset((setting_of(row), policy_of(row), row["budget"]) for row in rows)
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,17 @@
 """Every statement of the paper's Sec. 5.6 beside what a study measured, as pure functions of its rows.
 
-Numbers are medians in metres. Statements that the paper makes in words are put as a bound, which they name.
+Numbers are medians in metres; a median that is not detected ranks below every other. Statements that the paper
+makes in words are put as a bound, which they name.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from care_sim.study.entries import median
 from care_sim.study.episode import Row
-from care_sim.study.paper import CAMERA_POLICIES
+from care_sim.study.paper import CAMERA_POLICIES, paper_cells
 from care_sim.study.summary import Cell, summarise
-from care_sim.study.tables import paper_cells
 
 Cells = dict[tuple[str, str, float, str], Cell]
 """By scenario, policy, budget and camera fault ('' without one)."""
@@ -46,9 +48,9 @@ def _key(cell: Cell) -> tuple[str, str, float, str]:
 def _dartout(cells: Cells) -> list[Statement]:
     camera = [cells["dartout", policy, 0.1, ""] for policy in CAMERA_POLICIES]
     history, full = cells["dartout", "history", 0.1, ""], cells["dartout", "full", 1.0, ""]
-    gaps = [abs(_median(cell) - _median(full)) for cell in camera]
+    gaps = [_gap(cell, full) for cell in camera]
     passes = [_pass(cell) for cell in camera]
-    latest = min(map(_median, camera))
+    latest = min(camera, key=_median)
     at = "dart-out 10%: "
     return [
         Statement(
@@ -60,14 +62,14 @@ def _dartout(cells: Cells) -> list[Statement]:
         Statement(
             at + "camera policies detect within 0.3 m of full",
             "about 15",
-            f"{_list(camera)}, full {_median(full):.1f}",
-            round(max(gaps), 1) <= 0.3,
+            f"{_list(camera)}, full {_shown(full)}",
+            max(gaps) <= 0.3,
         ),
         Statement(
             at + "history detects at least 2 m later",
             "11.9 against about 15",
-            f"{_median(history):.1f} against {latest:.1f}",
-            latest - _median(history) >= 2.0,
+            f"{_shown(history)} against {_shown(latest)}",
+            _median(latest) - _median(history) >= 2.0,
         ),
         Statement(
             at + "history brakes in 3 of 5 episodes, to a tenth",
@@ -91,30 +93,28 @@ def _dense(cells: Cells) -> list[Statement]:
         Statement(
             "dense 3%: care detects within 0.5 m of full",
             "15.1, full 15.1",
-            f"{_median(care):.1f}, full {_median(full):.1f}",
-            abs(_median(care) - _median(full)) <= 0.5,
+            f"{_shown(care)}, full {_shown(full)}",
+            _gap(care, full) <= 0.5,
         ),
         Statement(
             "dense 3%: all-camera detects at least 3 m later than care",
             "10.3 against 15.1",
-            f"{_median(camera):.1f} against {_median(care):.1f}",
+            f"{_shown(camera)} against {_shown(care)}",
             _median(care) - _median(camera) >= 3.0,
         ),
         Statement(
             "dense from 5%: all-camera and care within 0.5 m of each other",
             "they converge",
-            ", ".join(f"{_median(a):.1f} against {_median(b):.1f} at {100 * a.budget:.0f}%" for a, b in pairs),
-            all(abs(_median(a) - _median(b)) <= 0.5 for a, b in pairs),
+            ", ".join(f"{_shown(a)} against {_shown(b)} at {100 * a.budget:.0f}%" for a, b in pairs),
+            all(_gap(a, b) <= 0.5 for a, b in pairs),
         ),
     ]
 
 
 def _cutin(cells: Cells) -> Statement:
     group = [cell for cell in cells.values() if cell.setting.scenario == "cutin"]
-    medians = [_median(cell) for cell in group]
-    return Statement(
-        "cut-in: all policies within 1 m", "no separation", _list(group), max(medians) - min(medians) <= 1.0
-    )
+    first, last = max(group, key=_median), min(group, key=_median)
+    return Statement("cut-in: all policies within 1 m", "no separation", _list(group), _gap(first, last) <= 1.0)
 
 
 def _faults(cells: Cells) -> list[Statement]:
@@ -123,7 +123,7 @@ def _faults(cells: Cells) -> list[Statement]:
     for text, name in (("missed detections up to 0.4", "false_negative_rate"), ("latency up to 2", "camera_latency")):
         faults = [fault for _, policy, _, fault in cells if fault.startswith(name) and policy == "care"]
         pairs = [(_slowest(cells, f), cells.get(("dartout", "history", 0.1, f), _history(cells))) for f in faults]
-        measured = (f"{_median(a):.1f} against {_median(b):.1f}" for a, b in pairs)
+        measured = (f"{_shown(a)} against {_shown(b)}" for a, b in pairs)
         agrees = all(_median(a) > _median(b) for a, b in pairs)
         said = f"dart-out 10%: {text} leaves every camera policy before history"
         made.append(Statement(said, "order unchanged", ", ".join(measured), agrees))
@@ -144,12 +144,23 @@ def _collisions(cells: Sequence[Cell]) -> Statement:
 
 
 def _median(cell: Cell) -> float:
-    return round(cell.detection.median, 1)
+    return -math.inf if cell.detection.median is None else round(cell.detection.median, 1)
+
+
+def _gap(ours: Cell, theirs: Cell) -> float:
+    """Distance between two medians; no gap is known where one is not detected."""
+    gap = abs(_median(ours) - _median(theirs))
+    return round(gap, 1) if math.isfinite(gap) else math.inf
+
+
+def _shown(cell: Cell) -> str:
+    return median(cell.detection)
 
 
 def _pass(cell: Cell) -> float:
-    return round(cell.closest_pass.median, 1) if cell.closest_pass else 0.0
+    values = cell.closest_pass
+    return round(values.median, 1) if values and values.median is not None else 0.0
 
 
 def _list(cells: Sequence[Cell]) -> str:
-    return ", ".join(f"{cell.policy} {_median(cell):.1f}" for cell in cells)
+    return ", ".join(f"{cell.policy} {_shown(cell)}" for cell in cells)

@@ -1,20 +1,16 @@
-"""What the episodes of one cell of a study say together: medians, counts, paired differences.
+"""What the episodes of one cell of a study say together: medians, counts, regret.
 
 Rows of one scenario under the same conditions form a setting; in it, the rows of a policy at a budget
-form a cell. Policies are compared seed by seed, because a seed fixes world, faults and floor.
-
-A first-sighting actor that is never detected has no detection distance. It ranks as 0 m, later than any
-detection, in medians, quartiles and differences, and is counted beside them.
+form a cell. Actors that were never detected are handled as `care_sim.evaluation.censoring` says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
-
-from care_sim.evaluation.bootstrap import Interval, paired_difference
+from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.study.config import PLAIN_FIELDS, EpisodeConfig
+from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
 from care_sim.study.episode import Row
 
 Conditions = tuple[tuple[str, Any], ...]
@@ -48,29 +44,25 @@ class Setting:
         return Setting(self.scenario, tuple(pair for pair in self.conditions if pair[0] not in _UNFELT_BY_FULL))
 
 
-@dataclass(frozen=True)
-class Quartiles:
-    """Lower quartile, median and upper quartile, and the number of values."""
-
-    low: float
-    median: float
-    high: float
-    count: int
+Key = tuple[Setting, str, float]
+"""Setting, policy with its parameters, budget."""
+Groups = Mapping[Key, Sequence[Row]]
 
 
 @dataclass(frozen=True)
 class Cell:
     """A policy at a budget in a setting. Distances in metres.
 
-    `detection` ranks the `never` detected at 0 m; `closest_pass` and `clearance` are over the episodes
-    in which the actor came into the camera's view, None when there are none. `vs_full` and `vs_care` are
-    this policy's mean detection distance minus that of `full` or `care`, paired by seed: positive when this
-    one detects earlier, None without shared seeds.
+    `tags` of the policy; `never` counts the episodes without a detection; `closest_pass` and `clearance` are over
+    the episodes in which the actor came into the camera's view, None when there are none. `regret`: detection
+    distance of the full scan of the same world minus this policy's, 0 at best, and `as_full` the episodes in which
+    the policy detects no later; None for `full` and without it.
     """
 
     setting: Setting
     policy: str
     budget: float
+    tags: tuple[str, ...]
     episodes: int
     never: int
     detection: Quartiles
@@ -78,8 +70,8 @@ class Cell:
     closest_pass: Quartiles | None
     clearance: Quartiles | None
     collisions: int
-    vs_full: Interval | None
-    vs_care: Interval | None
+    regret: Contrast | None
+    as_full: int | None
 
 
 def setting_of(row: Row) -> Setting:
@@ -95,54 +87,61 @@ def policy_of(row: Row) -> str:
     return " ".join([row["policy"], *given])
 
 
-def detection_distance(row: Row) -> float:
-    """Metres; 0 for an actor that was never detected, later than any detection."""
-    distance = row["detection_distance_m"]
-    return 0.0 if distance is None else float(distance)
+def tags_of_row(row: Row) -> tuple[str, ...]:
+    """Tags of the row's policy, such as privileged; none in a row that was not annotated."""
+    return tuple((row.get("tags") or "").split("+"))
 
 
-def quartiles(values: Sequence[float]) -> Quartiles | None:
-    """Quartiles of values, linearly interpolated; None without values."""
-    if not values:
-        return None
-    low, median, high = np.quantile(values, (0.25, 0.5, 0.75)).tolist()
-    return Quartiles(low, median, high, len(values))
+def grouped(rows: Sequence[Row]) -> dict[Key, list[Row]]:
+    """The rows of every cell, in the order of their first rows."""
+    groups: dict[Key, list[Row]] = {}
+    for row in rows:
+        groups.setdefault((setting_of(row), policy_of(row), row["budget"]), []).append(row)
+    return groups
+
+
+def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
+    """The full scans of the same worlds, None where they were not run."""
+    return groups.get((setting.for_full(), "full", 1.0))
 
 
 def summarise(rows: Sequence[Row]) -> list[Cell]:
     """The cells of a study, in the order of their first rows, settings kept together."""
-    groups: dict[tuple[Setting, str, float], list[Row]] = {}
-    for row in rows:
-        groups.setdefault((setting_of(row), policy_of(row), row["budget"]), []).append(row)
+    groups = grouped(rows)
     settings = list(dict.fromkeys(setting for setting, _, _ in groups))
     cells = [_cell(key, groups) for key in groups]
     return sorted(cells, key=lambda cell: (settings.index(cell.setting), cell.budget))
 
 
-def _cell(key: tuple[Setting, str, float], groups: dict[tuple[Setting, str, float], list[Row]]) -> Cell:
+def _cell(key: Key, groups: Groups) -> Cell:
     setting, policy, budget = key
     rows = groups[key]
-    detection = quartiles([detection_distance(row) for row in rows])
-    assert detection is not None
-    full, care = groups.get((setting.for_full(), "full", 1.0)), groups.get((setting, "care", budget))
+    detections = quartiles([detection(row) for row in rows])
+    assert detections is not None
+    full = None if policy == "full" else full_of(groups, setting)
+    regret = contrast(DETECTION, full, rows)
     return Cell(
         setting=setting,
         policy=policy,
         budget=budget,
+        tags=tags_of_row(rows[0]),
         episodes=len(rows),
-        never=sum(row["detection_distance_m"] is None for row in rows),
-        detection=detection,
+        never=sum(detection(row).censored for row in rows),
+        detection=detections,
         braked=sum(row["braked"] for row in rows),
-        closest_pass=quartiles([row["min_distance_m"] for row in rows if row["min_distance_m"] is not None]),
-        clearance=quartiles([row["clearance_m"] for row in rows if row["clearance_m"] is not None]),
+        closest_pass=_quartiles(rows, "min_distance_m"),
+        clearance=_quartiles(rows, "clearance_m"),
         collisions=sum(row["collision"] for row in rows),
-        vs_full=None if policy == "full" else difference(rows, full),
-        vs_care=None if policy == "care" else difference(rows, care),
+        regret=regret,
+        as_full=_no_later(rows, full or ()) if regret else None,
     )
 
 
-def difference(ours: Sequence[Row] | None, theirs: Sequence[Row] | None) -> Interval | None:
-    """Mean detection distance of `ours` minus `theirs`, paired by seed; None without shared seeds."""
-    a, b = ({row["seed"]: detection_distance(row) for row in rows or ()} for rows in (ours, theirs))
-    seeds = sorted(set(a) & set(b))
-    return paired_difference([a[s] for s in seeds], [b[s] for s in seeds]) if seeds else None
+def _quartiles(rows: Sequence[Row], column: str) -> Quartiles | None:
+    return quartiles([Reading(row[column]) for row in rows if row[column] is not None])
+
+
+def _no_later(rows: Sequence[Row], full: Sequence[Row]) -> int:
+    bounds = {row["seed"]: detection(row).value for row in full}
+    found = {row["seed"]: detection(row) for row in rows if row["seed"] in bounds}
+    return sum(not reading.censored and reading.value >= bounds[seed] for seed, reading in found.items())

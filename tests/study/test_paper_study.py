@@ -28,4 +28,4 @@ def test_every_published_figure_belongs_to_a_cell_that_is_run():
 def test_crowding_varies_the_vehicles_from_none_to_all():
     configs = crowding.configurations([0])
     assert {dict(c.scenario_parameters)["vehicles"] for c in configs} == set(range(13))
-    assert len(configs) == 13 * (2 * 4 + 1)
+    assert len(configs) == 13 * (2 * 8 + 1)

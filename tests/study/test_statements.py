@@ -17,6 +17,7 @@ def outcome(config):
     history = config.policy == "history"
     return {
         "detection_distance_m": 20.0 if config.scenario == "cutin" else distance(config),
+        "undetected_to_m": None,
         "braked": not history or config.seed < 3,
         "min_distance_m": 4.0 if history else 5.7,
         "clearance_m": 3.0,
@@ -40,6 +41,7 @@ def test_the_papers_own_figures_agree_with_every_statement():
     assert differing(STUDY) == []
 
 
+MISSED = {"detection_distance_m": None, "undetected_to_m": 3.0}
 DARTOUT = {"scenario": "dartout", "budget": 0.1, "false_negative_rate": 0.0, "camera_latency": 0}
 
 
@@ -60,7 +62,9 @@ DARTOUT = {"scenario": "dartout", "budget": 0.1, "false_negative_rate": 0.0, "ca
         ),
         ({"scenario": "dense", "policy": "care", "budget": 0.2}, {"detection_distance_m": 16.0}, "dense from 5%"),
         ({"scenario": "cutin", "policy": "history"}, {"detection_distance_m": 18.0}, "cut-in"),
-        ({"policy": "care", "false_negative_rate": 0.4}, {"detection_distance_m": None}, "missed detections"),
+        ({"policy": "care", "false_negative_rate": 0.4}, MISSED, "missed detections"),
+        ({"scenario": "dense", "policy": "care", "budget": 0.2}, MISSED, "dense from 5%"),
+        ({"scenario": "cutin", "policy": "care"}, MISSED, "cut-in"),
         ({"policy": "care", "camera_latency": 2}, {"detection_distance_m": 9.0}, "latency"),
         ({"scenario": "cutin", "policy": "full", "seed": 0}, {"collision": True}, "collides"),
     ],
@@ -74,6 +78,12 @@ def test_both_sides_are_shown():
     texts = [str(statement) for statement in statements(STUDY)]
     assert "agrees: dense 3%: all-camera detects at least 3 m later than care. Paper: 10.3 against 15.1. " in texts[6]
     assert texts[6].endswith("Here: 10.3 against 15.1.")
+
+
+def test_an_undetected_median_ranks_last_and_is_said():
+    missed = changed(DARTOUT | {"policy": "history"}, **MISSED)
+    assert differing(missed) == []
+    assert "Here: not detected against 15.1." in str(statements(missed)[2])
 
 
 def test_a_part_of_the_study_makes_no_statement():

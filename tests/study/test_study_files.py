@@ -11,7 +11,7 @@ from care_sim.study.rows import read_rows, write_rows
 from care_sim.types import Outcome
 
 ROWS = [
-    EpisodeConfig("dense", policy).row() | asdict(Outcome(distance, True, None, 2.5, False, None, 98280))
+    EpisodeConfig("dense", policy).row() | asdict(Outcome(distance, 3.0, True, None, 2.5, False, None, 98280))
     for policy, distance in (("history", None), ("care", 1 / 3))
 ]
 

@@ -1,137 +1,108 @@
+"""Tables of a sweep."""
+
 import io
 
 import pytest
+from made_rows import STUDY, row, rows
 from rich.console import Console
 
-from care_sim.study.config import EpisodeConfig, grid
-from care_sim.study.figures import study_figures
-from care_sim.study.summary import difference, quartiles, setting_of, summarise
-from care_sim.study.tables import crowding_table, study_tables
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.summary import setting_of
+from care_sim.study.table import Bold
+from care_sim.study.tables import COLUMNS, sweep_tables
+
+ORACLE = rows("history", [9.0, 10.0, 11.0, 12.0, 13.0], changes={"policy": "history-oracle", "tags": "privileged"})
 
 
-def row(config, distance, **changes):
-    outcome = {
-        "detection_distance_m": distance,
-        "braked": True,
-        "min_distance_m": 5.0,
-        "clearance_m": 3.0,
-        "collision": False,
-        "impact_speed_mps": None,
-        "rays_fired": 1000,
-    }
-    return config.row() | outcome | changes
+def levels(study=STUDY):
+    return {line[1]: dict(zip(COLUMNS, line, strict=True)) for line in sweep_tables(study)[0].rows}
 
 
-def rows(policy, distances, scenario="dense", budget=0.03, **conditions):
-    configs = grid([scenario], [policy], [budget], range(len(distances)), **conditions)
-    return [row(config, distance) for config, distance in zip(configs, distances, strict=True)]
-
-
-STUDY = [
-    *rows("history", [4.0, None, 8.0, 6.0, None]),
-    *rows("all-camera", [10.0, 11.0, 12.0, 13.0, 14.0]),
-    *rows("care", [15.0, 16.0, 17.0, 18.0, 19.0]),
-    *rows("full", [15.0, 16.0, 17.0, 18.0, 19.5]),
-]
-
-
-def cell(policy, study=STUDY):
-    return next(cell for cell in summarise(study) if cell.policy == policy)
-
-
-def test_medians_and_quartiles():
-    assert cell("care").detection == (quartiles([15.0, 16.0, 17.0, 18.0, 19.0]))
-    assert (cell("care").detection.low, cell("care").detection.median, cell("care").detection.high) == (
-        16.0,
-        17.0,
-        18.0,
-    )
-
-
-def test_the_never_detected_count_and_rank_last():
-    history = cell("history")
-    assert (history.never, history.episodes, history.detection.median, history.detection.low) == (2, 5, 4.0, 0.0)
-
-
-def test_differences_are_paired_by_seed():
-    assert cell("all-camera").vs_care == (-5.0, -5.0, -5.0)
-    assert cell("care").vs_full.mean == pytest.approx(-0.1)
-    assert cell("care").vs_full.high == 0.0
-    shuffled = [*rows("care", [15.0, 16.0])][::-1]
-    assert difference(shuffled, rows("full", [15.0, 16.0])) == (0.0, 0.0, 0.0)
-    assert difference(rows("care", [1.0]), None) is None
-
-
-def test_a_fault_is_compared_with_the_full_scan_of_the_faultless_world():
-    faulty = rows("care", [14.0] * 5, scenario="dartout", budget=0.1, false_negative_rates=(0.2,))
-    study = [*faulty, *rows("full", [15.0] * 5, scenario="dartout")]
-    assert cell("care", study).vs_full == (-1.0, -1.0, -1.0)
-    assert cell("care", study).setting.label == "dartout, false negative rate 0.2"
+def blocks(study=STUDY):
+    """Entries of the contrast table by block and policy."""
+    found, block = {}, ""
+    for line in sweep_tables(study)[1].rows:
+        if len(line) == 1:
+            block = line[0]
+        else:
+            found[block, line[0]] = line[1:]
+    return found
 
 
 def test_other_physics_are_another_setting():
     config = EpisodeConfig("dense", "care", scenario_parameters=(("vehicles", 7),))
     assert setting_of(row(config, 1.0)) != setting_of(row(EpisodeConfig("dense", "care"), 1.0))
-    assert study_tables([row(config, 1.0)])[0].title == "dense, vehicles 7"
+    assert sweep_tables([row(config, 1.0)])[0].title == "dense, vehicles 7"
 
 
-def test_tables_show_the_papers_figures_beside_ours():
-    (table,) = study_tables(STUDY)
-    lines = {line[1]: line for line in table.rows}
-    assert lines["all-camera"][2] == "12.0 [11.0, 13.0]"
-    assert lines["all-camera"][-1] == "10.3"
-    assert lines["history"][3] == "2/5"
+def test_levels_stand_beside_the_papers_figures():
+    lines = levels()
+    assert lines["all-camera"]["first detection m"] == "12.0 [11.0, 13.0]"
+    assert lines["all-camera"]["paper"] == "10.3"
+    assert (lines["history"]["never"], lines["history"]["regret m"]) == ("2/5", "≥12.3")
+    assert (lines["care"]["regret m"], lines["care"]["as full"]) == ("0.1", "4/5")
+    assert lines["full"]["regret m"] == ""
+    table = sweep_tables(STUDY)[0]
     assert any("10.3 m" in quote for quote in table.quotes)
-    assert "| 3% | history | 4.0 [0.0, 6.0] | 2/5 |" in table.markdown()
+    assert "| 3% | history | 4.0 [n.d., 6.0] | 2/5 |" in table.markdown()
 
 
-def test_the_terminal_shows_every_cell():
+@pytest.mark.parametrize(
+    ("distances", "text"),
+    [
+        ([None] * 5, "not detected"),
+        ([None, None, None, 8.0, 9.0], "not detected [n.d., 8.0]"),
+        ([None, 7.0, 8.0, 9.0, 9.5], "8.0 [7.0, 9.0]"),
+    ],
+)
+def test_a_quantile_on_a_miss_reads_not_detected(distances, text):
+    assert levels(rows("care", distances))["care"]["first detection m"] == text
+
+
+def test_care_is_compared_with_every_policy_at_every_budget():
+    study = [*STUDY, *rows("care", [15.0] * 5, budget=0.1), *rows("history", [14.0] * 5, budget=0.1)]
+    found = blocks(study)
+    assert sweep_tables(study)[1].columns == ("care minus", "3%", "10%")
+    assert found["First detection, m", "all-camera"] == ("+5.0* [5.0,5.0]", "")
+    assert found["First detection, m", "history"][1] == "+1.0 [1.0,1.0]"
+    assert [isinstance(entry, Bold) for entry in found["First detection, m", "history"]] == [True, True]
+    assert found["First detection, m", "history"][0].startswith("≥+12.2* [")
+    assert found["First detection, m", "full"][0].startswith("-0.1 [-0.3,0.0]")
+    assert not isinstance(found["First detection, m", "full"][0], Bold)
+    assert found["Braked, points", "history"] == ("+0.0 [0.0,0.0]",) * 2
+    assert found["Detected, points", "history"][0].startswith("+40.0 [0.0,80.0]")
+
+
+def test_detection_rates_are_compared_only_where_somebody_missed():
+    assert ("Detected, points", "history") in blocks()
+    everybody = [row for row in STUDY if row["policy"] != "history"]
+    assert ("Detected, points", "all-camera") not in blocks(everybody)
+
+
+def test_without_care_or_another_policy_there_is_no_contrast():
+    assert len(sweep_tables([row for row in STUDY if row["policy"] != "care"])) == 1
+    assert len(sweep_tables(rows("care", [15.0]))) == 1
+
+
+def test_policies_that_no_car_can_have_are_marked():
+    table, contrasts = sweep_tables([*STUDY, *ORACLE])
+    assert "history-oracle †" in {line[1] for line in table.rows}
+    assert "history-oracle †" in {line[0] for line in contrasts.rows}
+    assert all("† knows the truth: no policy of a car." in each.notes for each in (table, contrasts))
+    assert not any("‡" in note for note in table.notes)
+
+
+def test_the_terminal_shows_every_cell_in_80_columns():
     terminal = io.StringIO()
-    Console(width=80, file=terminal).print(study_tables(STUDY)[0].rich())
-    assert all(
-        part in terminal.getvalue() for part in ("all-camera", "12.0 [11.0, 13.0]", "2/5", "15.1", "-5.0 [-5.0, -5.0]")
-    )
-    assert "…" not in terminal.getvalue()
+    Console(width=80, file=terminal).print(*(table.rich() for table in sweep_tables([*STUDY, *ORACLE])))
+    shown = terminal.getvalue()
+    assert all(part in shown for part in ("history-oracle †", "12.0 [11.0, 13.0]", "2/5", "15.1", "+5.0* [5.0,5.0]"))
+    assert "…" not in shown
+    assert max(map(len, shown.splitlines())) <= 80
 
 
 def test_a_pass_that_was_never_in_view_is_said():
     config = EpisodeConfig("cutin", "care")
     seen, unseen = row(config, 9.0), row(config, None, min_distance_m=None, clearance_m=None)
-    assert study_tables([unseen])[0].rows[0][5] == "never in view"
-    assert study_tables([seen, unseen | {"seed": 1}])[0].rows[0][5] == "5.0 (of 1)"
-
-
-CROWD = [
-    each
-    for vehicles, camera in ((0, 15.0), (5, 14.5), (9, 8.0))
-    for policy, distance in (("all-camera", camera), ("care", 15.0), ("full", 15.0))
-    for each in rows(policy, [distance] * 2, scenario_parameters=(("vehicles", vehicles),))
-]
-
-
-def test_the_crowding_table_finds_the_collapse():
-    table = crowding_table(CROWD)
-    assert study_tables(CROWD) == [table]
-    assert table.rows[2] == ("9", "15.0", "15.0/8.0 -7.0 [-7.0, -7.0]")
-    assert table.notes[-1].endswith("3%: 9.")
-
-
-@pytest.mark.parametrize(
-    ("study", "name"), [(STUDY + rows("care", [15.0] * 5, budget=0.1), "dense-budget"), (CROWD, "crowding")]
-)
-def test_figures_are_written(study, name, tmp_path):
-    from care_sim.study.figures import save
-
-    figures = study_figures(study)
-    assert list(figures) == [name]
-    save(figures[name], tmp_path / name)
-    assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    drawing = (tmp_path / f"{name}.svg").read_text()
-    save(study_figures(study)[name], tmp_path / name)
-    assert (tmp_path / f"{name}.svg").read_text() == drawing
-
-
-def test_the_figure_names_its_curves_and_the_never_detected():
-    axes = study_figures(STUDY + rows("history", [9.0] * 5, budget=0.1))["dense-budget"].axes[0]
-    texts = [text.get_text() for text in axes.texts]
-    assert {"history", "care", "all-camera", "full scan", "2 never"} <= set(texts)
+    assert levels([unseen])["care"]["pass m"] == "never in view"
+    assert levels([seen, unseen | {"seed": 1}])["care"]["pass m"] == "5.0 (of 1)"

@@ -1,0 +1,84 @@
+"""Detection distances of actors that were never detected: censored, no zeros, and not dropped.
+
+All that is known of such a distance is that it is at most that of the nearest scan that passed the actor by.
+In medians and quartiles it ranks below every detection, and nothing is interpolated with it. In a paired
+difference it enters at that most, the reading that favours the policy that missed; the difference is then a
+bound on the true one, and says so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.evaluation.bootstrap import Interval, paired_difference
+
+FEWEST_PAIRS = 5
+"""Fewer pairs carry no claim: by chance alone, one set of four pairs in eight has differences of one sign."""
+
+
+class Reading(NamedTuple):
+    """A value measured in an episode; of a `censored` one is known that the truth is at most this."""
+
+    value: float
+    censored: bool = False
+
+
+@dataclass(frozen=True)
+class Quartiles:
+    """Lower quartile, median and upper quartile, None for not detected; and the number of values."""
+
+    low: float | None
+    median: float | None
+    high: float | None
+    count: int
+
+
+class Bound(StrEnum):
+    """How the printed difference stands to the true one; the value is the sign to print before it."""
+
+    EXACT = ""
+    AT_MOST = "≤"
+    AT_LEAST = "≥"
+    OPEN = "~"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A mean paired difference with its interval; the true one lies as `bound` says."""
+
+    interval: Interval
+    bound: Bound
+    pairs: int
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the interval excludes zero, whatever the censored values were; never of fewer than 5 pairs."""
+        below = self.interval.high < 0 and self.bound in (Bound.EXACT, Bound.AT_MOST)
+        above = self.interval.low > 0 and self.bound in (Bound.EXACT, Bound.AT_LEAST)
+        return (below or above) and self.pairs >= FEWEST_PAIRS
+
+
+def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
+    """Quartiles, linearly interpolated between detections only; None without readings."""
+    if not readings:
+        return None
+    censored = sum(reading.censored for reading in readings)
+    ranked = [-1.0] * censored + sorted(reading.value for reading in readings if not reading.censored)
+    shares = (0.25, 0.5, 0.75)
+    values = np.quantile(ranked, shares).tolist()
+    low, median, high = (
+        None if int(share * (len(ranked) - 1)) < censored else value
+        for share, value in zip(shares, values, strict=True)
+    )
+    return Quartiles(low, median, high, len(ranked))
+
+
+def difference(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Difference:
+    """Mean of `ours - theirs`, entry by entry. Raises InvalidInput as `paired_difference` does."""
+    interval = paired_difference([reading.value for reading in ours], [reading.value for reading in theirs])
+    missed = any(reading.censored for reading in ours), any(reading.censored for reading in theirs)
+    bounds = {(True, False): Bound.AT_MOST, (False, True): Bound.AT_LEAST, (True, True): Bound.OPEN}
+    return Difference(interval, bounds.get(missed, Bound.EXACT), len(ours))

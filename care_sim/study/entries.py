@@ -1,0 +1,68 @@
+"""How measured values are written in tables."""
+
+from care_sim.evaluation.censoring import Quartiles
+from care_sim.study.contrasts import Contrast
+from care_sim.study.table import Bold
+
+NOT_DETECTED = "not detected"
+MARKS = {"privileged": "†", "non-causal": "‡"}
+"""Marks of the policies that no car can have."""
+MEANINGS = {
+    "privileged": "† knows the truth: no policy of a car.",
+    "non-causal": "‡ saw the full scan first: saves no sensing.",
+}
+
+
+def percent(budget: float) -> str:
+    """A budget as people read it."""
+    return f"{100 * budget:.3g}%"
+
+
+def marked(policy: str, tags: tuple[str, ...]) -> str:
+    """The policy, with a mark when no car can have it."""
+    marks = "".join(mark for tag, mark in MARKS.items() if tag in tags)
+    return f"{policy} {marks}".rstrip()
+
+
+def median(values: Quartiles | None) -> str:
+    """A median detection distance."""
+    if values is None:
+        return "-"
+    return NOT_DETECTED if values.median is None else f"{values.median:.1f}"
+
+
+def spread(values: Quartiles) -> str:
+    """A median detection distance with its quartiles."""
+    if values.high is None:
+        return NOT_DETECTED
+    low, high = ("n.d." if value is None else f"{value:.1f}" for value in (values.low, values.high))
+    return f"{median(values)} [{low}, {high}]"
+
+
+def mean(contrast: Contrast | None) -> str:
+    """A mean difference without its interval: bold and with an asterisk where that is earned."""
+    return _weighed(contrast, _mean(contrast)) if contrast else ""
+
+
+def interval(contrast: Contrast | None) -> str:
+    """A mean difference with its interval: bold and with an asterisk where that is earned."""
+    return _weighed(contrast, f"{_mean(contrast)} {ends(contrast)}") if contrast else ""
+
+
+def unsigned(contrast: Contrast | None) -> str:
+    """A mean difference that is zero at best."""
+    return f"{contrast.difference.bound}{contrast.mean:z.1f}" if contrast else ""
+
+
+def ends(contrast: Contrast) -> str:
+    """The interval of a difference; one decimal, or two at an end that would round to zero."""
+    low, high = (f"{end:z.1f}" if round(end, 1) else f"{end:z.2f}" for end in contrast.difference.interval[1:])
+    return f"[{low},{high}]".replace("0.00", "0.0")
+
+
+def _mean(contrast: Contrast) -> str:
+    return f"{contrast.difference.bound}{contrast.mean:+z.1f}{'*' if contrast.counts else ''}"
+
+
+def _weighed(contrast: Contrast, text: str) -> str:
+    return Bold(text) if contrast.excludes_zero else text

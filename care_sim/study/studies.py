@@ -1,0 +1,74 @@
+"""The studies by name: what is shown of their rows."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from care_sim.errors import unknown
+from care_sim.study import budget_figure, crowding_figure
+from care_sim.study.captions import CAPTION, CROWDING
+from care_sim.study.crowding import crowding_tables
+from care_sim.study.episode import Row
+from care_sim.study.paper import NO_COLLISION
+from care_sim.study.rows import read_study
+from care_sim.study.statements import statements
+from care_sim.study.table import Table
+from care_sim.study.tables import sweep_tables
+
+
+@dataclass(frozen=True)
+class Study:
+    """How the rows of a study are shown: all pure functions of them.
+
+    `closing` are sentences after the tables; `figure_names` every figure that the study can draw; `caption` says
+    how to read its tables.
+    """
+
+    name: str
+    tables: Callable[[Sequence[Row]], list[Table]]
+    figures: Callable[[Sequence[Row]], dict[str, Figure]]
+    closing: Callable[[Sequence[Row]], list[str]]
+    figure_names: tuple[str, ...]
+    caption: str = CAPTION
+
+
+def collisions(rows: Sequence[Row]) -> str:
+    """Collisions over all rows."""
+    return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
+
+
+def _sweep_closing(rows: Sequence[Row]) -> list[str]:
+    return [collisions(rows)]
+
+
+def _paper_closing(rows: Sequence[Row]) -> list[str]:
+    return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
+
+
+_ALL = (
+    Study("sweep", sweep_tables, budget_figure.sweep_figures, _sweep_closing, budget_figure.NAMES),
+    Study("paper", sweep_tables, budget_figure.sweep_figures, _paper_closing, budget_figure.NAMES),
+    Study(
+        "crowding",
+        crowding_tables,
+        crowding_figure.crowding_figures,
+        _sweep_closing,
+        (crowding_figure.NAME,),
+        CROWDING,
+    ),
+)
+STUDIES = {study.name: study for study in _ALL}
+SWEEP = STUDIES["sweep"]
+
+
+def study_of(path: Path) -> Study:
+    """The study that a file of rows belongs to; a file that names none holds a sweep.
+
+    Raises InvalidInput for the name of a study that this version does not know.
+    """
+    name = read_study(path) or SWEEP.name
+    if name not in STUDIES:
+        raise unknown(f"study in {path}", name, STUDIES)
+    return STUDIES[name]

@@ -1,0 +1,30 @@
+from made_rows import CROWD, rows
+
+from care_sim.study.crowding import Crowd, crowding_tables
+from care_sim.study.table import Bold
+
+
+def test_the_tables_give_difference_interval_and_medians():
+    gaps, intervals, medians = crowding_tables(CROWD)
+    assert [line[0] for line in gaps.rows] == ["0", "5", "9", "12"]
+    assert [line[1] for line in gaps.rows] == ["+0.0", "-0.5", "-7.0*", "≤-12.0*"]
+    assert [isinstance(line[1], Bold) for line in gaps.rows] == [False, True, True, True]
+    assert intervals.rows[2] == ("9", "-7.0* [-7.0,-7.0]")
+    assert medians.rows[2] == ("9", "15.0/8.0", "15.0")
+    assert medians.rows[3] == ("12", "15.0/n.d.", "15.0")
+    assert gaps.notes[0].endswith("3%: 9, 12.")
+
+
+def test_a_collapse_needs_three_metres_and_an_interval_without_zero():
+    def crowd(camera):
+        study = [rows("all-camera", camera), rows("care", [15.0] * len(camera))]
+        return Crowd([row | {"scenario.vehicles": 5} for policy in study for row in policy])
+
+    assert crowd([12.0] * 5).collapsed(0.03) == [5]
+    assert crowd([12.1] * 5).collapsed(0.03) == []
+    assert crowd([15.0, 15.0, 15.0, 15.0, None]).collapsed(0.03) == []
+    assert crowd([8.0]).collapsed(0.03) == []
+
+
+def test_rows_that_name_no_number_have_the_streets_own():
+    assert Crowd(rows("care", [15.0])).counts == [7]

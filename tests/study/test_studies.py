@@ -1,0 +1,61 @@
+import json
+
+import pyarrow.parquet as pq
+import pytest
+from made_rows import CROWD, STUDY
+from rich.console import Console
+
+from care_sim.errors import InvalidInput
+from care_sim.study.config import grid
+from care_sim.study.report import ROWS, conduct, print_report, write_report
+from care_sim.study.rows import read_rows, write_rows
+from care_sim.study.studies import STUDIES, study_of
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_file_knows_its_study(name, tmp_path):
+    write_rows(STUDY, tmp_path / ROWS, name)
+    assert study_of(tmp_path / ROWS) is STUDIES[name]
+
+
+def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
+    path = tmp_path / ROWS
+    write_rows(STUDY, path)
+    pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
+    assert study_of(path).name == "sweep"
+
+
+def test_an_unknown_study_is_one_clear_line(tmp_path):
+    write_rows(STUDY, tmp_path / ROWS, "gardening")
+    with pytest.raises(InvalidInput, match=r"unknown study in .* 'gardening'; known: crowding, paper, sweep"):
+        study_of(tmp_path / ROWS)
+
+
+@pytest.mark.parametrize(("name", "rows"), [("sweep", STUDY), ("paper", STUDY), ("crowding", CROWD)])
+def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys):
+    study = STUDIES[name]
+    assert set(study.figures(rows)) <= set(study.figure_names)
+    write_report(rows, tmp_path, study)
+    print_report(rows, Console(width=80), study)
+    printed, markdown, latex = (
+        capsys.readouterr().out,
+        *((tmp_path / f).read_text() for f in ("tables.md", "tables.tex")),
+    )
+    assert "Collisions: 0 in" in printed
+    assert all("Collisions: 0 in" in text and "never detected" in text for text in (markdown, latex))
+    tables = study.tables(rows)
+    assert latex.count(r"\begin{table}") == len(tables)
+    assert all(f"## {table.title}\n" in markdown for table in tables)
+
+
+def test_only_the_papers_study_quotes_the_paper_on_collisions():
+    assert "Paper" in STUDIES["paper"].closing(STUDY)[0]
+    assert "Paper" not in STUDIES["sweep"].closing(STUDY)[0]
+
+
+def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
+    configs = grid(["dartout"], ["random", "full"], [0.1], [0], scenario_parameters=(("duration_s", 0.2),))
+    assert conduct(configs, tmp_path, workers=1, study=STUDIES["crowding"]) == []
+    assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
+    assert study_of(tmp_path / ROWS).name == "crowding"
+    assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / ROWS)[0])
