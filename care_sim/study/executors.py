@@ -2,8 +2,9 @@
 
 import logging
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -60,21 +61,27 @@ class ClusterExecutor(Executor):
 
     def threads(self) -> int:
         """Threads of all workers that are connected now. Raises ClusterLost."""
-        try:
+        with self._answering():
             return sum(self._client.nthreads().values())
-        except OSError as error:
-            raise self._lost() from error
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Hand a call over."""
+        """Hand a call over. Raises ClusterLost."""
         ours: Future[T] = Future()
-        self._executor.submit(fn, *args, **kwargs).add_done_callback(partial(self._hand_on, ours))
+        with self._answering():
+            self._executor.submit(fn, *args, **kwargs).add_done_callback(partial(self._hand_on, ours))
         return ours
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster; what has not ended is cancelled."""
-        self._executor.shutdown(wait=False)
         self._client.close()
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Whatever a client raises that has lost its scheduler, and that is much, is ClusterLost."""
+        try:
+            yield
+        except Exception as error:
+            raise self._lost() from error
 
     def _hand_on(self, ours: Future[Any], theirs: Future[Any]) -> None:
         error = self._lost() if theirs.cancelled() else theirs.exception()
