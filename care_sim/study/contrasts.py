@@ -20,10 +20,11 @@ GATE_POINTS = 5.0
 
 @dataclass(frozen=True)
 class Measure:
-    """A quantity of an episode, its unit, and the `gate`: the smallest mean difference that counts."""
+    """A quantity of an episode, its unit and decimals, and the `gate`: the smallest mean difference that counts."""
 
     name: str
     unit: str
+    decimals: int
     gate: float
     read: Callable[[Row], Reading]
 
@@ -42,9 +43,9 @@ def detection(row: Row) -> Reading:
     return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
 
 
-DETECTION = Measure("First detection", "m", GATE_M, detection)
-BRAKED = Measure("Braked", "points", GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
-DETECTED = Measure("Detected", "points", GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored)))
+DETECTION = Measure("First detection", "m", 1, GATE_M, detection)
+BRAKED = Measure("Braked", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
+DETECTED = Measure("Detected", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored)))
 
 
 @dataclass(frozen=True)

@@ -55,13 +55,19 @@ def unsigned(contrast: Contrast | None) -> str:
 
 
 def ends(contrast: Contrast) -> str:
-    """The interval of a difference; one decimal, or two at an end that would round to zero."""
-    low, high = (f"{end:z.1f}" if round(end, 1) else f"{end:z.2f}" for end in contrast.difference.interval[1:])
-    return f"[{low},{high}]".replace("0.00", "0.0")
+    """The interval of a difference; an end that would round to zero has one decimal more."""
+    decimals = contrast.measure.decimals
+    low, high = (_end(end, decimals) for end in contrast.difference.interval[1:])
+    return f"[{low},{high}]"
+
+
+def _end(end: float, decimals: int) -> str:
+    hidden = round(end, decimals) == 0 != round(end, decimals + 1)
+    return f"{end:z.{decimals + hidden}f}"
 
 
 def _mean(contrast: Contrast) -> str:
-    return f"{contrast.difference.bound}{contrast.mean:+z.1f}{'*' if contrast.counts else ''}"
+    return f"{contrast.difference.bound}{contrast.mean:+z.{contrast.measure.decimals}f}{'*' if contrast.counts else ''}"
 
 
 def _weighed(contrast: Contrast, text: str) -> str:

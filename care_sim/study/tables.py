@@ -67,7 +67,8 @@ def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> 
     measures = [DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])]
     lines = [line for measure in measures for line in _block(measure, setting, tags, budgets, groups)]
     columns = (f"{REFERENCE} minus", *map(percent, budgets))
-    return [Table(f"{setting.label}: {REFERENCE} minus each policy", columns, tuple(lines), tag_notes(cells))]
+    title = f"{setting.label}: {REFERENCE} minus each policy"
+    return [Table(title, columns, tuple(lines), tag_notes(cells), whole=columns[:1])]
 
 
 def _block(

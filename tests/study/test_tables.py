@@ -69,8 +69,8 @@ def test_care_is_compared_with_every_policy_at_every_budget():
     assert found["First detection, m", "history"][0].startswith("≥+12.2* [")
     assert found["First detection, m", "full"][0].startswith("-0.1 [-0.3,0.0]")
     assert not isinstance(found["First detection, m", "full"][0], Bold)
-    assert found["Braked, points", "history"] == ("+0.0 [0.0,0.0]",) * 2
-    assert found["Detected, points", "history"][0].startswith("+40.0 [0.0,80.0]")
+    assert found["Braked, points", "history"] == ("+0 [0,0]",) * 2
+    assert found["Detected, points", "history"][0].startswith("+40 [0,80]")
 
 
 def test_detection_rates_are_compared_only_where_somebody_missed():
