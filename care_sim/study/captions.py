@@ -28,7 +28,8 @@ STATISTICS = (
 COVERAGE = (
     "The ego covers 0.8 m of road a keyframe, so differences come in such steps. How often the intervals hold the "
     "truth was measured on synthetic differences: of 30 seeds, 90 to 96 times in 100; of 5 seeds, only about 80 "
-    "times, and about 40 times where one episode in ten differs and most sets of five show no difference at all."
+    "times, and about 40 times where one episode in ten differs and most sets of five show no difference at all. An "
+    "interval without width says that all seeds differ alike, not that the estimate is exact."
 )
 CAPTION = " ".join([READING, CENSORING, LEVELS, STATISTICS, COVERAGE])
 CROWDING = " ".join([READING, CENSORING, STATISTICS, COVERAGE])
