@@ -111,7 +111,7 @@ def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path)
     assert [row["digest"] for row in rows] == [config.digest() for config in configs]
     assert rows[0]["episode_hash"] == run_episode(configs[0])["episode_hash"]
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"config.json", JOURNAL, ROWS, "tables.md"}
+    assert names == {"config.json", JOURNAL, ROWS, "tables.md", "tables.tex"}
 
 
 def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
