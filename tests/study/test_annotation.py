@@ -24,3 +24,8 @@ def test_what_was_there_stays_and_tags_are_text():
     (after,) = annotated([before])
     assert before.items() <= after.items()
     assert after["tags"] == "causal"
+
+
+def test_a_camera_fault_is_measured_against_the_full_scan_that_asks_no_camera():
+    faulty = rows("care", [14.0], scenario="dartout", budget=0.1, false_negative_rates=(0.2,))
+    assert columns([*faulty, *rows("full", [15.0], scenario="dartout")], "care") == [(1.0, False)]
