@@ -28,13 +28,20 @@ class Uncertainty(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then unexplained returns in shells of distance, nearest first."""
+        cells, ranges = self._unexplained(belief)
+        shell = np.floor(ranges / SHELL_M)
+        layers = [[cells[shell == number]] for number in np.unique(shell)]
+        return Demand(self.rig.hulls(belief.tracks.boxes), layers)
+
+    def _unexplained(self, belief: Belief) -> tuple[Cells, Floats]:
+        """Cells (n,) and ranges (n,) of the last scan's returns above the ground and outside detected boxes."""
         cells = np.flatnonzero((belief.ranges > 0) & (belief.ranges < self.rig.grid.range_m))
         ranges = belief.ranges.ravel()[cells].astype(np.float64)
         points = self.rig.grid.directions[cells] * ranges[:, None]
-        ground = points[:, 2] + self.rig.sensor_height_m < CLEARANCE_M
-        unexplained = ~ground
-        unexplained[~ground] = ~_inside(points[~ground], self._detected_boxes(belief))
-        return Demand(self.rig.hulls(belief.tracks.boxes), _shells(cells[unexplained], ranges[unexplained]))
+        unexplained = points[:, 2] + self.rig.sensor_height_m >= CLEARANCE_M
+        for box in self._detected_boxes(belief):
+            unexplained &= ~_inside(points, box)
+        return cells[unexplained], ranges[unexplained]
 
     def _detected_boxes(self, belief: Belief) -> Floats:
         """(n, 7) boxes detected at the last scan, moved back to it, in the sensor frame of then."""
@@ -51,14 +58,8 @@ def _travelled(ego: Ego, duration: float) -> Frame:
     return Frame(way * np.cos(yaw / 2), way * np.sin(yaw / 2), 0.0, yaw)
 
 
-def _inside(points: Floats, boxes: Floats) -> NDArray[np.bool_]:
-    """(n,) which points (n, 3) lie in any of the widened boxes (m, 7)."""
-    local = turned(points[:, None] - boxes[:, :3], -boxes[:, 6])
-    beyond = np.abs(local) - (boxes[:, 3:6] / 2 + BOX_MARGIN_M)
-    inside: NDArray[np.bool_] = (beyond.max(axis=2) <= 0).any(axis=1)
+def _inside(points: Floats, box: Floats) -> NDArray[np.bool_]:
+    """(n,) which points (n, 3) lie in the widened box (7,)."""
+    local = np.abs(turned(points - box[:3], -box[6]))
+    inside: NDArray[np.bool_] = np.all(local <= box[3:6] / 2 + BOX_MARGIN_M, axis=1)
     return inside
-
-
-def _shells(cells: Cells, ranges: Floats) -> list[list[Cells]]:
-    shell = np.floor(ranges / SHELL_M)
-    return [[cells[shell == number]] for number in np.unique(shell)]

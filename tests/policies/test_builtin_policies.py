@@ -1,4 +1,7 @@
-"""Common checks for every policy in every scenario, and what sets each one apart."""
+"""What sets the policies of the closed loop apart: history, camera reserves, forgetting, the two bounds."""
+
+import inspect
+from dataclasses import asdict
 
 import gymnasium
 import numpy as np
@@ -7,11 +10,12 @@ import pytest
 import care_sim
 from care_sim.allocation import allocate
 from care_sim.errors import InvalidInput
-from care_sim.types import CLASSES, MAX_DETECTIONS, Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.forgetting import ForgettingRules
+from care_sim.policies.care_sbf import CareSbf
+from care_sim.types import Belief, Ego, Rig
 
 SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]
-POLICIES = ["full", "random", "history", "all-camera", "care", "care-sbf"]
-CAMERA_POLICIES = ["care", "all-camera", "care-sbf"]
+CAMERA_POLICIES = ["care", "all-camera", "care-priority", "care-sbf"]
 
 
 def made(scenario, policy="care", budget=0.05, **parameters):
@@ -36,64 +40,9 @@ def driven(scenario, policy, keyframes=60, seed=0, **parameters):
     return history
 
 
-@pytest.fixture(scope="module")
-def encounter():
-    """Observations of a dense street from a second before the person appears to a second after."""
-    return [observation for observation, _, _ in driven("CARE-Dense-v0", "care", 36)][14:]
-
-
-@pytest.fixture
-def environment():
-    env = gymnasium.make("CARE-Dense-v0", budget=0.05)
-    yield env
-    env.close()
-
-
-def test_the_built_in_policies_are_listed():
-    assert set(POLICIES) <= set(care_sim.policy_names())
-
-
-@pytest.mark.parametrize("scenario", SCENARIOS)
-@pytest.mark.parametrize("policy", POLICIES)
-def test_a_policy_spends_within_the_budget_and_repeats_itself(scenario, policy):
-    history = driven(scenario, policy, 12)
-    env, again = made(scenario, policy)
-    again.reset()
-    for observation, action, info in history:
-        asked = np.flatnonzero(action)
-        assert (action.shape, action.dtype) == (env.unwrapped.rig.grid.shape, np.float32)
-        assert env.action_space.contains(action)
-        assert len(asked) <= env.unwrapped.rig.budget
-        assert len(info["fired"]) == len(set(info["fired"].tolist())) == env.unwrapped.rig.budget
-        assert set(asked.tolist()) <= set(info["fired"].tolist())
-        assert np.array_equal(again(observation), action)
-    env.close()
-
-
-@pytest.mark.parametrize("policy", POLICIES)
-def test_reset_forgets_the_episode(policy, encounter):
-    env, chooses = made("CARE-Dense-v0", policy)
-    chooses.reset()
-    first = [chooses(observation) for observation in encounter]
-    chooses.reset()
-    assert all(np.array_equal(chooses(o), action) for o, action in zip(encounter, first, strict=True))
-    env.close()
-
-
-@pytest.mark.parametrize("policy", ["care", "all-camera"])
-def test_without_a_detection_camera_policies_act_as_history_cell_for_cell(policy, encounter, environment):
-    padding = np.zeros((MAX_DETECTIONS, len(ImageDetections.COLUMNS)), np.float32)
-    padding[:, 0] = -1
-    chooses, history = (care_sim.make_policy(name, environment) for name in (policy, "history"))
-    for observation in encounter:
-        blind = {**observation, "detections": padding}
-        assert np.array_equal(chooses(blind), history(blind))
-    assert any(not np.array_equal(chooses(o), history(o)) for o in encounter)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", SCENARIOS)
-@pytest.mark.parametrize("policy", ["care", "all-camera"])
+@pytest.mark.parametrize("policy", ["care", "care-priority", "all-camera"])
 def test_with_a_camera_that_misses_everything_whole_episodes_are_those_of_history(scenario, policy):
     blind = driven(scenario, policy, false_negative_rate=1.0)
     history = driven(scenario, "history", false_negative_rate=1.0)
@@ -134,27 +83,17 @@ def test_full_asks_for_everything_and_refuses_another_budget(environment):
         care_sim.make_policy("full", environment)
 
 
-def belief_of(tracks=(), ego_speed=0.0):
-    table = np.array(tracks, dtype=float).reshape(-1, len(Tracks.COLUMNS))
-    nothing = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
-    return Belief(Ego(ego_speed), 819, nothing, Tracks.from_rows(table), np.zeros((32, 512), np.float32))
-
-
-def standing(number, x, y=0.0, vy=0.0):
-    return [number, CLASSES.index("car"), x, y, -1.0, 4.6, 1.95, 1.7, 0.0, 0.0, vy, 0, 2]
-
-
-def test_history_demands_the_hulls_nearest_first(environment):
+def test_history_demands_the_hulls_nearest_first(environment, belief_of, car):
     history, rig = care_sim.make_policy("history", environment), environment.unwrapped.rig
-    belief = belief_of([standing(0, 10), standing(1, 20, 5), standing(2, 40, -5)])
+    belief = belief_of([car(0, 10), car(1, 20, 5), car(2, 40, -5)])
     hulls = rig.grid.hulls(belief.tracks.boxes)
     assert [s.tolist() for s in history.demand(belief).exploitation] == [hull.tolist() for hull in hulls]
     assert not any(len(layer) for layer in history.demand(belief).layers)
 
 
-def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation_pad(environment):
+def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation_pad(environment, belief_of, car):
     sbf, rig = care_sim.make_policy("care-sbf", environment), environment.unwrapped.rig
-    belief = belief_of([standing(0, 10), standing(1, 20, 5, vy=3.0), standing(2, 30, -5)])
+    belief = belief_of([car(0, 10), car(1, 20, 5, vy=3.0), car(2, 30, -5)])
     sbf.reset()
     for _ in range(5):
         demand = sbf.demand(belief)
@@ -168,8 +107,14 @@ def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation
     ]
 
 
-def test_parameters_of_forgetting_reach_the_rules(environment):
-    belief = belief_of([standing(0, 10)], ego_speed=8.0)
+def test_the_parameters_of_forgetting_are_its_rules_with_their_defaults():
+    rig, *rules = inspect.signature(CareSbf).parameters.values()
+    assert rig.name == "rig"
+    assert {rule.name: rule.default for rule in rules} == asdict(ForgettingRules())
+
+
+def test_parameters_of_forgetting_reach_the_rules(environment, belief_of, car):
+    belief = belief_of([car(0, 10)], Ego(8.0))
     guarded, unguarded = (care_sim.make_policy("care-sbf", environment, **p) for p in ({}, {"k_safe": 0.0}))
     for _ in range(5):
         kept, dropped = guarded.demand(belief), unguarded.demand(belief)
