@@ -1,10 +1,14 @@
 """Real observations round the encounter, beliefs made by hand, and packages as pip would leave them."""
 
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
 
 import care_sim
+from care_sim.errors import MissingExtra
+from care_sim.extras import import_open3d
 from care_sim.types import CLASSES, Belief, Ego, ImageDetections, Tracks
 
 STANDING = Ego()
@@ -29,6 +33,15 @@ def encounter():
         observation, *_ = env.step(care(observation))
     env.close()
     return observations[14:]
+
+
+@pytest.fixture(scope="session")
+def open3d():
+    """Open3D; skips what needs it where it cannot be imported."""
+    try:
+        return import_open3d()
+    except MissingExtra as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")
@@ -67,5 +80,9 @@ def install(tmp_path, monkeypatch):
         lines = [f"{name} = {package}:{thing}" for name, thing in policies.items()]
         (info / "entry_points.txt").write_text("\n".join(["[care_sim.policies]", *lines]))
         monkeypatch.syspath_prepend(str(place))
+        packages.append(package)
 
-    return put
+    packages = []
+    yield put
+    for package in packages:
+        sys.modules.pop(package, None)

@@ -6,6 +6,7 @@ import pytest
 
 import care_sim
 from care_sim.errors import InvalidInput
+from care_sim.policies import BUILT_IN, policy_names, tags_of, usable
 
 MODULE = '''
 import numpy as np
@@ -30,14 +31,8 @@ class Horizon(care_sim.Policy):
 
 
 @pytest.fixture
-def installed(tmp_path, monkeypatch):
-    """A distribution on the path, as pip would leave it."""
-    (tmp_path / "horizon_policy.py").write_text(MODULE)
-    info = tmp_path / "horizon_policy-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: horizon-policy\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[care_sim.policies]\nhorizon = horizon_policy:Horizon\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+def installed(install):
+    install("horizon_policy", MODULE, horizon="Horizon")
 
 
 @pytest.fixture
@@ -104,3 +99,112 @@ def test_cells_off_the_grid_are_refused_with_the_policys_name(env, cell):
     observation, _ = env.reset(seed=0)
     with pytest.raises(InvalidInput, match=r"policy lost: cells must lie in 0\.\.16383"):
         Lost(env.unwrapped.rig, cell)(observation)
+
+
+BROKEN = """
+import care_sim
+
+module = "a string"
+
+class Abstract(care_sim.Policy):
+    name = "abstract"
+
+class Other:
+    def __init__(self, rig): ...
+
+class Mistagged(care_sim.Policy):
+    tags = ("wise",)
+    def demand(self, belief): ...
+
+class Exploding(care_sim.Policy):
+    def __init__(self, rig):
+        raise KeyError("weights")
+    def demand(self, belief): ...
+
+class Deaf(care_sim.Policy):
+    def __init__(self): ...
+    def demand(self, belief): ...
+
+def nothing(rig): ...
+
+def honest(rig, bins=3):
+    return care_sim.policies.BUILT_IN["history"](rig)
+"""
+
+REASONS = {
+    "abstract": r"broken:Abstract is abstract: it lacks demand",
+    "mistagged": r"broken:Mistagged has tags \('wise',\); allowed is a tuple of causal, privileged, .*",
+    "other": r"broken:Other is no Policy",
+    "string": r"broken:module is no Policy",
+    "torn": r"AttributeError: .*Nowhere",
+}
+
+
+@pytest.fixture
+def broken(install):
+    install(
+        "broken",
+        BROKEN,
+        abstract="Abstract",
+        other="Other",
+        string="module",
+        mistagged="Mistagged",
+        torn="Nowhere",
+        exploding="Exploding",
+        deaf="Deaf",
+        nothing="nothing",
+        honest="honest",
+    )
+    install("leaving", "raise SystemExit(3)", leaving="Gone")
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_a_policy_that_cannot_be_loaded_is_named_with_the_reason(broken, env, name):
+    with pytest.raises(InvalidInput, match=f"policy {name} cannot be loaded: {REASONS[name]}"):
+        care_sim.make_policy(name, env)
+    assert tags_of(name) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("exploding", r"policy exploding refuses {}: KeyError: 'weights'"),
+        ("deaf", r"policy deaf refuses {}: TypeError: .*positional argument"),
+        ("nothing", r"policy nothing is no Policy but of type NoneType"),
+    ],
+)
+def test_a_policy_that_cannot_be_made_is_named_with_the_reason(broken, env, name, reason):
+    with pytest.raises(InvalidInput, match=reason):
+        care_sim.make_policy(name, env)
+
+
+def test_broken_policies_do_not_stop_the_others(broken, installed, env):
+    assert set(BUILT_IN) | set(REASONS) | {"horizon", "leaving"} <= set(policy_names())
+    good, bad = usable(["care", "torn", "horizon", "abstract", "leaving"])
+    assert good == ["care", "horizon"]
+    assert bad == {
+        "torn": "AttributeError: module 'broken' has no attribute 'Nowhere'",
+        "abstract": "broken:Abstract is abstract: it lacks demand",
+        "leaving": "SystemExit: 3",
+    }
+    with pytest.raises(InvalidInput, match="unknown policy 'nobody'"):
+        usable(["care", "nobody"])
+    assert care_sim.make_policy("horizon", env).name == "horizon"
+
+
+def test_a_function_that_makes_a_policy_is_one(broken, env):
+    assert tags_of("honest") == ("causal",)
+    assert care_sim.make_policy("honest", env, bins=4).name == "history"
+
+
+def test_a_built_in_name_cannot_be_taken(install, env):
+    install("usurper", MODULE, care="Horizon")
+    assert policy_names().count("care") == 1
+    assert type(care_sim.make_policy("care", env)) is BUILT_IN["care"]
+
+
+def test_of_two_packages_with_one_name_the_first_on_the_path_counts(install, env):
+    install("second", MODULE.replace("rows=4", "rows=5"), horizon="Horizon")
+    install("first", MODULE, horizon="Horizon")
+    assert policy_names().count("horizon") == 1
+    assert care_sim.make_policy("horizon", env).rows == 4

@@ -1,0 +1,119 @@
+"""What every policy keeps to in every scenario, over keyframes in which the hidden one appears."""
+
+from itertools import product
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.allocation import allocate
+from care_sim.policies import BUILT_IN
+from care_sim.types import CLASSES, MAX_DETECTIONS, Belief, ImageDetections
+
+SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]
+BEFORE, KEYFRAMES = 24, 6
+"""The hidden one comes into view two or four keyframes later."""
+
+
+def driven_to_the_encounter(env):
+    """The observation there, the floor having fired until then; with a full scan, which is slow, an earlier one."""
+    observation, _ = env.reset(seed=0)
+    for _ in range(BEFORE if observation["budget"] < 1 else 2):
+        observation, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
+    return read_only(observation)
+
+
+def read_only(observation):
+    for array in observation.values():
+        array.flags.writeable = False
+    return observation
+
+
+def played(env, policy):
+    """Observations, actions and infos of the policy's keyframes."""
+    observation = driven_to_the_encounter(env)
+    policy.reset()
+    for _ in range(KEYFRAMES):
+        action = policy(observation)
+        following, _, _, _, info = env.step(action)
+        yield observation, action, info
+        observation = read_only(following)
+
+
+@pytest.fixture(scope="module", params=product(SCENARIOS, BUILT_IN), ids="-".join)
+def case(request):
+    """An environment, and the name of the policy for it."""
+    scenario, name = request.param
+    if name == "farthest-points":
+        request.getfixturevalue("open3d")
+    env = gymnasium.make(scenario, budget=1.0 if name == "full" else 0.05)
+    yield env, name
+    env.close()
+
+
+def test_within_the_budget_without_a_duplicate_finite_and_the_same_after_reset(case):
+    env, name = case
+    policy = care_sim.make_policy(name, env)
+    first, again = (list(played(env, policy)) for _ in range(2))
+    for (_, action, info), (_, same, _) in zip(first, again, strict=True):
+        assert env.action_space.contains(action)
+        assert np.isfinite(action).all()
+        asked, fired = np.flatnonzero(action).tolist(), info["fired"].tolist()
+        assert len(asked) <= env.unwrapped.rig.budget
+        assert len(fired) == len(set(fired)) == env.unwrapped.rig.budget
+        assert set(asked) <= set(fired)
+        assert np.array_equal(action, same)
+
+
+def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
+    """Three fresh ones; the second is always shown something else in between."""
+    env, name = case
+    one, disturbing, other = (care_sim.make_policy(name, env) for _ in range(3))
+    first = observation = driven_to_the_encounter(env)
+    for _ in range(KEYFRAMES):
+        action = one(observation)
+        disturbing(first)
+        assert np.array_equal(other(observation), action)
+        observation, *_ = env.step(action)
+        read_only(observation)
+
+
+@pytest.mark.parametrize("name", ["care", "care-priority", "all-camera"])
+def test_with_a_black_camera_camera_policies_allocate_as_history_cell_for_cell(name, encounter, environment):
+    padding = np.zeros((MAX_DETECTIONS, len(ImageDetections.COLUMNS)), np.float32)
+    padding[:, 0] = -1
+    chooses, history = (care_sim.make_policy(policy, environment) for policy in (name, "history"))
+    for observation in encounter:
+        blind = {**observation, "detections": padding}
+        assert np.array_equal(chooses(blind), history(blind))
+    assert any(not np.array_equal(chooses(o), history(o)) for o in encounter)
+
+
+def haunted(observation):
+    """The same with three people more in the picture, none of whom is there."""
+    ghosts = np.array([[40, 90, 52, 120], [210, 80, 222, 118], [280, 70, 300, 130]])
+    rows = observation["detections"].copy()
+    free = np.flatnonzero(rows[:, 0] < 0)[:3]
+    rows[free] = 0
+    rows[free, 0], rows[free, 1], rows[free, 2:6] = CLASSES.index("pedestrian"), 0.9, ghosts
+    return {**observation, "detections": rows}
+
+
+def test_false_positives_leave_the_exploitation_cells_as_they_are(case, encounter):
+    env, name = case
+    driven_to_the_encounter(env)
+    rig = env.unwrapped.rig
+    chosen = [[], []]
+    for cells, change in zip(chosen, (haunted, dict), strict=True):
+        policy = care_sim.make_policy(name, env)
+        for observation in encounter[::4]:
+            demand = policy.demand(Belief.from_observation(change(observation)))
+            cells.append(allocate(care_sim.Demand(demand.exploitation), rig.budget, rig.reserve_fraction).tolist())
+    assert chosen[0] == chosen[1]
+
+
+@pytest.mark.parametrize("name", ["care", "care-priority", "care-sbf", "all-camera"])
+def test_false_positives_do_reach_the_reserve(name, encounter, environment):
+    seeing, haunting = (care_sim.make_policy(name, environment) for _ in range(2))
+    assert any(not np.array_equal(seeing(o), haunting(haunted(o))) for o in encounter)

@@ -1,0 +1,191 @@
+"""Truth has a door of its own: who is handed it, what its holders do with it, and that nobody else reaches it."""
+
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.loop import ClosedLoop
+from care_sim.policies import BUILT_IN, tags_of
+from care_sim.policies.farthest_points import FarthestPoints
+from care_sim.policies.privileged import PrivilegedPolicy
+from care_sim.types import Belief
+from care_sim.world.bullet import BulletWorld
+from care_sim.world.world import World
+
+PRIVILEGED = ["history-oracle", "random-points", "farthest-points"]
+ORDINARY = [name for name in BUILT_IN if name not in (*PRIVILEGED, "full")]
+
+
+@pytest.fixture(params=PRIVILEGED)
+def privileged(request):
+    if request.param == "farthest-points":
+        request.getfixturevalue("open3d")
+    return request.param
+
+
+def reachable(thing, seen=None):
+    """Everything that can be reached from an object through attributes and containers."""
+    seen = {} if seen is None else seen
+    if id(thing) in seen:
+        return seen
+    seen[id(thing)] = thing
+    if isinstance(thing, dict):
+        parts = [*thing, *thing.values()]
+    elif isinstance(thing, list | tuple | set | frozenset):
+        parts = list(thing)
+    else:
+        parts = [*getattr(thing, "__dict__", {}).values(), getattr(thing, "__self__", None)]
+    for part in parts:
+        reachable(part, seen)
+    return seen
+
+
+def knows(policy):
+    """Whether an environment, a simulation or truth can be reached from a policy."""
+    inside = (gymnasium.Env, ClosedLoop, World, BulletWorld)
+    return any(isinstance(o, inside) or hasattr(o, "full_scan") for o in reachable(policy).values())
+
+
+def used(name, environment, encounter):
+    """A policy that has acted a few times."""
+    environment.reset(seed=0)
+    policy = care_sim.make_policy(name, environment)
+    for observation in encounter[:3]:
+        policy(observation)
+    return policy
+
+
+@pytest.mark.parametrize("name", ORDINARY)
+def test_an_ordinary_policy_cannot_reach_truth(name, environment, encounter):
+    assert not knows(used(name, environment, encounter))
+
+
+def test_a_privileged_policy_is_handed_truth(privileged, environment, encounter):
+    assert knows(used(privileged, environment, encounter))
+
+
+def test_tags():
+    assert [name for name in BUILT_IN if "causal" not in tags_of(name)] == PRIVILEGED
+    assert tags_of("history-oracle") == ("privileged",)
+    assert tags_of("random-points") == tags_of("farthest-points") == ("non-causal",)
+
+
+@pytest.mark.parametrize(
+    ("claimed", "told"),
+    [
+        (("causal",), ("privileged",)),
+        (("learned",), ("privileged", "learned")),
+        (("causal", "learned", "non-causal"), ("learned", "non-causal")),
+    ],
+)
+def test_a_privileged_policy_never_counts_as_causal(claimed, told):
+    class Claims(PrivilegedPolicy):
+        tags = claimed
+
+    assert Claims.tags == told
+
+
+def test_mixed_with_an_ordinary_policy_it_stays_privileged():
+    class Mixed(BUILT_IN["care"], PrivilegedPolicy):
+        pass
+
+    assert Mixed.tags == ("privileged",)
+
+
+def test_truth_is_no_parameter(environment):
+    with pytest.raises(InvalidInput, match="truth of policy history-oracle comes from the environment"):
+        care_sim.make_policy("history-oracle", environment, truth=None)
+    with pytest.raises(InvalidInput, match="truth"):
+        care_sim.make_policy("history", environment, truth=None)
+
+
+def test_the_oracle_covers_where_the_tracked_objects_will_be():
+    """True boxes read off the world; each track's hull is that of the actor nearest to its forecast."""
+    env = gymnasium.make("CARE-CutIn-v0", budget=0.1)
+    oracle, history = (care_sim.make_policy(name, env) for name in ("history-oracle", "history"))
+    observation, _ = env.reset(seed=0)
+    loop, differs = env.unwrapped.loop, 0
+    reported = [actor for actor in loop.world.actors if actor.label is not None]
+    for _ in range(45):
+        belief = Belief.from_observation(observation)
+        boxes = loop.sensor.boxes_to_local(loop.world.boxes(reported))
+        distance = np.hypot(*(belief.tracks.boxes[:, None, :2] - boxes[None, :, :2]).T).T
+        true = boxes[distance.argmin(axis=1)] if len(belief.tracks) else boxes[:0]
+        expected = oracle.rig.hulls(true[np.argsort(np.hypot(*true[:, :2].T), kind="stable")])
+        demand = oracle.demand(belief)
+        assert [cells.tolist() for cells in demand.exploitation] == [hull.tolist() for hull in expected]
+        assert not any(len(layer) for layer in demand.layers)
+        differs += not np.array_equal(oracle(observation), history(observation))
+        observation, *_ = env.step(history(observation))
+    env.close()
+    assert differs
+
+
+@pytest.mark.parametrize("privileged", PRIVILEGED[1:], indirect=True)
+@pytest.mark.parametrize("budget", [0.03, 0.35])
+def test_references_keep_exactly_the_matched_fraction_of_the_points(privileged, budget):
+    """P is counted in the picture of a full scan of the same moment, the kept points in the next observation."""
+    sampled, whole = (gymnasium.make("CARE-Dense-v0", budget=b) for b in (budget, 1.0))
+    policy = care_sim.make_policy(privileged, sampled)
+    observation, _ = sampled.reset(seed=0)
+    whole.reset(seed=0)
+    full, *_ = whole.step(np.ones(whole.action_space.shape, np.float32))
+    observation, *_ = sampled.step(policy(observation))
+    cells, reach = sampled.unwrapped.rig.budget, sampled.unwrapped.rig.grid.range_m
+    points = np.count_nonzero(full["ranges"] < reach)
+    returned = (observation["ranges"] > 0) & (observation["ranges"] < reach)
+    assert np.count_nonzero(returned) == round(cells * points / full["ranges"].size)
+    assert np.count_nonzero(observation["ranges"]) == cells
+    sampled.close()
+    whole.close()
+
+
+def test_random_points_change_with_the_keyframe_and_the_seed_and_come_back_after_reset(environment):
+    observation, _ = environment.reset(seed=0)
+    policy, other = (care_sim.make_policy("random-points", environment, seed=seed) for seed in (0, 1))
+    first, second = policy(observation), policy(observation)
+    policy.reset()
+    assert np.array_equal(policy(observation), first)
+    assert not np.array_equal(second, first)
+    assert not np.array_equal(other(observation), first)
+
+
+def test_the_seed_of_random_points_is_checked(environment):
+    with pytest.raises(InvalidInput, match="seed must be a whole number >= 0, got -1"):
+        care_sim.make_policy("random-points", environment, seed=-1)
+
+
+@pytest.mark.usefixtures("open3d")
+def test_farthest_points_are_those_of_the_plain_algorithm(environment):
+    grid = environment.unwrapped.rig.grid
+    rng = np.random.default_rng(0)
+    cells = np.sort(rng.choice(grid.size, 300, replace=False))
+    points = grid.directions[cells] * rng.uniform(2, 50, (300, 1))
+    policy = FarthestPoints(environment.unwrapped.rig, truth=None)
+    chosen, distance = [0], np.linalg.norm(points - points[0], axis=1)
+    for _ in range(39):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    assert set(policy.kept(cells, points, 40).tolist()) == set(cells[chosen].tolist())
+    assert policy.kept(cells[:0], points[:0], 0).tolist() == []
+
+
+def test_without_open3d_farthest_points_names_the_extra(environment, monkeypatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(MissingExtra, match=r"extra 'open3d': pip install 'care-sim\[open3d\]'"):
+        care_sim.make_policy("farthest-points", environment)
+
+
+def test_an_environment_without_truth_is_refused(environment):
+    class Blindfold(gymnasium.Wrapper):
+        def get_wrapper_attr(self, name):
+            if name == "truth":
+                raise AttributeError(name)
+            return super().get_wrapper_attr(name)
+
+    with pytest.raises(InvalidInput, match="history-oracle needs an environment of CARE-Sim with a truth"):
+        care_sim.make_policy("history-oracle", Blindfold(environment))
