@@ -26,7 +26,7 @@ from care_sim.sensors.lidar import Lidar
 from care_sim.study.config import ENVIRONMENTS, EpisodeConfig
 from care_sim.study.episode import peak_rss_mb
 from care_sim.study.provenance import machine, versions
-from care_sim.study.tables import Table
+from care_sim.study.table import Table
 from care_sim.types import Belief
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World

@@ -15,7 +15,7 @@ from care_sim.perception.memory import TrackMemory
 from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture, window_on
 from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar, LidarNoise
-from care_sim.types import Belief, Keyframe, Rig, Scan
+from care_sim.types import Belief, Keyframe, Rig, Scan, Tracks
 from care_sim.world.bullet import Integers
 from care_sim.world.world import World
 
@@ -50,6 +50,7 @@ class ClosedLoop:
         self._camera = CameraDetector(labels, sensing.camera, rig.keyframe_s, camera_rng)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._memory = TrackMemory(rig.keyframe_s)
+        self._objects: dict[int, int] = {}
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
             world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
@@ -69,7 +70,8 @@ class ClosedLoop:
 
         scan, bodies = self._lidar.fire(fired, sensor)
         detections, detected = self._detector.detect(bodies, partial(self._local_boxes, sensor))
-        self._memory.update(detections, sensor)
+        tracks = self._memory.update(detections, sensor)
+        self._objects.update(zip(tracks.tolist(), detected.tolist(), strict=True))
         command = self._controller.command(self._memory.tracks(sensor), world.ego_motion)
 
         distance = self._distance_to_first_sighting(sensor)
@@ -92,6 +94,15 @@ class ClosedLoop:
             clearance_m=passage.clearance_m,
             impact_speed_mps=passage.impact_speed_mps,
         )
+
+    def true_boxes(self, tracks: Tracks) -> Floats:
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame. Truth: for the privileged alone."""
+        actors = [self._actors[self._objects[track]] for track in tracks.ids.tolist()]
+        return self.sensor.boxes_to_local(self.world.boxes(actors))
+
+    def full_scan(self) -> Scan:
+        """What every cell would return now, before noise. Truth: for the privileged alone."""
+        return self._lidar.peek(self.sensor)
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from care_sim import reward as rewards
 from care_sim.allocation import RESERVE_FRACTION, budget_cells, fired_cells
 from care_sim.envs.spaces import checked_scores, observation_space
+from care_sim.envs.truth import EpisodeTruth
 from care_sim.errors import InvalidInput, check_number
 from care_sim.evaluation.metrics import outcome
 from care_sim.grid import AngularGrid
@@ -20,6 +21,7 @@ from care_sim.perception.detectors import MIN_RETURNS
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, CameraFaults
 from care_sim.sensors.lidar import LidarNoise
+from care_sim.truth import Truth
 from care_sim.types import Action, Keyframe, Rig
 from care_sim.world.world import whole_steps
 
@@ -114,6 +116,11 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         if self._loop is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
         return self._loop
+
+    @property
+    def truth(self) -> Truth:
+        """What privileged policies may ask for; `make_policy` hands it to them and to nobody else."""
+        return EpisodeTruth(lambda: self.loop)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -40,6 +40,12 @@ class Lidar:
         self._noise = noise
         self._rng = rng
 
+    def peek(self, sensor: Frame) -> Scan:
+        """What a scan of every cell would return, before noise, which stays undrawn."""
+        directions = turned(self.grid.directions, sensor.yaw)
+        ranges, _ = self._engine.cast(sensor.origin, directions, self.grid.range_m)
+        return Scan(np.arange(self.grid.size), ranges)
+
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """Fire `cells` from the frame `sensor`.
 

@@ -101,20 +101,21 @@ class _Study:
     seeds: tuple[int, ...] = (5,)
     """One number: that many seeds, from 0. Several: these seeds."""
     workers: int = os.cpu_count() or 1
-    """Episodes that are played at the same time."""
+    """Episodes that are played at the same time on this machine; a cluster plays as many as it has threads."""
     cluster: str | None = None
     """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
 
-    def conduct(self, configs: "Sequence[EpisodeConfig]", out: Path) -> int:
+    def conduct(self, study: str, configs: "Sequence[EpisodeConfig]", out: Path) -> int:
         """Play the episodes, print their tables, name those that failed."""
         from care_sim.study import executors
         from care_sim.study.report import ROWS, conduct, print_report
         from care_sim.study.rows import read_rows
+        from care_sim.study.studies import STUDIES
 
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
-        failures = conduct(configs, out, self.workers, make_executor)
+        failures = conduct(configs, out, self.workers, make_executor, STUDIES[study])
         if len(failures) < len(configs):
-            print_report(read_rows(out / ROWS), _console())
+            print_report(read_rows(out / ROWS), _console(), STUDIES[study])
             print(f"Results are in {out}")
         for failure in failures:
             print(f"care-sim: failed: {failure}", file=sys.stderr)
@@ -149,7 +150,7 @@ class Sweep(_Study):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
         axes = (self.scenarios, self.policies, self.budgets, _seeds(self.seeds))
         faults = (self.false_negative_rates, self.camera_latencies)
-        return self.conduct(grid(*axes, *faults, **self.conditions.arguments()), self.out)
+        return self.conduct("sweep", grid(*axes, *faults, **self.conditions.arguments()), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,12 +164,12 @@ class Reproduce(_Study):
         """Run it."""
         from care_sim.study.paper import configurations
 
-        return self.conduct(configurations(_seeds(self.seeds)), self.out)
+        return self.conduct("paper", configurations(_seeds(self.seeds)), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Crowding(_Study):
-    """Find where the all-camera reserve collapses as vehicles fill the dense street, 117 configurations a seed."""
+    """Find where the all-camera reserve collapses as vehicles fill the dense street, 221 configurations a seed."""
 
     out: Path = Path("runs/crowding")
     """Folder of the results; an interrupted study goes on there."""
@@ -177,7 +178,7 @@ class Crowding(_Study):
         """Run it."""
         from care_sim.study.crowding import configurations
 
-        return self.conduct(configurations(_seeds(self.seeds)), self.out)
+        return self.conduct("crowding", configurations(_seeds(self.seeds)), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,10 +192,11 @@ class Report:
         """Run it."""
         from care_sim.study.report import ROWS, print_report, write_report
         from care_sim.study.rows import read_rows
+        from care_sim.study.studies import study_of
 
-        rows = read_rows(self.folder / ROWS)
-        print_report(rows, _console())
-        write_report(rows, self.folder)
+        rows, study = read_rows(self.folder / ROWS), study_of(self.folder / ROWS)
+        print_report(rows, _console(), study)
+        write_report(rows, self.folder, study)
         return 0
 
 

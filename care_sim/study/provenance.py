@@ -10,7 +10,8 @@ from pathlib import Path
 from uuid import uuid4
 
 import care_sim
-from care_sim.policies import BUILT_IN, ENTRY_POINTS
+from care_sim.policies import BUILT_IN
+from care_sim.policies.installed import entries
 
 LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numpy", "pyarrow", "pybullet", "scipy")
 
@@ -30,7 +31,7 @@ def policy_digest(policy: str) -> str | None:
     """
     if policy in BUILT_IN:
         return ""
-    (entry,) = metadata.entry_points(group=ENTRY_POINTS, name=policy)
+    entry = entries()[policy]
     spec = find_spec(entry.module.partition(".")[0])
     if spec is None:
         return None

@@ -22,7 +22,7 @@ def test_every_scenario_has_its_environment():
     ("change", "names"),
     [
         ({"scenario": "dance"}, ["'dance'", "cutin, dartout, dense"]),
-        ({"policy": "best"}, ["'best'", "all-camera, care"]),
+        ({"policy": "best"}, ["'best'", "all-camera", "care-sbf"]),
         ({"budget": 0.0}, ["budget", "(0, 1]"]),
         ({"budget": 1.1}, ["budget", "(0, 1]"]),
         ({"budget": float("nan")}, ["budget"]),
