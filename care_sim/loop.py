@@ -96,9 +96,14 @@ class ClosedLoop:
         )
 
     def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) where the objects behind forecasts are now, in the sensor frame. Truth: for the privileged alone."""
-        actors = [self._actors[self._objects[track]] for track in tracks.ids.tolist()]
-        return self.sensor.boxes_to_local(self.world.boxes(actors))
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object
+        keeps its forecast. Truth: for the privileged alone.
+        """
+        boxes = tracks.boxes.copy()
+        known = [(row, self._objects[track]) for row, track in enumerate(tracks.ids.tolist()) if track in self._objects]
+        actors = [self._actors[body] for _, body in known]
+        boxes[[row for row, _ in known]] = self.sensor.boxes_to_local(self.world.boxes(actors))
+        return boxes
 
     def full_scan(self) -> Scan:
         """What every cell would return now, before noise. Truth: for the privileged alone."""

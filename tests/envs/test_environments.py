@@ -102,6 +102,7 @@ def test_an_episode_stays_inside_its_spaces_and_ends(name):
     assert outcome["rays_fired"] == 20 * env.unwrapped.rig.budget
     assert set(outcome) == {
         "detection_distance_m",
+        "undetected_to_m",
         "braked",
         "min_distance_m",
         "clearance_m",
