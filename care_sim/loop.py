@@ -1,53 +1,39 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.conditions import Sensing
 from care_sim.control import BrakingController
-from care_sim.errors import check_whole
 from care_sim.frames import Floats, Frame
 from care_sim.grid import Cells
-from care_sim.perception.detectors import MIN_RETURNS, ReturnsDetector
+from care_sim.perception.detectors import ReturnsDetector
 from care_sim.perception.memory import TrackMemory
-from care_sim.sensors.camera import CameraDetector, CameraFaults, Picture, window_on
-from care_sim.sensors.engines import ENGINES, check_engine
-from care_sim.sensors.lidar import LIDAR_POSITION, Lidar, LidarNoise
-from care_sim.types import Belief, Keyframe, Rig, Scan, Tracks
+from care_sim.sensors.camera import CameraDetector, Picture, window_on
+from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
+from care_sim.types import Belief, Ego, Keyframe, Rig, Scan, Tracks
 from care_sim.world.bullet import Integers
 from care_sim.world.world import World
-
-
-@dataclass(frozen=True)
-class Sensing:
-    """How well the car senses: everything that degrades LiDAR and camera, off by default."""
-
-    engine: str = "bullet"
-    min_returns: int = MIN_RETURNS
-    camera: CameraFaults = field(default_factory=CameraFaults)
-    lidar: LidarNoise = field(default_factory=LidarNoise)
-
-    def __post_init__(self) -> None:
-        check_engine(self.engine)
-        check_whole("min_returns", self.min_returns, 1)
 
 
 class ClosedLoop:
     """A world, the sensors and the car's software over the keyframes of one episode."""
 
-    def __init__(
-        self, world: World, rig: Rig, sensing: Sensing, seeds: tuple[np.random.SeedSequence, np.random.SeedSequence]
-    ):
+    def __init__(self, world: World, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence]):
         self.world, self.rig = world, rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
         self._reported = [actor for actor in world.actors if actor.body in labels]
         self._actors = {actor.body: actor for actor in world.actors}
-        camera_rng, noise_rng = (np.random.default_rng(seed) for seed in seeds)
+        camera_seed, lidar_seed, odometry_seed = seeds
         engine = ENGINES[sensing.engine](world.bullet)
-        self._lidar = Lidar(rig.grid, engine, sensing.lidar, noise_rng)
-        self._camera = CameraDetector(labels, sensing.camera, rig.keyframe_s, camera_rng)
+        self._lidar = Lidar(rig.grid, engine, sensing, np.random.default_rng(lidar_seed))
+        self._camera = CameraDetector(labels, sensing, rig.keyframe_s, camera_seed, rig.cameras[0], rig.sensor_height_m)
+        self._speed_sigma, self._odometry = sensing.ego_speed_sigma, np.random.default_rng(odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._memory = TrackMemory(rig.keyframe_s)
         self._objects: dict[int, int] = {}
@@ -72,7 +58,7 @@ class ClosedLoop:
         detections, detected = self._detector.detect(bodies, partial(self._local_boxes, sensor))
         tracks = self._memory.update(detections, sensor)
         self._objects.update(zip(tracks.tolist(), detected.tolist(), strict=True))
-        command = self._controller.command(self._memory.tracks(sensor), world.ego_motion)
+        command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
 
         distance = self._distance_to_first_sighting(sensor)
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
@@ -112,16 +98,23 @@ class ClosedLoop:
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
         sensor = self.sensor
-        camera = self.rig.cameras[0]
-        window = window_on(camera, sensor.boxes_to_local(self.world.boxes(self._reported)))
+        camera, boxes = self._camera.mounted, sensor.boxes_to_local(self.world.boxes(self._reported))
+        window = window_on(camera, boxes)
         self.picture = Picture.of(self.world.bullet.body_ids(camera, sensor, window), window)
         self.belief = Belief(
-            self.world.ego_motion,
+            self._odometry_reading(),
             self.rig.budget,
-            self._camera.detect(self.picture, sensor.yaw),
+            self._camera.detect(self.picture, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
             self._memory.tracks(sensor),
             ranges,
         )
+
+    def _odometry_reading(self) -> Ego:
+        """The car's own motion as its software reads it."""
+        motion = self.world.ego_motion
+        if not self._speed_sigma:
+            return motion
+        return replace(motion, speed=max(motion.speed + self._speed_sigma * self._odometry.standard_normal(), 0.0))
 
     def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)

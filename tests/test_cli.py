@@ -5,7 +5,7 @@ import time
 import pytest
 
 from care_sim.cli import main
-from care_sim.study.commands import Conditions
+from care_sim.study.commands import Options
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.report import ROWS
 from care_sim.study.rows import read_rows
@@ -120,7 +120,7 @@ def test_an_installed_policy_that_does_not_load_is_listed_with_the_reason(capsys
 
 def test_the_defaults_are_those_of_an_episode():
     usual = EpisodeConfig("dense", "care")
-    assert all(getattr(usual, name) == value for name, value in Conditions().arguments().items())
+    assert all(getattr(usual, name) == value for name, value in Options().arguments().items())
 
 
 @pytest.mark.parametrize("command", ["", "run", "sweep", "reproduce", "crowding", "report"])

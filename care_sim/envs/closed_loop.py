@@ -1,7 +1,7 @@
 """The closed-loop environments: thin Gymnasium adapters around `care_sim.loop`."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any, ClassVar
 
 import gymnasium
@@ -10,22 +10,24 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from care_sim import reward as rewards
-from care_sim.allocation import RESERVE_FRACTION, budget_cells, fired_cells
+from care_sim.allocation import budget_cells, fired_cells
+from care_sim.conditions import Conditions
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.envs.truth import EpisodeTruth
-from care_sim.errors import InvalidInput, check_number
+from care_sim.errors import InvalidInput
 from care_sim.evaluation.metrics import outcome
 from care_sim.grid import AngularGrid
-from care_sim.loop import ClosedLoop, Sensing
-from care_sim.perception.detectors import MIN_RETURNS
+from care_sim.loop import ClosedLoop
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import FRONT_CAMERA, CameraFaults
-from care_sim.sensors.lidar import LidarNoise
+from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.engines import check_engine
+from care_sim.sensors.lidar import LIDAR_POSITION, dead_cells
 from care_sim.truth import Truth
 from care_sim.types import Action, Keyframe, Rig
 from care_sim.world.world import whole_steps
 
 Observed = dict[str, NDArray[np.float32]]
+_CONDITIONS = {field.name for field in fields(Conditions)}
 
 
 class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
@@ -59,11 +61,15 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
     `info["outcome"]`, a dict of `care_sim.types.Outcome`.
 
     ### Arguments
-    `budget` beta in (0, 1]; `reserve_fraction` rho of the shared allocator; `false_negative_rate` and
-    `camera_latency` (whole keyframes) of the camera; `min_returns` of the proxy detector;
-    `lidar_range_sigma` (m) and `lidar_dropout`; `engine`; `floor`; `keyframe_s`; `reward_weights`, a
-    mapping of changes; `render_mode` None or "rgb_array"; any field of the scenario. A value that is not
-    allowed raises `care_sim.InvalidInput`.
+    `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode` None or
+    "rgb_array"; any field of the scenario; and the conditions, any field of
+    `care_sim.conditions.Conditions`. Of these, the allocator: `reserve_fraction` rho, `floor`, `floor_seed`,
+    `azimuth_margin`, `elevation_margin`. The detectors: `engine`, `min_returns`, `camera_confidence`. Camera
+    faults: `false_negative_rate`, `false_negative_per_m`, `false_negative_burst` (keyframes),
+    `false_positive_rate` (a picture), `camera_latency` and `camera_jitter` (whole keyframes),
+    `blackout_start_s`, `blackout_s`, `camera_rotation_sigma_deg`, `camera_position_sigma_m`. LiDAR faults:
+    `lidar_range_sigma` (m), `lidar_dropout`, `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are
+    off by default and drawn by the seed. A value that is not allowed raises `care_sim.InvalidInput`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's interface)
@@ -73,41 +79,36 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         self,
         *,
         budget: float = 0.10,
-        reserve_fraction: float = RESERVE_FRACTION,
-        false_negative_rate: float = 0.0,
-        camera_latency: int = 0,
-        min_returns: int = MIN_RETURNS,
-        lidar_range_sigma: float = 0.0,
-        lidar_dropout: float = 0.0,
-        engine: str = "bullet",
-        floor: bool = True,
         keyframe_s: float = 0.1,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
-        **scenario_parameters: Any,
+        **parameters: Any,
     ):
-        check_number("reserve_fraction", reserve_fraction, 0, 1)
-        if not isinstance(floor, bool):
-            raise InvalidInput(f"floor must be True or False, got {floor!r}")
         whole_steps(keyframe_s)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
         grid = AngularGrid()
-        self.rig = Rig(grid, (FRONT_CAMERA,), budget_cells(budget, grid.size), reserve_fraction, keyframe_s)
-        self.sensing = Sensing(
-            engine,
-            min_returns,
-            CameraFaults(false_negative_rate, camera_latency),
-            LidarNoise(lidar_range_sigma, lidar_dropout),
+        conditions = Conditions(**{name: parameters.pop(name) for name in [*parameters] if name in _CONDITIONS})
+        check_engine(conditions.engine)
+        dead_cells(grid, conditions.lidar_dead_rows)
+        self.conditions = conditions
+        self.rig = Rig(
+            grid,
+            (FRONT_CAMERA,),
+            budget_cells(budget, grid.size),
+            conditions.reserve_fraction,
+            keyframe_s,
+            conditions.azimuth_margin,
+            conditions.elevation_margin,
+            LIDAR_POSITION[2],
         )
-        self.scenario = make_scenario(self.scenario_name, **scenario_parameters)
+        self.scenario = make_scenario(self.scenario_name, **parameters)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
         self.keyframes: list[Keyframe] = []
         self._weights = rewards.weights(reward_weights)
-        self._floor_on = floor
         self._loop: ClosedLoop | None = None
 
     @property
@@ -131,11 +132,12 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         """
         super().reset(seed=seed)
         entropy = seed if seed is not None else int(self.np_random.integers(2**32))
-        scenario, camera, noise, floor = np.random.SeedSequence(entropy).spawn(4)
+        scenario, camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(5)
         self.close()
         world = self.scenario.build(np.random.default_rng(scenario))
-        self._loop = ClosedLoop(world, self.rig, self.sensing, (camera, noise))
-        self._floor_rng = np.random.default_rng(floor)
+        self._loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
+        floors = [floor, *floor.spawn(self.conditions.floor_seed)]
+        self._floor_rng = np.random.default_rng(floors[-1])
         self._in_view = self._detected = self._over = False
         self.keyframes = []
         return self._loop.belief.to_observation(), {"seed": entropy}
@@ -152,7 +154,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         scores = checked_scores(action, self.rig.grid.shape)
         # Drawn at every keyframe, so that it is the same for every policy.
         floor = self._floor_rng.permutation(self.rig.grid.size)
-        frame = loop.keyframe(fired_cells(scores, self.rig.budget, floor if self._floor_on else None))
+        frame = loop.keyframe(fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None))
         self.keyframes.append(frame)
         self._in_view |= frame.in_view
         self._detected |= frame.detected
@@ -182,7 +184,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
 
     def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         return {
-            "fired": frame.fired if self._floor_on else frame.fired.tolist(),
+            "fired": frame.fired if self.conditions.floor else frame.fired.tolist(),
             "detected": frame.detected,
             "in_view": frame.in_view,
             "braking": frame.braking,

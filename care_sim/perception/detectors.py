@@ -4,12 +4,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from care_sim.conditions import MIN_RETURNS
 from care_sim.frames import Floats
 from care_sim.types import Detections
 from care_sim.world.bullet import Integers
-
-MIN_RETURNS = 3
-"""Fired rays that must hit an object. The fewest that span a surface."""
 
 
 class ReturnsDetector:

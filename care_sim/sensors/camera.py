@@ -1,15 +1,16 @@
-"""A ground-truth camera: boxes read off the visible pixels, with injectable misses and latency."""
+"""A ground-truth camera: boxes read off the visible pixels."""
 
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
-from care_sim.errors import check_number, check_whole
+from care_sim.conditions import Sensing
 from care_sim.frames import Floats
 from care_sim.pinhole import PinholeCamera
+from care_sim.sensors.camera_faults import Delay, Ghosts, Misses, mounted
 from care_sim.types import ImageDetections
 from care_sim.world.bullet import Integers, Window
 
@@ -26,18 +27,6 @@ an unoccluded adult at about 40 m."""
 FULL_CONFIDENCE = 3 * MIN_PIXELS
 """Visible pixels at which n / (n + FULL_CONFIDENCE) is one half; the least box then has confidence
 0.25, the detector threshold of the paper."""
-
-
-@dataclass(frozen=True)
-class CameraFaults:
-    """`false_negative_rate` per detection and frame, `latency` in whole keyframes."""
-
-    false_negative_rate: float = 0.0
-    latency: int = 0
-
-    def __post_init__(self) -> None:
-        check_number("false_negative_rate", self.false_negative_rate, 0, 1)
-        check_whole("camera_latency", self.latency, 0)
 
 
 def window_on(camera: PinholeCamera, boxes: Floats) -> Window:
@@ -82,56 +71,47 @@ class Picture:
 
 
 class CameraDetector:
-    """Turns pictures into detections: knows the classes of the reported bodies, misses some, is late.
+    """Turns pictures into detections: knows the classes of the reported bodies, and errs as `faults` say.
 
-    Misses are drawn for every body in every frame, seen or not, so that every policy meets the same
-    ones. `labels` maps body ids to classes; bodies that it does not hold are not detected.
+    `labels` maps body ids to classes; bodies that it does not hold are not detected. `camera` is the camera
+    that the rig knows, `height_m` that of the sensor frame above the road.
     """
 
-    def __init__(self, labels: Mapping[int, int], faults: CameraFaults, keyframe_s: float, rng: np.random.Generator):
-        self._labels = labels
-        self._faults = faults
-        self._keyframe_s = keyframe_s
-        self._rng = rng
-        self._frames: deque[tuple[ImageDetections, float]] = deque(maxlen=int(faults.latency) + 1)
+    def __init__(
+        self,
+        labels: Mapping[int, int],
+        sensing: Sensing,
+        keyframe_s: float,
+        seed: np.random.SeedSequence,
+        camera: PinholeCamera = FRONT_CAMERA,
+        height_m: float = 1.84,
+    ):
+        ghosts, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
+        self._labels, self._sensing = labels, sensing
+        self._misses = Misses(len(labels), sensing, np.random.default_rng(seed))
+        self._ghosts = Ghosts(camera, height_m, sensing.false_positive_rate, ghosts)
+        self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
+        self.mounted = mounted(camera, sensing, mount)
+        """The camera as it really stands."""
 
-    def detect(self, picture: Picture, heading: float) -> ImageDetections:
-        """The newest detections that are due, the surest first; `picture` is the latest, taken at `heading`."""
-        self._frames.append((self._look(picture), heading))
-        if len(self._frames) <= self._faults.latency:
-            return _NOTHING_SEEN
-        detections, heading_then = self._frames[0]
-        age = self._faults.latency * self._keyframe_s
-        return replace(
-            detections,
-            ages=np.full(len(detections), age),
-            yaw_changes=np.full(len(detections), heading - heading_then),
+    def detect(self, picture: Picture, heading: float, ranges: Floats, time_s: float) -> ImageDetections:
+        """The newest detections that are due, the surest first; `picture` is the latest, taken at `heading`.
+
+        `ranges` (n,) are the distances of the labelled bodies in metres, in the order of the labels.
+        """
+        seen = self._seen(picture, self._misses.draw(ranges)), self._ghosts.draw()
+        rows = np.concatenate([detections.rows() for detections in seen])
+        kept = rows[(rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))]
+        surest_first = kept[np.lexsort((kept[:, 2], -kept[:, 1]))]
+        return self._delay.newest(ImageDetections.from_rows(surest_first), heading)
+
+    def _seen(self, picture: Picture, missed: NDArray[np.bool_]) -> ImageDetections:
+        found = {body for body, is_missed in zip(self._labels, missed.tolist(), strict=True) if not is_missed}
+        seen = (picture.pixels >= MIN_PIXELS) & np.array(
+            [body in found for body in picture.bodies.tolist()], dtype=bool
         )
-
-    def _look(self, picture: Picture) -> ImageDetections:
-        draws = self._rng.random(len(self._labels))
-        missed = {
-            body for body, draw in zip(self._labels, draws, strict=True) if draw < self._faults.false_negative_rate
-        }
-        seen = np.array(
-            [
-                pixels >= MIN_PIXELS and body in self._labels and body not in missed
-                for body, pixels in zip(picture.bodies.tolist(), picture.pixels.tolist(), strict=True)
-            ],
-            dtype=bool,
-        )
-        pixels, boxes = picture.pixels[seen], picture.boxes[seen]
-        order = np.lexsort((boxes[:, 0], -pixels))
-        classes = np.array([self._labels[body] for body in picture.bodies[seen].tolist()], dtype=np.int64)
-        zeros = np.zeros(len(classes))
-        return ImageDetections(
-            classes[order],
-            (pixels / (pixels + FULL_CONFIDENCE))[order],
-            boxes[order],
-            zeros.astype(np.int64),
-            zeros,
-            zeros,
-        )
-
-
-_NOTHING_SEEN = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
+        pixels, bodies = picture.pixels[seen], picture.bodies[seen].tolist()
+        classes = np.array([self._labels[body] for body in bodies], dtype=np.int64)
+        zeros = np.zeros(len(bodies))
+        confidences = pixels / (pixels + FULL_CONFIDENCE)
+        return ImageDetections(classes, confidences, picture.boxes[seen], zeros.astype(np.int64), zeros, zeros)

@@ -1,10 +1,12 @@
 """A LiDAR that fires chosen cells, and nothing else."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from care_sim.errors import check_number
+from care_sim.conditions import LidarFaults
+from care_sim.errors import InvalidInput
 from care_sim.frames import Frame, turned
 from care_sim.grid import AngularGrid, Cells
 from care_sim.sensors.engines import RayEngine
@@ -17,27 +19,16 @@ NEAREST_M = 0.01
 """A noisy return stays this far from 0 m (not fired) and from the reach (no return)."""
 
 
-@dataclass(frozen=True)
-class LidarNoise:
-    """Gaussian `range_sigma_m` on every return and the rate of returns lost (`dropout`)."""
-
-    range_sigma_m: float = 0.0
-    dropout: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_number("lidar_dropout", self.dropout, 0, 1)
-        check_number("lidar_range_sigma", self.range_sigma_m, 0)
-
-
 class Lidar:
     """Casts the fired cells through a ray engine; noise draws are one a cell, fired or not, so that
     every policy meets the same noise (common random numbers).
     """
 
-    def __init__(self, grid: AngularGrid, engine: RayEngine, noise: LidarNoise, rng: np.random.Generator):
+    def __init__(self, grid: AngularGrid, engine: RayEngine, faults: LidarFaults, rng: np.random.Generator):
         self.grid = grid
         self._engine = engine
-        self._noise = noise
+        self._faults = faults
+        self._dead = dead_cells(grid, faults.lidar_dead_rows)
         self._rng = rng
 
     def peek(self, sensor: Frame) -> Scan:
@@ -53,11 +44,21 @@ class Lidar:
         """
         directions = turned(self.grid.directions[cells], sensor.yaw)
         ranges, ids = self._engine.cast(sensor.origin, directions, self.grid.range_m)
-        if self._noise.range_sigma_m > 0:
+        if self._faults.lidar_range_sigma > 0:
             draws = self._rng.standard_normal(self.grid.size)[cells]
-            noisy = np.clip(ranges + self._noise.range_sigma_m * draws, NEAREST_M, self.grid.range_m - NEAREST_M)
+            noisy = np.clip(ranges + self._faults.lidar_range_sigma * draws, NEAREST_M, self.grid.range_m - NEAREST_M)
             ranges = np.where(np.isinf(ranges), ranges, noisy)
-        if self._noise.dropout > 0:
-            lost = self._rng.random(self.grid.size)[cells] < self._noise.dropout
+        if self._faults.lidar_dropout > 0:
+            lost = self._rng.random(self.grid.size)[cells] < self._faults.lidar_dropout
             ranges, ids = np.where(lost, np.inf, ranges), np.where(lost, NOTHING, ids)
+        if self._faults.lidar_dead_rows:
+            ranges, ids = np.where(self._dead[cells], np.inf, ranges), np.where(self._dead[cells], NOTHING, ids)
         return Scan(cells, ranges), ids
+
+
+def dead_cells(grid: AngularGrid, rows: Sequence[int]) -> NDArray[np.bool_]:
+    """(N,) mask of the cells of dead rows. Raises InvalidInput for a row that the grid does not have."""
+    for row in rows:
+        if row >= grid.rows:
+            raise InvalidInput(f"lidar_dead_rows must lie in 0..{grid.rows - 1}, got {row}")
+    return np.isin(np.arange(grid.size) // grid.columns, rows)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from care_sim.allocation import RESERVE_FRACTION
+from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
-from care_sim.perception.detectors import MIN_RETURNS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,21 +27,9 @@ PIPE_WIDTH = 180
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conditions:
+class Options(Conditions):
     """Conditions that all episodes share."""
 
-    reserve_fraction: float = RESERVE_FRACTION
-    """Share rho of the budget that the allocator keeps for the reserve, 0 to 1."""
-    min_returns: int = MIN_RETURNS
-    """Fired rays that must hit an object for it to be detected."""
-    lidar_range_sigma: float = 0.0
-    """Gaussian noise on every range, metres."""
-    lidar_dropout: float = 0.0
-    """Rate of returns lost, 0 to 1."""
-    engine: str = "bullet"
-    """Ray engine."""
-    floor: bool = True
-    """Whether the shared random floor spends what the policy leaves of the budget."""
     scenario_parameters: tuple[str, ...] = ()
     """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
     policy_parameters: tuple[str, ...] = ()
@@ -69,13 +56,9 @@ class Run:
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     seed: int = 0
     """Draws scenario, camera faults, noise and floor."""
-    false_negative_rate: float = 0.0
-    """Rate at which the camera misses a detection, 0 to 1."""
-    camera_latency: int = 0
-    """Age of the camera's detections in whole keyframes."""
     picture: Path | None = None
     """PNG file for a picture of the first keyframe at which the brake is on."""
-    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = Conditions()
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = Options()
     """Further conditions."""
 
     def __call__(self) -> int:
@@ -86,8 +69,7 @@ class Run:
         from care_sim.study.timeline import print_timeline
 
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
-        faults = ([self.false_negative_rate], [self.camera_latency])
-        (config,) = grid(*axes, *faults, **self.conditions.arguments())
+        (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer = Photographer(self.picture)
@@ -132,25 +114,27 @@ class Sweep(_Study):
     """`care-sim policies` lists them. `full` always runs with budget 1.0."""
     budgets: tuple[float, ...] = (0.1,)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
-    false_negative_rates: tuple[float, ...] = (0.0,)
-    """Rates at which the camera misses a detection, 0 to 1."""
-    camera_latencies: tuple[int, ...] = (0,)
-    """Ages of the camera's detections in whole keyframes."""
+    false_negative_rates: tuple[float, ...] = ()
+    """Several of --false-negative-rate, in turn."""
+    camera_latencies: tuple[int, ...] = ()
+    """Several of --camera-latency, in turn."""
     out: Path = Path("runs/sweep")
     """Folder of the results; an interrupted sweep goes on there."""
-    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = Conditions()
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = Options()
     """Further conditions."""
 
     def __call__(self) -> int:
         """Run it."""
         from care_sim.study.config import grid
 
-        for axis in ("scenarios", "policies", "budgets", "seeds", "false_negative_rates", "camera_latencies"):
+        for axis in ("scenarios", "policies", "budgets", "seeds"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
         axes = (self.scenarios, self.policies, self.budgets, _seeds(self.seeds))
-        faults = (self.false_negative_rates, self.camera_latencies)
-        return self.conduct("sweep", grid(*axes, *faults, **self.conditions.arguments()), self.out)
+        common = self.conditions.arguments()
+        rate, latency = common.pop("false_negative_rate"), common.pop("camera_latency")
+        rates, latencies = self.false_negative_rates or (rate,), self.camera_latencies or (latency,)
+        return self.conduct("sweep", grid(*axes, rates, latencies, **common), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,10 +11,9 @@ from typing import Any
 import gymnasium
 
 import care_sim
-from care_sim.allocation import RESERVE_FRACTION
+from care_sim.conditions import UNFELT_BY_FULL, Conditions
 from care_sim.envs import IDS
 from care_sim.errors import InvalidInput, check_whole
-from care_sim.perception.detectors import MIN_RETURNS
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
 from care_sim.scenarios import make_scenario
@@ -26,15 +25,12 @@ Parameters = tuple[tuple[str, Any], ...]
 ENVIRONMENTS = {name.split("-")[1].lower(): name for name in IDS}
 """Environment id of every scenario."""
 
-FULL_CONDITIONS = (1.0, 0.0, 0)
-"""`full` fires every cell and asks no camera, whatever budget, misses and latency of the policies it bounds."""
-
 LARGEST_SEED = 2**63 - 1
 """What a column of a results file holds."""
 
 
 @dataclass(frozen=True)
-class EpisodeConfig:
+class EpisodeConfig(Conditions):
     """Everything that decides an episode.
 
     The fields are the arguments of the environments (see `care_sim.envs.closed_loop.ClosedLoopEnv`);
@@ -46,14 +42,6 @@ class EpisodeConfig:
     policy: str
     budget: float = 0.1
     seed: int = 0
-    reserve_fraction: float = RESERVE_FRACTION
-    false_negative_rate: float = 0.0
-    camera_latency: int = 0
-    min_returns: int = MIN_RETURNS
-    lidar_range_sigma: float = 0.0
-    lidar_dropout: float = 0.0
-    engine: str = "bullet"
-    floor: bool = True
     scenario_parameters: Parameters = ()
     policy_parameters: Parameters = ()
 
@@ -71,14 +59,7 @@ class EpisodeConfig:
             f"care_sim:{ENVIRONMENTS[self.scenario]}",
             disable_env_checker=True,
             budget=self.budget,
-            reserve_fraction=self.reserve_fraction,
-            false_negative_rate=self.false_negative_rate,
-            camera_latency=self.camera_latency,
-            min_returns=self.min_returns,
-            lidar_range_sigma=self.lidar_range_sigma,
-            lidar_dropout=self.lidar_dropout,
-            engine=self.engine,
-            floor=self.floor,
+            **{field.name: getattr(self, field.name) for field in fields(Conditions)},
             **dict(self.scenario_parameters),
         )
 
@@ -116,8 +97,10 @@ class EpisodeConfig:
         return " ".join([f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes])
 
 
-PLAIN_FIELDS = [field.name for field in fields(EpisodeConfig) if not field.name.endswith("_parameters")]
+PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *(field.name for field in fields(Conditions))]
 """Fields that are one value."""
+
+_USUAL = {field.name: field.default for field in fields(Conditions)}
 
 
 def grid(
@@ -129,15 +112,24 @@ def grid(
     camera_latencies: Sequence[int] = (0,),
     **common: Any,
 ) -> list[EpisodeConfig]:
-    """All combinations, without repeats; `full` runs once for all conditions. `common` are further fields."""
-    conditions = list(product(budgets, false_negative_rates, camera_latencies))
+    """All combinations, without repeats; `full` runs once for all that it does not feel.
+
+    `common` are further fields of `EpisodeConfig`.
+    """
+    axes = list(product(budgets, false_negative_rates, camera_latencies))
     configs = (
-        EpisodeConfig(scenario, policy, budget, seed, false_negative_rate=rate, camera_latency=latency, **common)
+        _config(scenario, policy, budget, seed, {"false_negative_rate": rate, "camera_latency": latency} | common)
         for scenario, policy in product(scenarios, policies)
-        for budget, rate, latency in ([FULL_CONDITIONS] if policy == "full" else conditions)
+        for budget, rate, latency in axes
         for seed in seeds
     )
     return list(dict.fromkeys(configs))
+
+
+def _config(scenario: str, policy: str, budget: float, seed: int, given: dict[str, Any]) -> EpisodeConfig:
+    if policy == "full":
+        budget, given = 1.0, given | {name: _USUAL[name] for name in UNFELT_BY_FULL}
+    return EpisodeConfig(scenario, policy, budget, seed, **given)
 
 
 def without_seeds(configs: Sequence[EpisodeConfig]) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from care_sim.conditions import CAMERA_FAULTS, UNFELT_BY_FULL
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.study.config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
@@ -17,9 +18,6 @@ Conditions = tuple[tuple[str, Any], ...]
 
 _AXES = ("scenario", "policy", "budget", "seed")
 _USUAL = {field.name: field.default for field in fields(EpisodeConfig)}
-_OF_CAMERA = ("false_negative_rate", "camera_latency")
-_UNFELT_BY_FULL = (*_OF_CAMERA, "reserve_fraction", "floor")
-"""A scan of every cell asks neither the camera nor the allocator."""
 
 
 @dataclass(frozen=True, order=True)
@@ -32,7 +30,7 @@ class Setting:
     @property
     def faults(self) -> bool:
         """Whether the camera is impaired."""
-        return any(name in _OF_CAMERA for name, _ in self.conditions)
+        return any(name in CAMERA_FAULTS for name, _ in self.conditions)
 
     @property
     def label(self) -> str:
@@ -41,7 +39,7 @@ class Setting:
 
     def for_full(self) -> "Setting":
         """The setting in which the full scan of the same world is found."""
-        return Setting(self.scenario, tuple(pair for pair in self.conditions if pair[0] not in _UNFELT_BY_FULL))
+        return Setting(self.scenario, tuple(pair for pair in self.conditions if pair[0] not in UNFELT_BY_FULL))
 
 
 Key = tuple[Setting, str, float]

@@ -2,7 +2,7 @@
 
 import pickle
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import gymnasium
 import numpy as np
@@ -10,14 +10,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import care_sim
+from care_sim.conditions import Conditions
 from care_sim.envs import IDS
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.loop import Sensing
 from care_sim.reward import WEIGHTS
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.dartout import Dartout
-from care_sim.sensors.camera import CameraFaults
-from care_sim.sensors.lidar import LidarNoise
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
@@ -214,15 +212,12 @@ def test_misses_and_losses_are_the_seeds_own_even_where_the_street_is_not():
 
 
 def test_arguments_of_the_sensing_arrive():
-    env = make(
-        "CARE-Dartout-v0",
-        min_returns=9,
-        false_negative_rate=0.2,
-        camera_latency=2,
-        lidar_range_sigma=0.03,
-        lidar_dropout=0.1,
-    ).unwrapped
-    assert env.sensing == Sensing("bullet", 9, CameraFaults(0.2, 2), LidarNoise(0.03, 0.1))
+    arguments = {"min_returns": 9, "false_negative_rate": 0.2, "camera_latency": 2, "lidar_dropout": 0.1}
+    assert make("CARE-Dartout-v0", **arguments).unwrapped.conditions == Conditions(**arguments)
+
+
+def test_every_condition_stands_on_the_page_of_the_environments():
+    assert [f.name for f in fields(Conditions) if f"`{f.name}`" not in ClosedLoopEnv.__doc__] == []
 
 
 def test_a_contact_ends_the_episode_with_the_speed_it_happened_at():

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from care_sim.conditions import Sensing
 from care_sim.errors import InvalidInput
-from care_sim.loop import Sensing
 from care_sim.perception.detectors import ReturnsDetector
 
 LABELS = {4: 0, 9: 4}

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from care_sim.conditions import Sensing
 from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.sensors.camera import (
@@ -8,7 +9,6 @@ from care_sim.sensors.camera import (
     FULL_CONFIDENCE,
     MIN_PIXELS,
     CameraDetector,
-    CameraFaults,
     Picture,
     window_on,
 )
@@ -19,8 +19,20 @@ SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 PEDESTRIAN = CLASSES.index("pedestrian")
 
 
+class Detector(CameraDetector):
+    """Everybody 20 m away, one picture a keyframe."""
+
+    def __init__(self, labels, sensing, keyframe_s, seed):
+        super().__init__(labels, sensing, keyframe_s, seed)
+        self.ranges, self.keyframe_s, self.frame = np.full(len(labels), 20.0), keyframe_s, -1
+
+    def detect(self, picture, heading):
+        self.frame += 1
+        return super().detect(picture, heading, self.ranges, self.frame * self.keyframe_s)
+
+
 def detector(labels, keyframe_s=0.1, seed=0, **faults):
-    return CameraDetector(labels, CameraFaults(**faults), keyframe_s, np.random.default_rng(seed))
+    return Detector(labels, Sensing(**faults), keyframe_s, np.random.SeedSequence(seed))
 
 
 def picture(*boxes, shape=(180, 320)):
@@ -178,7 +190,7 @@ def test_another_seed_misses_others():
 
 @pytest.mark.parametrize("latency", [0, 1, 2, 3])
 def test_a_late_camera_shows_exactly_the_picture_of_then(latency):
-    camera = detector({1: 0}, latency=latency)
+    camera = detector({1: 0}, camera_latency=latency)
     found = [camera.detect(picture((1, 10 * t, 0, 10 * t + 9, 9)), 0.1 * t**2) for t in range(8)]
     assert [len(one) for one in found] == [0] * latency + [1] * (8 - latency)
     for t in range(latency, 8):
@@ -188,7 +200,7 @@ def test_a_late_camera_shows_exactly_the_picture_of_then(latency):
 
 
 def test_latency_counts_keyframes_of_any_length():
-    camera = detector({1: 0}, keyframe_s=0.5, latency=1)
+    camera = detector({1: 0}, keyframe_s=0.5, camera_latency=1)
     camera.detect(picture((1, 0, 0, 9, 9)), 0.0)
     assert camera.detect(picture((1, 0, 0, 9, 9)), 0.0).ages.tolist() == [0.5]
 
@@ -199,13 +211,13 @@ def test_latency_counts_keyframes_of_any_length():
         ({"false_negative_rate": -0.1}, "false_negative_rate"),
         ({"false_negative_rate": 1.1}, "false_negative_rate"),
         ({"false_negative_rate": float("nan")}, "false_negative_rate"),
-        ({"latency": -1}, "camera_latency"),
-        ({"latency": 0.5}, "camera_latency"),
+        ({"camera_latency": -1}, "camera_latency"),
+        ({"camera_latency": 0.5}, "camera_latency"),
     ],
 )
 def test_impossible_faults_are_refused_by_name(faults, named):
     with pytest.raises(InvalidInput, match=named):
-        CameraFaults(**faults)
+        Sensing(**faults)
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.4, -0.3])

@@ -3,10 +3,11 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from care_sim.conditions import Sensing
 from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.sensors.engines import ENGINES, check_engine
-from care_sim.sensors.lidar import Lidar, LidarNoise
+from care_sim.sensors.lidar import Lidar, dead_cells
 from care_sim.types import Scan
 from care_sim.world.bodies import CATALOGUE
 
@@ -33,7 +34,7 @@ def street(bullet):
 
 
 def lidar(grid, bullet, seed=0, **noise):
-    return Lidar(grid, ENGINES["bullet"](bullet), LidarNoise(**noise), np.random.default_rng(seed))
+    return Lidar(grid, ENGINES["bullet"](bullet), Sensing(**noise), np.random.default_rng(seed))
 
 
 def everything(grid):
@@ -43,7 +44,7 @@ def everything(grid):
 def test_only_the_fired_cells_are_cast(grid, street):
     engine = Watched(street)
     cells = np.array([5, 300, 9000, 16383])
-    Lidar(grid, engine, LidarNoise(), np.random.default_rng(0)).fire(cells, SENSOR)
+    Lidar(grid, engine, Sensing(), np.random.default_rng(0)).fire(cells, SENSOR)
     assert len(engine.directions) == 1
     assert engine.directions[0] == pytest.approx(grid.directions[cells])
 
@@ -93,7 +94,7 @@ def test_without_noise_the_generator_does_not_matter(grid, street):
 
 def test_range_noise_has_its_spread_and_leaves_misses_alone(grid, street):
     clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
-    noisy, _ = lidar(grid, street, range_sigma_m=0.05).fire(everything(grid), SENSOR)
+    noisy, _ = lidar(grid, street, lidar_range_sigma=0.05).fire(everything(grid), SENSOR)
     hit = np.isfinite(clean.ranges)
     errors = noisy.ranges[hit] - clean.ranges[hit]
     assert np.isinf(noisy.ranges[~hit]).all()
@@ -103,7 +104,7 @@ def test_range_noise_has_its_spread_and_leaves_misses_alone(grid, street):
 
 def test_dropout_loses_its_share_of_returns_with_their_bodies(grid, street):
     clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
-    noisy, bodies = lidar(grid, street, dropout=0.3).fire(everything(grid), SENSOR)
+    noisy, bodies = lidar(grid, street, lidar_dropout=0.3).fire(everything(grid), SENSOR)
     hit = np.isfinite(clean.ranges)
     assert np.isinf(noisy.ranges[hit]).mean() == pytest.approx(0.3, abs=0.05)
     assert np.array_equal(bodies == -1, np.isinf(noisy.ranges))
@@ -112,18 +113,33 @@ def test_dropout_loses_its_share_of_returns_with_their_bodies(grid, street):
 
 
 def test_total_dropout_returns_nothing(grid, street):
-    scan, bodies = lidar(grid, street, dropout=1.0).fire(everything(grid), SENSOR)
+    scan, bodies = lidar(grid, street, lidar_dropout=1.0).fire(everything(grid), SENSOR)
     assert np.isinf(scan.ranges).all()
     assert np.all(bodies == -1)
 
 
 def test_noise_of_a_cell_does_not_depend_on_which_others_fire(grid, street):
-    noise = {"range_sigma_m": 0.1, "dropout": 0.3}
+    noise = {"lidar_range_sigma": 0.1, "lidar_dropout": 0.3}
     everywhere, here = lidar(grid, street, **noise), lidar(grid, street, **noise)
     cells = np.arange(7000, 9000, 3)
     for _ in range(3):
         full, part = everywhere.fire(everything(grid), SENSOR)[0], here.fire(cells, SENSOR)[0]
         assert np.array_equal(part.ranges, full.ranges[cells])
+
+
+def test_a_dead_row_fires_and_returns_nothing(grid, street):
+    clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
+    scan, bodies = lidar(grid, street, lidar_dead_rows=(9, 12)).fire(everything(grid), SENSOR)
+    dead = np.isin(np.arange(grid.size) // grid.columns, (9, 12))
+    assert np.isfinite(clean.ranges[dead]).any()
+    assert np.isinf(scan.ranges[dead]).all()
+    assert np.all(bodies[dead] == -1)
+    assert np.array_equal(scan.ranges[~dead], clean.ranges[~dead])
+
+
+def test_a_row_that_the_grid_lacks_cannot_be_dead(grid):
+    with pytest.raises(InvalidInput, match=r"lidar_dead_rows must lie in 0\.\.31, got 32"):
+        dead_cells(grid, (32,))
 
 
 def test_firing_nothing_returns_nothing(grid, street):
@@ -133,12 +149,13 @@ def test_firing_nothing_returns_nothing(grid, street):
 
 @pytest.mark.parametrize(
     ("noise", "named"),
-    [({"dropout": 1.5}, "dropout"), ({"dropout": -0.1}, "dropout"), ({"range_sigma_m": -1}, "lidar_range_sigma"),
-     ({"range_sigma_m": float("nan")}, "lidar_range_sigma")],
+    [({"lidar_dropout": 1.5}, "dropout"),
+     ({"lidar_dropout": -0.1}, "dropout"), ({"lidar_range_sigma": -1}, "range_sigma"),
+     ({"lidar_range_sigma": float("nan")}, "lidar_range_sigma")],
 )  # fmt: skip
 def test_impossible_noise_is_refused_by_name(noise, named):
     with pytest.raises(InvalidInput, match=named):
-        LidarNoise(**noise)
+        Sensing(**noise)
 
 
 def test_an_unknown_engine_is_refused_with_the_known_ones():
