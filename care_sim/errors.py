@@ -11,6 +11,10 @@ class InvalidInput(ValueError):
     """A value from outside (argument, option, file) that the benchmark cannot accept."""
 
 
+class BrokenPolicy(InvalidInput):
+    """A policy of an installed package that cannot be loaded or made."""
+
+
 class MissingExtra(ImportError):
     """An optional dependency that is not installed; the message names the extra to install."""
 

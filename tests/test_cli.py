@@ -5,6 +5,8 @@ import time
 import pytest
 
 from care_sim.cli import main
+from care_sim.policies import BUILT_IN
+from care_sim.scenarios import SCENARIOS
 from care_sim.study.commands import Options
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.report import ROWS
@@ -96,6 +98,26 @@ def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
     assert code == 0
     assert again in out
     assert (tmp_path / "tables.md").exists()
+
+
+def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_named(capsys, tmp_path, monkeypatch):
+    package = tmp_path / "site" / "torn-1.5.dist-info"
+    package.mkdir(parents=True)
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: torn\nVersion: 1.5\n")
+    (package / "entry_points.txt").write_text("[care_sim.policies]\ntorn = torn_policy:Torn\n")
+    monkeypatch.syspath_prepend(package.parent)
+    out = tmp_path / "out"
+    axes = ["--policies", "all", "--scenarios", "all", "--seeds", "1", "--workers", "1", "--out", out]
+    short = ["--scenario-parameters", "duration_s=0.1"]
+    code, _, err = run(capsys, "sweep", *axes, *short)
+    assert code == 1
+    assert err.count("care-sim: left out: policy torn cannot be loaded: ModuleNotFoundError") == 2
+    rows = read_rows(out / ROWS)
+    assert {row["policy"] for row in rows} == set(BUILT_IN)
+    assert {row["scenario"] for row in rows} == set(SCENARIOS)
+    code, _, err = run(capsys, "sweep", "--policies", "torn", "--seeds", "1", "--out", out)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "policy torn cannot be loaded" in err
 
 
 def test_the_lists(capsys):

@@ -1,10 +1,8 @@
 """Policies by name: the built-in ones and those that installed packages add (`care_sim.policies.installed`)."""
 
-from collections.abc import Iterable
-
 import gymnasium
 
-from care_sim.errors import InvalidInput, MissingExtra, unknown
+from care_sim.errors import BrokenPolicy, InvalidInput, MissingExtra, unknown
 from care_sim.policies.all_camera import AllCamera
 from care_sim.policies.base import Policy
 from care_sim.policies.beam_reduce import BeamReduce
@@ -22,7 +20,7 @@ from care_sim.policies.random import Random
 from care_sim.policies.random_points import RandomPoints
 from care_sim.policies.uncertainty import Uncertainty
 
-__all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "make_policy", "policy_names", "tags_of", "usable"]
+__all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "make_policy", "policy_names", "tags_of"]
 
 BUILT_IN: dict[str, Maker] = {
     policy.name: policy
@@ -55,22 +53,6 @@ def check_policy(name: str) -> None:
         raise unknown("policy", name, policy_names())
 
 
-def usable(names: Iterable[str]) -> tuple[list[str], dict[str, str]]:
-    """The names whose policies load, and for each of the others the reason why it does not.
-
-    Raises InvalidInput for an unknown name.
-    """
-    made, broken = [], {}
-    for name in names:
-        check_policy(name)
-        try:
-            maker(name)
-            made.append(name)
-        except InvalidInput as error:
-            broken[name] = str(error)
-    return made, broken
-
-
 def tags_of(name: str) -> tuple[str, ...]:
     """What the policy is (of `care_sim.policies.base.TAGS`); nothing for one that cannot be loaded."""
     try:
@@ -83,14 +65,15 @@ def tags_of(name: str) -> tuple[str, ...]:
 def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
     """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its rig alone.
 
-    Raises InvalidInput for an unknown name or parameter, an environment without a rig, a policy that cannot
-    be loaded, or an environment that the policy refuses; MissingExtra for one whose library is not installed.
+    Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, or an environment
+    without a rig; BrokenPolicy for one that cannot be loaded or made; MissingExtra for one whose library is not
+    installed.
     """
     check_policy(name)
     try:
         make = maker(name)
     except InvalidInput as error:
-        raise InvalidInput(f"policy {name} cannot be loaded: {error}") from error
+        raise BrokenPolicy(f"policy {name} cannot be loaded: {error}") from error
     given = [_of_environment(name, env, "rig")]
     check_parameters(name, make, parameters)
     if is_privileged(make):
@@ -100,9 +83,9 @@ def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
     except (InvalidInput, MissingExtra):
         raise
     except Exception as error:
-        raise InvalidInput(f"policy {name} refuses {parameters}: {type(error).__name__}: {error}") from error
+        raise BrokenPolicy(f"policy {name} refuses {parameters}: {type(error).__name__}: {error}") from error
     if not isinstance(policy, Policy):
-        raise InvalidInput(f"policy {name} is no Policy but of type {type(policy).__name__}")
+        raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")
     return policy
 
 

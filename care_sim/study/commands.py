@@ -87,8 +87,8 @@ class _Study:
     cluster: str | None = None
     """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
 
-    def conduct(self, study: str, configs: "Sequence[EpisodeConfig]", out: Path) -> int:
-        """Play the episodes, print their tables, name those that failed."""
+    def conduct(self, study: str, configs: "Sequence[EpisodeConfig]", out: Path, left_out: Sequence[str] = ()) -> int:
+        """Play the episodes, print their tables, name those that failed and the policies that were left out."""
         from care_sim.study import executors
         from care_sim.study.report import ROWS, conduct, print_report
         from care_sim.study.rows import read_rows
@@ -99,9 +99,8 @@ class _Study:
         if len(failures) < len(configs):
             print_report(read_rows(out / ROWS), _console(), STUDIES[study])
             print(f"Results are in {out}")
-        for failure in failures:
-            print(f"care-sim: failed: {failure}", file=sys.stderr)
-        return FAILED if failures else DONE
+        _name([*(f"failed: {failure}" for failure in failures), *left_out])
+        return FAILED if failures or left_out else DONE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,9 +108,9 @@ class Sweep(_Study):
     """Play every combination of scenarios, policies, budgets, faults and seeds."""
 
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
-    """`care-sim scenarios` lists them."""
+    """`care-sim scenarios` lists them; `all`."""
     policies: tuple[str, ...] = ("history", "all-camera", "care", "full")
-    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
+    """`care-sim policies` lists them; `all`. `full` always runs with budget 1.0."""
     budgets: tuple[float, ...] = (0.1,)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     false_negative_rates: tuple[float, ...] = ()
@@ -125,16 +124,25 @@ class Sweep(_Study):
 
     def __call__(self) -> int:
         """Run it."""
+        from care_sim.policies import policy_names
+        from care_sim.scenarios import SCENARIOS
         from care_sim.study.config import grid
+        from care_sim.study.selection import expanded, playable
 
         for axis in ("scenarios", "policies", "budgets", "seeds"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
-        axes = (self.scenarios, self.policies, self.budgets, _seeds(self.seeds))
+        scenarios = expanded(self.scenarios, SCENARIOS)
         common = self.conditions.arguments()
+        policies, broken = playable(expanded(self.policies, policy_names()), scenarios, self.budgets[0], **common)
+        left_out = [f"left out: {reason}" for reason in broken.values()]
+        if not policies:
+            raise InvalidInput(f"no policy to play: {'; '.join(broken.values())}")
+        _name(left_out)
         rate, latency = common.pop("false_negative_rate"), common.pop("camera_latency")
         rates, latencies = self.false_negative_rates or (rate,), self.camera_latencies or (latency,)
-        return self.conduct("sweep", grid(*axes, rates, latencies, **common), self.out)
+        configs = grid(scenarios, policies, self.budgets, _seeds(self.seeds), rates, latencies, **common)
+        return self.conduct("sweep", configs, self.out, left_out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +190,11 @@ class Report:
         print_report(rows, _console(), study)
         write_report(rows, self.folder, study)
         return 0
+
+
+def _name(problems: Sequence[str]) -> None:
+    for problem in problems:
+        print(f"care-sim: {problem}", file=sys.stderr)
 
 
 def _seeds(numbers: Sequence[int]) -> list[int]:

@@ -6,7 +6,8 @@ import pytest
 
 import care_sim
 from care_sim.errors import InvalidInput
-from care_sim.policies import BUILT_IN, policy_names, tags_of, usable
+from care_sim.policies import BUILT_IN, policy_names, tags_of
+from care_sim.study.selection import playable
 
 MODULE = '''
 import numpy as np
@@ -180,16 +181,26 @@ def test_a_policy_that_cannot_be_made_is_named_with_the_reason(broken, env, name
 
 def test_broken_policies_do_not_stop_the_others(broken, installed, env):
     assert set(BUILT_IN) | set(REASONS) | {"horizon", "leaving"} <= set(policy_names())
-    good, bad = usable(["care", "torn", "horizon", "abstract", "leaving"])
-    assert good == ["care", "horizon"]
-    assert bad == {
-        "torn": "AttributeError: module 'broken' has no attribute 'Nowhere'",
-        "abstract": "broken:Abstract is abstract: it lacks demand",
-        "leaving": "SystemExit: 3",
-    }
-    with pytest.raises(InvalidInput, match="unknown policy 'nobody'"):
-        usable(["care", "nobody"])
+    made, reasons = playable(["care", "torn", "horizon", "exploding", "leaving", "deaf"], ["dartout", "dense"], 0.1)
+    assert made == ["care", "horizon"]
+    assert reasons["torn"] == "policy torn cannot be loaded: AttributeError: module 'broken' has no attribute 'Nowhere'"
+    assert reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3"
+    assert reasons["exploding"] == "policy exploding refuses {}: KeyError: 'weights'"
+    assert list(reasons) == ["torn", "exploding", "leaving", "deaf"]
     assert care_sim.make_policy("horizon", env).name == "horizon"
+
+
+@pytest.mark.parametrize(
+    ("policies", "common", "complaint"),
+    [
+        (["care", "nobody"], {}, "unknown policy 'nobody'"),
+        (["care"], {"policy_parameters": (("k_safe", 1.0),)}, "k_safe"),
+        (["care"], {"camera_latency": -1}, "camera_latency"),
+    ],
+)
+def test_what_a_user_got_wrong_stops_all(policies, common, complaint):
+    with pytest.raises(InvalidInput, match=complaint):
+        playable(policies, ["dartout"], 0.1, **common)
 
 
 def test_a_function_that_makes_a_policy_is_one(broken, env):
