@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 import tyro
 
 from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.study.commands import Crowding, Report, Reproduce, Run, Sweep
+from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -60,6 +60,8 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
     "run": Run,
     "sweep": Sweep,
+    "ablate": Ablate,
+    "faults": Faults,
     "crowding": Crowding,
     "report": Report,
     "policies": Policies,
@@ -67,7 +69,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "bench": Bench,
 }
 
-STUDIES = ("reproduce", "sweep", "crowding")
+STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding")
 """Commands that keep what they have finished."""
 
 

@@ -32,4 +32,4 @@ COVERAGE = (
     "interval without width says that all seeds differ alike, not that the estimate is exact."
 )
 CAPTION = " ".join([READING, CENSORING, LEVELS, STATISTICS, COVERAGE])
-CROWDING = " ".join([READING, CENSORING, STATISTICS, COVERAGE])
+COMPARED = " ".join([READING, CENSORING, STATISTICS, COVERAGE])

@@ -6,7 +6,7 @@ What imports the simulator or draws is imported by the command that needs it: he
 import ast
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from care_sim.study.config import EpisodeConfig, Parameters
+
+    Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
 
 DONE, FAILED = 0, 1
 PIPE_WIDTH = 180
@@ -124,21 +126,15 @@ class Sweep(_Study):
 
     def __call__(self) -> int:
         """Run it."""
-        from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
         from care_sim.study.config import grid
-        from care_sim.study.selection import expanded, playable
+        from care_sim.study.selection import expanded
 
         for axis in ("scenarios", "policies", "budgets", "seeds"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
-        scenarios = expanded(self.scenarios, SCENARIOS)
-        common = self.conditions.arguments()
-        policies, broken = playable(expanded(self.policies, policy_names()), scenarios, self.budgets[0], **common)
-        left_out = [f"left out: {reason}" for reason in broken.values()]
-        if not policies:
-            raise InvalidInput(f"no policy to play: {'; '.join(broken.values())}")
-        _name(left_out)
+        scenarios, common = expanded(self.scenarios, SCENARIOS), self.conditions.arguments()
+        policies, left_out = _playable(self.policies, scenarios, self.budgets[0], **common)
         rate, latency = common.pop("false_negative_rate"), common.pop("camera_latency")
         rates, latencies = self.false_negative_rates or (rate,), self.camera_latencies or (latency,)
         configs = grid(scenarios, policies, self.budgets, _seeds(self.seeds), rates, latencies, **common)
@@ -146,7 +142,22 @@ class Sweep(_Study):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reproduce(_Study):
+class _SetStudy(_Study):
+    """A study whose episodes are set, but for the seeds and for policies that join in."""
+
+    also: tuple[str, ...] = ()
+    """Further policies, installed ones too, that are played and shown beside those of the study."""
+
+    def play(self, study: str, configurations: "Configurations", out: Path) -> int:
+        """Play the configurations of the seeds, with the policies that join in."""
+        from care_sim.scenarios import SCENARIOS
+
+        also, left_out = _playable(self.also, list(SCENARIOS), 0.1)
+        return self.conduct(study, configurations(_seeds(self.seeds), also), out, left_out)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce(_SetStudy):
     """Play the paper's closed-loop study, 49 configurations a seed, and print it beside the paper's figures."""
 
     out: Path = Path("runs/reproduce")
@@ -156,11 +167,39 @@ class Reproduce(_Study):
         """Run it."""
         from care_sim.study.paper import configurations
 
-        return self.conduct("paper", configurations(_seeds(self.seeds)), self.out)
+        return self.play("paper", configurations, self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crowding(_Study):
+class Ablate(_SetStudy):
+    """Vary one thing at a time as the paper's ablations do, 162 configurations a seed: a table each."""
+
+    out: Path = Path("runs/ablate")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.ablations import configurations
+
+        return self.play("ablate", configurations, self.out)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Faults(_SetStudy):
+    """Let every fault grow and find where the order of the policies changes, 318 configurations a seed."""
+
+    out: Path = Path("runs/faults")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.study.faults import configurations
+
+        return self.play("faults", configurations, self.out)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowding(_SetStudy):
     """Find where the all-camera reserve collapses as vehicles fill the dense street, 221 configurations a seed."""
 
     out: Path = Path("runs/crowding")
@@ -170,7 +209,7 @@ class Crowding(_Study):
         """Run it."""
         from care_sim.study.crowding import configurations
 
-        return self.conduct("crowding", configurations(_seeds(self.seeds)), self.out)
+        return self.play("crowding", configurations, self.out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +229,24 @@ class Report:
         print_report(rows, _console(), study)
         write_report(rows, self.folder, study)
         return 0
+
+
+def _playable(
+    names: Sequence[str], scenarios: Sequence[str], budget: float, **common: Any
+) -> tuple[list[str], list[str]]:
+    """The policies that can be played, and a line for each that cannot, which is printed too.
+
+    Raises InvalidInput when none of them can.
+    """
+    from care_sim.policies import policy_names
+    from care_sim.study.selection import expanded, playable
+
+    policies, broken = playable(expanded(names, policy_names()), scenarios, budget, **common)
+    if broken and not policies:
+        raise InvalidInput("; ".join(broken.values()))
+    left_out = [f"left out: {reason}" for reason in broken.values()]
+    _name(left_out)
+    return policies, left_out
 
 
 def _name(problems: Sequence[str]) -> None:

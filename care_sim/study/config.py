@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from itertools import product
@@ -46,12 +47,17 @@ class EpisodeConfig(Conditions):
     policy_parameters: Parameters = ()
 
     def __post_init__(self) -> None:
-        check_whole("seed", self.seed, 0)
-        if self.seed > LARGEST_SEED:
-            raise InvalidInput(f"seed must be at most {LARGEST_SEED}, got {self.seed}")
+        _check_seed(self.seed)
         make_scenario(self.scenario, **dict(self.scenario_parameters))
         with self.make_env() as env:
             self.make_policy(env)
+
+    def with_seed(self, seed: int) -> "EpisodeConfig":
+        """The same of another seed; what is sound for one is for all, so that only the seed is checked."""
+        _check_seed(seed)
+        other = copy(self)
+        object.__setattr__(other, "seed", seed)
+        return other
 
     def make_env(self) -> gymnasium.Env[Any, Any]:
         """The environment of this episode, not yet reset."""
@@ -118,18 +124,23 @@ def grid(
     """
     axes = list(product(budgets, false_negative_rates, camera_latencies))
     configs = (
-        _config(scenario, policy, budget, seed, {"false_negative_rate": rate, "camera_latency": latency} | common)
+        _config(scenario, policy, budget, {"false_negative_rate": rate, "camera_latency": latency} | common)
         for scenario, policy in product(scenarios, policies)
         for budget, rate, latency in axes
-        for seed in seeds
     )
-    return list(dict.fromkeys(configs))
+    return [config.with_seed(seed) for config in dict.fromkeys(configs) for seed in dict.fromkeys(seeds)]
 
 
-def _config(scenario: str, policy: str, budget: float, seed: int, given: dict[str, Any]) -> EpisodeConfig:
+def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
     if policy == "full":
         budget, given = 1.0, given | {name: _USUAL[name] for name in UNFELT_BY_FULL}
-    return EpisodeConfig(scenario, policy, budget, seed, **given)
+    return EpisodeConfig(scenario, policy, budget, **given)
+
+
+def _check_seed(seed: object) -> None:
+    check_whole("seed", seed, 0)
+    if seed > LARGEST_SEED:  # type: ignore[operator]
+        raise InvalidInput(f"seed must be at most {LARGEST_SEED}, got {seed}")
 
 
 def without_seeds(configs: Sequence[EpisodeConfig]) -> list[dict[str, Any]]:

@@ -17,16 +17,21 @@ VEHICLES = range(len(PLACES) + 1)
 POLICIES = ("all-camera", "care", "full")
 COLUMN = "scenario.vehicles"
 """The column of the rows that the study varies."""
+TITLE = "dense, by standing vehicles: "
 COLLAPSE_M = 3.0
 """All-camera counts as collapsed where CARE detects this much earlier and the interval excludes zero."""
 
 
-def configurations(seeds: Sequence[int]) -> list[EpisodeConfig]:
-    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221 configurations a seed."""
+def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
+    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221 configurations a seed.
+
+    `also` are further policies.
+    """
+    policies = list(dict.fromkeys([*POLICIES, *also]))
     return [
         config
         for vehicles in VEHICLES
-        for config in grid(["dense"], POLICIES, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),))
+        for config in grid(["dense"], policies, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),))
     ]
 
 
@@ -60,10 +65,17 @@ class Crowd:
         """Numbers of standing vehicles."""
         return sorted({vehicles for vehicles, _, _ in self.cells})
 
-    def gap(self, vehicles: int, budget: float) -> Contrast | None:
-        """First detection of all-camera minus CARE, metres; negative where all-camera is later."""
-        camera, care = (self.cells.get((vehicles, policy, budget)) for policy in ("all-camera", "care"))
-        return contrast(DETECTION, camera, care)
+    @cached_property
+    def others(self) -> list[str]:
+        """The policies that are compared with CARE, all-camera first."""
+        return list(
+            dict.fromkeys(["all-camera", *(row["policy"] for row in self.rows if row["policy"] not in POLICIES)])
+        )
+
+    def gap(self, vehicles: int, budget: float, other: str = "all-camera") -> Contrast | None:
+        """First detection of another policy minus that of CARE, metres; negative where the other is later."""
+        theirs, care = (self.cells.get((vehicles, policy, budget)) for policy in (other, "care"))
+        return contrast(DETECTION, theirs, care)
 
     def median(self, vehicles: int, policy: str, budget: float) -> str:
         """A median first detection, as text."""
@@ -76,30 +88,35 @@ class Crowd:
 
 
 def crowding_tables(rows: Sequence[Row]) -> list[Table]:
-    """All-camera minus CARE by standing vehicles and budget, its intervals, and the medians behind them."""
+    """What all-camera, and every further policy, has less than CARE by standing vehicles and budget: differences,
+    intervals, and the medians behind them.
+    """
     crowd = Crowd(rows)
-    gaps = [(str(n), *(mean(crowd.gap(n, budget)) for budget in crowd.budgets)) for n in crowd.counts]
-    intervals = [(str(n), *(interval(crowd.gap(n, budget)) for budget in crowd.budgets)) for n in crowd.counts]
-    columns = ("vehicles", *map(percent, crowd.budgets))
-    title = "dense, by standing vehicles: "
-    return [
-        Table(f"{title}first detection of all-camera minus care, m", columns, tuple(gaps), (_collapse_note(crowd),)),
-        Table(f"{title}the same with intervals", columns, tuple(intervals), terminal=False),
-        _medians_table(f"{title}median first detection, care/all-camera, m", crowd),
-    ]
+    gaps = [_gaps_table(crowd, other, intervals) for other in crowd.others for intervals in (False, True)]
+    return [*gaps, _medians_table(crowd)]
 
 
-def _medians_table(title: str, crowd: Crowd) -> Table:
+def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
+    entry, more = (interval, ", with intervals") if intervals else (mean, "")
+    lines = [(str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets)) for n in crowd.counts]
+    title = f"{TITLE}first detection of {other} minus care, m{more}"
+    notes = (_collapse_note(crowd),) if other == "all-camera" and not intervals else ()
+    return Table(title, ("vehicles", *map(percent, crowd.budgets)), tuple(lines), notes, terminal=not intervals)
+
+
+def _medians_table(crowd: Crowd) -> Table:
+    policies = ["care", *crowd.others]
     lines = [
-        (str(n), *(_pair(crowd, n, budget) for budget in crowd.budgets), crowd.median(n, "full", 1.0))
+        (str(n), *(_medians(crowd, n, policies, budget) for budget in crowd.budgets), crowd.median(n, "full", 1.0))
         for n in crowd.counts
     ]
+    title = f"{TITLE}median first detection, {'/'.join(policies)}, m"
     columns = ("vehicles", *map(percent, crowd.budgets), "full")
     return Table(title, columns, tuple(lines), ("n.d.: not detected.",), terminal=False)
 
 
-def _pair(crowd: Crowd, vehicles: int, budget: float) -> str:
-    medians = (crowd.median(vehicles, policy, budget) for policy in ("care", "all-camera"))
+def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:
+    medians = (crowd.median(vehicles, policy, budget) for policy in policies)
     return "/".join(medians).replace("not detected", "n.d.")
 
 

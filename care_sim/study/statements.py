@@ -33,7 +33,7 @@ class Statement:
 
 def statements(rows: Sequence[Row]) -> list[Statement]:
     """All statements, when the rows cover every cell of the paper's study; else none."""
-    found = {(c.setting, c.policy, c.budget): c for c in summarise(rows)}
+    found = {cell.key: cell for cell in summarise(rows)}
     if not paper_cells() <= set(found):
         return []
     cells = {_key(cell): cell for key, cell in found.items() if key in paper_cells()}

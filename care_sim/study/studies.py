@@ -7,10 +7,12 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.errors import unknown
-from care_sim.study import budget_figure, crowding_figure
-from care_sim.study.captions import CAPTION, CROWDING
+from care_sim.study import budget_figure, crowding_figure, faults_figure
+from care_sim.study.ablations import ablation_tables
+from care_sim.study.captions import CAPTION, COMPARED
 from care_sim.study.crowding import crowding_tables
 from care_sim.study.episode import Row
+from care_sim.study.faults import fault_tables
 from care_sim.study.paper import NO_COLLISION
 from care_sim.study.rows import read_study
 from care_sim.study.statements import statements
@@ -43,6 +45,10 @@ def _sweep_closing(rows: Sequence[Row]) -> list[str]:
     return [collisions(rows)]
 
 
+def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
+    return {}
+
+
 def _paper_closing(rows: Sequence[Row]) -> list[str]:
     return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
 
@@ -56,8 +62,10 @@ _ALL = (
         crowding_figure.crowding_figures,
         _sweep_closing,
         (crowding_figure.NAME,),
-        CROWDING,
+        COMPARED,
     ),
+    Study("ablate", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
+    Study("faults", fault_tables, faults_figure.fault_figures, _sweep_closing, faults_figure.NAMES, COMPARED),
 )
 STUDIES = {study.name: study for study in _ALL}
 SWEEP = STUDIES["sweep"]

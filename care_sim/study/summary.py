@@ -71,12 +71,22 @@ class Cell:
     regret: Contrast | None
     as_full: int | None
 
+    @property
+    def key(self) -> Key:
+        """Where its rows are found."""
+        return self.setting, self.policy, self.budget
+
 
 def setting_of(row: Row) -> Setting:
     """The setting a row belongs to."""
     names = [name for name in row if name in PLAIN_FIELDS or name.startswith("scenario.")]
     changed = [(n, row[n]) for n in names if n not in _AXES and row[n] is not None and row[n] != _USUAL.get(n)]
     return Setting(row["scenario"], tuple(sorted((n.removeprefix("scenario."), v) for n, v in changed)))
+
+
+def key_of(row: Row) -> Key:
+    """The cell a row belongs to."""
+    return setting_of(row), policy_of(row), row["budget"]
 
 
 def policy_of(row: Row) -> str:
@@ -94,7 +104,7 @@ def grouped(rows: Sequence[Row]) -> dict[Key, list[Row]]:
     """The rows of every cell, in the order of their first rows."""
     groups: dict[Key, list[Row]] = {}
     for row in rows:
-        groups.setdefault((setting_of(row), policy_of(row), row["budget"]), []).append(row)
+        groups.setdefault(key_of(row), []).append(row)
     return groups
 
 

@@ -1,6 +1,6 @@
 from made_rows import CROWD, rows
 
-from care_sim.study.crowding import Crowd, crowding_tables
+from care_sim.study.crowding import Crowd, configurations, crowding_tables
 from care_sim.study.table import Bold
 
 
@@ -28,3 +28,19 @@ def test_a_collapse_needs_three_metres_and_an_interval_without_zero():
 
 def test_rows_that_name_no_number_have_the_streets_own():
     assert Crowd(rows("care", [15.0])).counts == [7]
+
+
+def test_a_further_policy_is_compared_with_care_too():
+    late = rows("uncertainty", [9.0] * 5, scenario_parameters=(("vehicles", 5),))
+    tables = crowding_tables([*CROWD, *late])
+    assert [table.title.partition(": ")[2] for table in tables] == [
+        "first detection of all-camera minus care, m",
+        "first detection of all-camera minus care, m, with intervals",
+        "first detection of uncertainty minus care, m",
+        "first detection of uncertainty minus care, m, with intervals",
+        "median first detection, care/all-camera/uncertainty, m",
+    ]
+    assert tables[2].rows[1] == ("5", "-6.0*")
+    assert tables[4].rows[1] == ("5", "15.0/14.5/9.0", "15.0")
+    played = {config.policy for config in configurations([0], ["uncertainty"])}
+    assert played == {"all-camera", "care", "full", "uncertainty"}

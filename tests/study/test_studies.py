@@ -27,11 +27,16 @@ def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
 
 def test_an_unknown_study_is_one_clear_line(tmp_path):
     write_rows(STUDY, tmp_path / ROWS, "gardening")
-    with pytest.raises(InvalidInput, match=r"unknown study in .* 'gardening'; known: crowding, paper, sweep"):
+    with pytest.raises(
+        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, sweep"
+    ):
         study_of(tmp_path / ROWS)
 
 
-@pytest.mark.parametrize(("name", "rows"), [("sweep", STUDY), ("paper", STUDY), ("crowding", CROWD)])
+EPISODES = {"sweep": STUDY, "paper": STUDY, "crowding": CROWD, "ablate": STUDY, "faults": STUDY}
+
+
+@pytest.mark.parametrize(("name", "rows"), EPISODES.items())
 def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys):
     study = STUDIES[name]
     assert set(study.figures(rows)) <= set(study.figure_names)
@@ -46,6 +51,10 @@ def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys)
     tables = study.tables(rows)
     assert latex.count(r"\begin{table}") == len(tables)
     assert all(f"## {table.title}\n" in markdown for table in tables)
+
+
+def test_no_study_is_left_out_above():
+    assert set(EPISODES) == set(STUDIES)
 
 
 def test_only_the_papers_study_quotes_the_paper_on_collisions():

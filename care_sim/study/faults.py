@@ -1,0 +1,185 @@
+"""How detection, braking and clearance hold up as every fault grows, and where the order of policies changes."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+from typing import Any
+
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.contrasts import DETECTION, Contrast, contrast
+from care_sim.study.entries import interval, median
+from care_sim.study.episode import Row
+from care_sim.study.factors import Level, Place
+from care_sim.study.summary import Cell, Groups, Key, grouped, summarise
+from care_sim.study.table import Bold, Table
+
+PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
+"""The paper's own: the budget at which it injects faults, and the one at which it tells the reserves apart."""
+POLICIES = ("history", "all-camera", "care", "full")
+PAIRS = (("care", "history"), ("care", "all-camera"), ("all-camera", "history"))
+BLACKOUT_START_S = 2.0
+"""The person comes into the camera's view 2.4 to 2.9 s after the start."""
+DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
+"""Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees below the horizon."""
+
+
+@dataclass(frozen=True)
+class Strength:
+    """A level of a fault and its place on the axis of a figure."""
+
+    value: float
+    level: Level
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault from none of it (the first strength) to much of it."""
+
+    title: str
+    unit: str
+    strengths: tuple[Strength, ...]
+
+    @property
+    def label(self) -> str:
+        """Title and unit."""
+        return f"{self.title}, {self.unit}"
+
+
+def _growing(parameter: str, *values: float, start: float = 0, **given: Any) -> tuple[Strength, ...]:
+    levels = [Strength(start, Level(f"{start:g}", given if start else {}))]
+    return (*levels, *(Strength(value, Level(f"{value:g}", {parameter: value, **given})) for value in values))
+
+
+FAULTS = (
+    Fault("missed objects", "share", _growing("false_negative_rate", 0.2, 0.4, 0.6, 0.8, 1.0)),
+    Fault(
+        "misses in bursts",
+        "keyframes, at a share of 0.4",
+        _growing("false_negative_burst", 5, 10, 20, start=1, false_negative_rate=0.4),
+    ),
+    Fault("misses growing with distance", "share a metre", _growing("false_negative_per_m", 0.01, 0.02, 0.04)),
+    Fault("false detections", "boxes a picture", _growing("false_positive_rate", 1.0, 2.0, 4.0, 8.0, 16.0)),
+    Fault("latency", "keyframes", _growing("camera_latency", 1, 2, 3, 5)),
+    Fault("jitter of the latency", "most keyframes", _growing("camera_jitter", 1, 2, 4)),
+    Fault(
+        f"blackout from {BLACKOUT_START_S:.1f} s",
+        "s",
+        _growing("blackout_s", 0.5, 1.0, 2.0, blackout_start_s=BLACKOUT_START_S),
+    ),
+    Fault("camera turned", "sigma in degrees", _growing("camera_rotation_sigma_deg", 0.5, 1.0, 2.0, 4.0)),
+    Fault("camera shifted", "sigma in m", _growing("camera_position_sigma_m", 0.05, 0.1, 0.2)),
+    Fault("lost returns", "share", _growing("lidar_dropout", 0.1, 0.2, 0.4, 0.6)),
+    Fault("range noise", "sigma in m", _growing("lidar_range_sigma", 0.02, 0.1, 0.5)),
+    Fault(
+        "dead rows",
+        "rows",
+        (
+            Strength(0, Level("0")),
+            *(Strength(len(rows), Level(f"{len(rows)}", {"lidar_dead_rows": rows})) for rows in DEAD_ROWS),
+        ),
+    ),
+    Fault("noise of the car's speed", "sigma in m/s", _growing("ego_speed_sigma", 0.25, 0.5, 1.0)),
+)
+
+
+def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
+    """Every policy at every strength of every fault in both places; `also` are further policies."""
+    made = [
+        config
+        for place, fault in product(PLACES, FAULTS)
+        for strength in fault.strengths
+        for config in strength.level.configurations(place, [*POLICIES, *also], seeds)
+    ]
+    return list(dict.fromkeys(made))
+
+
+class Played:
+    """The rows of the study by policy, place and strength."""
+
+    def __init__(self, rows: Sequence[Row]):
+        self.policies = list(dict.fromkeys([*POLICIES, *(row["policy"] for row in rows)]))
+        self._cells: Mapping[Key, Cell] = {cell.key: cell for cell in summarise(rows)}
+        self._groups: Groups = grouped(rows)
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """The pairs of policies whose order is followed."""
+        return [*PAIRS, *(("care", policy) for policy in self.policies if policy not in POLICIES)]
+
+    def cell(self, place: Place, policy: str, strength: Strength) -> Cell | None:
+        """What a policy does at a strength."""
+        return self._cells.get(strength.level.key(place, policy))
+
+    def difference(self, place: Place, pair: tuple[str, str], strength: Strength) -> Contrast | None:
+        """First detection of one policy minus that of another at the same strength."""
+        ours, theirs = (self._groups.get(strength.level.key(place, policy)) for policy in pair)
+        return contrast(DETECTION, ours, theirs)
+
+
+def fault_tables(rows: Sequence[Row]) -> list[Table]:
+    """Where the order changes, then a table a fault with levels and paired differences."""
+    played = Played(rows)
+    return [_order_table(played), *(_fault_table(fault, played) for fault in FAULTS)]
+
+
+def order(pair: tuple[str, str], fault: Fault, place: Place, played: Played) -> str:
+    """How two policies stand as the fault grows: '>' where the first detects earlier by a difference that counts,
+    '<' where the second does, '=' elsewhere; bold when it changes.
+    """
+    signs = [(strength, _sign(played.difference(place, pair, strength))) for strength in fault.strengths]
+    changes = [
+        f"{sign} from {strength.level.label}" for (_, before), (strength, sign) in pairwise(signs) if sign != before
+    ]
+    text = ", ".join([signs[0][1], *changes])
+    return Bold(text) if changes else text
+
+
+def _sign(difference: Contrast | None) -> str:
+    if difference is None:
+        return ""
+    return "=" if not difference.counts else ">" if difference.mean > 0 else "<"
+
+
+def _order_table(played: Played) -> Table:
+    lines: list[tuple[str, ...]] = []
+    for place in PLACES:
+        lines.append((str(place),))
+        lines += [(fault.label, *(order(pair, fault, place, played) for pair in played.pairs)) for fault in FAULTS]
+    columns = ("fault", *(f"{ours} : {theirs}" for ours, theirs in played.pairs))
+    note = (
+        "How the first named stands to the second without the fault, and from which strength on otherwise. > : it "
+        "detects earlier, interval without zero and gate met; < : it detects later, likewise; = : neither."
+    )
+    return Table("Where the order of policies changes", columns, tuple(lines), (note,))
+
+
+def _fault_table(fault: Fault, played: Played) -> Table:
+    columns = (fault.unit, *(strength.level.label for strength in fault.strengths))
+    lines = [line for place in PLACES for line in _blocks(fault, place, played)]
+    return Table(fault.title, columns, tuple(lines), terminal=False)
+
+
+def _blocks(fault: Fault, place: Place, played: Played) -> Iterator[tuple[str, ...]]:
+    """A block of policies for each measure, and one of paired differences."""
+    for name, entry in (("first detection, m", _detection), ("braked", _braked), ("clearance, m", _clearance)):
+        yield (f"{place}: {name}",)
+        for policy in played.policies:
+            cells = (played.cell(place, policy, strength) for strength in fault.strengths)
+            yield (policy, *(entry(cell) if cell else "" for cell in cells))
+    yield (f"{place}: first detection of care minus, m",)
+    for policy in played.policies:
+        if policy != "care":
+            differences = (played.difference(place, ("care", policy), strength) for strength in fault.strengths)
+            yield (policy, *map(interval, differences))
+
+
+def _detection(cell: Cell) -> str:
+    return median(cell.detection)
+
+
+def _braked(cell: Cell) -> str:
+    return f"{cell.braked}/{cell.episodes}"
+
+
+def _clearance(cell: Cell) -> str:
+    return median(cell.clearance)
