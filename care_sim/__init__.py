@@ -11,6 +11,7 @@ from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.grid import AngularGrid
 from care_sim.policies import make_policy, policy_names
 from care_sim.policies.base import Policy
+from care_sim.policies.privileged import PrivilegedPolicy
 from care_sim.types import Belief, Demand, ImageDetections, Rig, Tracks
 
 __version__ = version("care-sim")
@@ -22,6 +23,7 @@ __all__ = [
     "InvalidInput",
     "MissingExtra",
     "Policy",
+    "PrivilegedPolicy",
     "Rig",
     "Tracks",
     "allocate",

@@ -8,7 +8,7 @@ from care_sim.study.entries import MARKS, MEANINGS, ends, interval, marked, perc
 from care_sim.study.episode import Row
 from care_sim.study.paper import Published, paper_cells, published
 from care_sim.study.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
-from care_sim.study.table import Table as Table
+from care_sim.study.table import Table
 
 COLUMNS = (
     "budget",
