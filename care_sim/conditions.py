@@ -5,15 +5,20 @@ the results. Every fault is off by default.
 """
 
 from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
 
 from care_sim.allocation import RESERVE_FRACTION
-from care_sim.errors import InvalidInput, check_number, check_whole
+from care_sim.errors import InvalidInput, check_number, check_whole, is_number
 from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
 CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
+MOST_GHOSTS = 64
+"""False detections a picture, on average: as many as a policy is shown at most."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +38,7 @@ class CameraFaults:
     camera_jitter: int = 0
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
     blackout_start_s: float = 0.0
-    """When the camera goes black, seconds from the start."""
+    """When the camera goes black, seconds from the start; it does only with `blackout_s`."""
     blackout_s: float = 0.0
     """How long the camera's pictures are black, seconds."""
     camera_rotation_sigma_deg: float = 0.0
@@ -46,7 +51,8 @@ class CameraFaults:
         check_whole("false_negative_burst", self.false_negative_burst, 1)
         check_whole("camera_latency", self.camera_latency, 0)
         check_whole("camera_jitter", self.camera_jitter, 0)
-        for name in ("false_negative_per_m", "false_positive_rate", "blackout_start_s", "blackout_s"):
+        check_number("false_positive_rate", self.false_positive_rate, 0, MOST_GHOSTS)
+        for name in ("false_negative_per_m", "blackout_start_s", "blackout_s"):
             check_number(name, getattr(self, name), 0)
         for name in ("camera_rotation_sigma_deg", "camera_position_sigma_m"):
             check_number(name, getattr(self, name), 0)
@@ -61,7 +67,7 @@ class LidarFaults:
     """What the LiDAR gets wrong."""
 
     lidar_range_sigma: float = 0.0
-    """Gaussian noise on every range, metres."""
+    """Gaussian noise on every range, metres; policies meet it, the proxy detector, whose boxes are true, does not."""
     lidar_dropout: float = 0.0
     """Share of returns that are lost, 0 to 1."""
     lidar_dead_rows: tuple[int, ...] = ()
@@ -70,8 +76,12 @@ class LidarFaults:
     def _check_lidar(self) -> None:
         check_number("lidar_dropout", self.lidar_dropout, 0, 1)
         check_number("lidar_range_sigma", self.lidar_range_sigma, 0)
-        for row in self.lidar_dead_rows:
+        rows: Any = self.lidar_dead_rows
+        if not isinstance(rows, list | tuple | np.ndarray) or np.ndim(rows) != 1:
+            raise InvalidInput(f"lidar_dead_rows must be a list of rows, got {rows!r}")
+        for row in rows:
             check_whole("lidar_dead_rows", row, 0)
+        object.__setattr__(self, "lidar_dead_rows", tuple(sorted({int(row) for row in rows})))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,13 +101,26 @@ class Sensing(CameraFaults, LidarFaults):
         self._check_camera()
         self._check_lidar()
         check_number("ego_speed_sigma", self.ego_speed_sigma, 0)
+        if not isinstance(self.engine, str):
+            raise InvalidInput(f"engine must be a name, got {self.engine!r}")
         check_whole("min_returns", self.min_returns, 1)
         check_number("camera_confidence", self.camera_confidence, 0, 1)
+        self._settle_numbers()
+
+    def _settle_numbers(self) -> None:
+        """Make every number the int or float that it is declared as, so that equal conditions are written alike."""
+        for field in fields(self):
+            value, declared = getattr(self, field.name), type(field.default)
+            if declared in (int, float) and is_number(value) and declared(value) == value:
+                object.__setattr__(self, field.name, declared(value))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions(Sensing):
-    """All conditions: sensing, and how the budget is spent."""
+    """All conditions: sensing, and how the budget is spent.
+
+    `care_sim.types.Rig` checks what the allocator is given, the environments whether engine and rows exist.
+    """
 
     reserve_fraction: float = RESERVE_FRACTION
     """Share rho of the budget that the allocator keeps for the reserve, 0 to 1."""

@@ -39,7 +39,13 @@ def check_number(name: str, value: object, least: float = -math.inf, most: float
         raise InvalidInput(f"{name} must {allowed}, got {value!r}")
 
 
-def check_whole(name: str, value: object, least: int) -> None:
-    """Raise InvalidInput unless `value` is a whole number (of an integer type) of at least `least`."""
+LARGEST = 2**31 - 1
+"""What a whole number may be where nothing else is said."""
+
+
+def check_whole(name: str, value: object, least: int, most: int = LARGEST) -> None:
+    """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
     if not (isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= least):
         raise InvalidInput(f"{name} must be a whole number >= {least}, got {value!r}")
+    if value > most:
+        raise InvalidInput(f"{name} must be at most {most}, got {value}")

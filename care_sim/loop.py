@@ -13,6 +13,7 @@ from care_sim.frames import Floats, Frame
 from care_sim.grid import Cells
 from care_sim.perception.detectors import ReturnsDetector
 from care_sim.perception.memory import TrackMemory
+from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera import CameraDetector, Picture, window_on
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
@@ -31,7 +32,7 @@ class ClosedLoop:
         self._actors = {actor.body: actor for actor in world.actors}
         camera_seed, lidar_seed, odometry_seed = seeds
         engine = ENGINES[sensing.engine](world.bullet)
-        self._lidar = Lidar(rig.grid, engine, sensing, np.random.default_rng(lidar_seed))
+        self._lidar = Lidar(rig.grid, engine, sensing, lidar_seed)
         self._camera = CameraDetector(labels, sensing, rig.keyframe_s, camera_seed, rig.cameras[0], rig.sensor_height_m)
         self._speed_sigma, self._odometry = sensing.ego_speed_sigma, np.random.default_rng(odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
@@ -92,22 +93,27 @@ class ClosedLoop:
         return boxes
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise. Truth: for the privileged alone."""
+        """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
         return self._lidar.peek(self.sensor)
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
         sensor = self.sensor
-        camera, boxes = self._camera.mounted, sensor.boxes_to_local(self.world.boxes(self._reported))
-        window = window_on(camera, boxes)
-        self.picture = Picture.of(self.world.bullet.body_ids(camera, sensor, window), window)
+        boxes = sensor.boxes_to_local(self.world.boxes(self._reported))
+        nominal, mounted = self.rig.cameras[0], self._camera.mounted
+        self.picture = self._photograph(nominal, sensor, boxes)
+        taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
         self.belief = Belief(
             self._odometry_reading(),
             self.rig.budget,
-            self._camera.detect(self.picture, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._camera.detect(taken, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
             self._memory.tracks(sensor),
             ranges,
         )
+
+    def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
+        window = window_on(camera, boxes)
+        return Picture.of(self.world.bullet.body_ids(camera, sensor, window), window)
 
     def _odometry_reading(self) -> Ego:
         """The car's own motion as its software reads it."""

@@ -20,5 +20,5 @@ class Truth(Protocol):
         ...
 
     def full_scan(self) -> Scan:
-        """What a scan of every cell would return, before noise: `cells` are all cells, ascending."""
+        """What a scan of every cell would return, before noise and dropout: `cells` are all cells, ascending."""
         ...

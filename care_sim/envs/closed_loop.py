@@ -136,8 +136,7 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         self.close()
         world = self.scenario.build(np.random.default_rng(scenario))
         self._loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
-        floors = [floor, *floor.spawn(self.conditions.floor_seed)]
-        self._floor_rng = np.random.default_rng(floors[-1])
+        self._floor_rng = np.random.default_rng(_floor_of(floor, self.conditions.floor_seed))
         self._in_view = self._detected = self._over = False
         self.keyframes = []
         return self._loop.belief.to_observation(), {"seed": entropy}
@@ -193,6 +192,12 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
             "time_s": frame.time_s,
             "reward_terms": terms,
         }
+
+
+def _floor_of(seed: np.random.SeedSequence, number: int) -> np.random.SeedSequence:
+    """Floor 0 is the seed's own, the others are its children."""
+    children = (number - 1,) if number else ()
+    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
 
 
 class DartoutEnv(ClosedLoopEnv):

@@ -18,5 +18,5 @@ class EpisodeTruth:
         return self._running().true_boxes(tracks)
 
     def full_scan(self) -> Scan:
-        """What a scan of every cell would return, before noise."""
+        """What a scan of every cell would return, before noise and dropout."""
         return self._running().full_scan()

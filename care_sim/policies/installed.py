@@ -48,6 +48,12 @@ def _faults(made: Any) -> Iterator[str]:
         yield "is no Policy"
     if inspect.isabstract(made):
         yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
-    tags = getattr(made, "tags", ())
-    if not (isinstance(tags, tuple) and set(tags) <= set(TAGS)):
+    try:
+        inspect.signature(made)
+    except (TypeError, ValueError):
+        yield "tells no parameters"
+    tags, source = getattr(made, "tags", TAGS), getattr(made, "source", "")
+    if not (isinstance(tags, tuple) and tags and all(tag in TAGS for tag in tags)):
         yield f"has tags {tags!r}; allowed is a tuple of {', '.join(TAGS)}"
+    if not isinstance(source, str):
+        yield f"has the source {source!r}; allowed is one line of text"

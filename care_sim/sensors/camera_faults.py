@@ -13,7 +13,7 @@ from care_sim.types import CLASSES, ImageDetections
 from care_sim.world.bodies import CATALOGUE
 
 GHOST_RANGE_M = (5.0, 40.0)
-"""Where an object of a ghost's size would stand: not nearer than the bonnet shows, and as far as an adult has a box."""
+"""How far the near face of an object of a ghost's size would be: beyond the bonnet, as far as an adult has a box."""
 
 NOTHING_SEEN = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
 
@@ -38,8 +38,9 @@ class Misses:
             begins = (self._lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
             self._lasting = np.where(begins, burst, self._lasting)
         else:
-            served = np.floor(burst * draws / np.maximum(rates, 1e-12)).astype(np.int64)
-            self._lasting = np.where(draws < rates, burst - served, 0)
+            hit = draws < rates
+            served = np.floor(burst * np.divide(draws, rates, out=np.zeros_like(draws), where=hit)).astype(np.int64)
+            self._lasting = np.where(hit, burst - served, 0)
             self._started = True
         missed = self._lasting > 0
         self._lasting -= missed
@@ -66,8 +67,8 @@ class Ghosts:
         label = int(rng.integers(len(CLASSES)))
         bearing, distance, yaw, confidence = rng.random(4)
         azimuth = camera.yaw + (bearing - 0.5) * 0.95 * camera.horizontal_fov
-        reach = GHOST_RANGE_M[0] + distance * (GHOST_RANGE_M[1] - GHOST_RANGE_M[0])
         size = CATALOGUE[CLASSES[label]].size
+        reach = size[0] / 2 + GHOST_RANGE_M[0] + distance * (GHOST_RANGE_M[1] - GHOST_RANGE_M[0])
         place = (reach * np.cos(azimuth), reach * np.sin(azimuth), size[2] / 2 - self._height_m)
         (box,) = camera.project_boxes(np.array([[*place, *size, 2 * np.pi * yaw]]))
         low, high = np.floor(box[:2]), np.ceil(box[2:])

@@ -24,18 +24,18 @@ class Lidar:
     every policy meets the same noise (common random numbers).
     """
 
-    def __init__(self, grid: AngularGrid, engine: RayEngine, faults: LidarFaults, rng: np.random.Generator):
+    def __init__(self, grid: AngularGrid, engine: RayEngine, faults: LidarFaults, seed: np.random.SeedSequence):
         self.grid = grid
         self._engine = engine
         self._faults = faults
         self._dead = dead_cells(grid, faults.lidar_dead_rows)
-        self._rng = rng
+        self._noise, self._dropout = np.random.default_rng(seed), np.random.default_rng(seed.spawn(1)[0])
 
     def peek(self, sensor: Frame) -> Scan:
-        """What a scan of every cell would return, before noise, which stays undrawn."""
+        """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
         directions = turned(self.grid.directions, sensor.yaw)
         ranges, _ = self._engine.cast(sensor.origin, directions, self.grid.range_m)
-        return Scan(np.arange(self.grid.size), ranges)
+        return Scan(np.arange(self.grid.size), np.where(self._dead, np.inf, ranges))
 
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """Fire `cells` from the frame `sensor`.
@@ -45,15 +45,13 @@ class Lidar:
         directions = turned(self.grid.directions[cells], sensor.yaw)
         ranges, ids = self._engine.cast(sensor.origin, directions, self.grid.range_m)
         if self._faults.lidar_range_sigma > 0:
-            draws = self._rng.standard_normal(self.grid.size)[cells]
+            draws = self._noise.standard_normal(self.grid.size)[cells]
             noisy = np.clip(ranges + self._faults.lidar_range_sigma * draws, NEAREST_M, self.grid.range_m - NEAREST_M)
             ranges = np.where(np.isinf(ranges), ranges, noisy)
+        lost = self._dead[cells]
         if self._faults.lidar_dropout > 0:
-            lost = self._rng.random(self.grid.size)[cells] < self._faults.lidar_dropout
-            ranges, ids = np.where(lost, np.inf, ranges), np.where(lost, NOTHING, ids)
-        if self._faults.lidar_dead_rows:
-            ranges, ids = np.where(self._dead[cells], np.inf, ranges), np.where(self._dead[cells], NOTHING, ids)
-        return Scan(cells, ranges), ids
+            lost = lost | (self._dropout.random(self.grid.size)[cells] < self._faults.lidar_dropout)
+        return Scan(cells, np.where(lost, np.inf, ranges)), np.where(lost, NOTHING, ids)
 
 
 def dead_cells(grid: AngularGrid, rows: Sequence[int]) -> NDArray[np.bool_]:

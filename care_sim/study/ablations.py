@@ -50,7 +50,7 @@ def _margins(columns: int, rows: int) -> Level:
 
 def _rules(name: str, values: Iterable[float]) -> tuple[Level, ...]:
     default = getattr(ForgettingRules(), name)
-    return tuple(Level(f"{value:g}", parameters={} if value == default else {name: value}) for value in values)
+    return tuple(Level(f"{value:g}", parameters={} if value == default else {name: float(value)}) for value in values)
 
 
 ABLATIONS = (

@@ -10,11 +10,12 @@ from itertools import product
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 import care_sim
 from care_sim.conditions import UNFELT_BY_FULL, Conditions
 from care_sim.envs import IDS
-from care_sim.errors import InvalidInput, check_whole
+from care_sim.errors import check_whole
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
 from care_sim.scenarios import make_scenario
@@ -48,15 +49,18 @@ class EpisodeConfig(Conditions):
 
     def __post_init__(self) -> None:
         _check_seed(self.seed)
+        for name in ("scenario_parameters", "policy_parameters"):
+            object.__setattr__(self, name, tuple((key, _plain(value)) for key, value in getattr(self, name)))
         make_scenario(self.scenario, **dict(self.scenario_parameters))
         with self.make_env() as env:
             self.make_policy(env)
+        super().__post_init__()
 
     def with_seed(self, seed: int) -> "EpisodeConfig":
         """The same of another seed; what is sound for one is for all, so that only the seed is checked."""
         _check_seed(seed)
         other = copy(self)
-        object.__setattr__(other, "seed", seed)
+        object.__setattr__(other, "seed", int(seed))
         return other
 
     def make_env(self) -> gymnasium.Env[Any, Any]:
@@ -138,9 +142,12 @@ def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) ->
 
 
 def _check_seed(seed: object) -> None:
-    check_whole("seed", seed, 0)
-    if seed > LARGEST_SEED:  # type: ignore[operator]
-        raise InvalidInput(f"seed must be at most {LARGEST_SEED}, got {seed}")
+    check_whole("seed", seed, 0, LARGEST_SEED)
+
+
+def _plain(value: Any) -> Any:
+    """A parameter's value as Python's own type, which files can hold."""
+    return value.item() if isinstance(value, np.generic) else tuple(value) if isinstance(value, list) else value
 
 
 def without_seeds(configs: Sequence[EpisodeConfig]) -> list[dict[str, Any]]:

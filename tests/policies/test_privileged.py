@@ -1,5 +1,6 @@
 """Truth has a door of its own: who is handed it, what its holders do with it, and that nobody else reaches it."""
 
+import itertools
 import sys
 
 import gymnasium
@@ -144,14 +145,22 @@ def test_references_keep_exactly_the_matched_fraction_of_the_points(privileged, 
     whole.close()
 
 
-def test_random_points_change_with_the_keyframe_and_the_seed_and_come_back_after_reset(environment):
-    observation, _ = environment.reset(seed=0)
+def test_random_points_are_drawn_anew_for_every_cloud_and_seed(environment):
+    """Two independent draws of a share b of the points have the share b of each in common."""
     policy, other = (care_sim.make_policy("random-points", environment, seed=seed) for seed in (0, 1))
-    first, second = policy(observation), policy(observation)
-    policy.reset()
-    assert np.array_equal(policy(observation), first)
-    assert not np.array_equal(second, first)
-    assert not np.array_equal(other(observation), first)
+    share = environment.unwrapped.rig.budget / environment.unwrapped.rig.grid.size
+
+    def common(ours, theirs):
+        return len(np.intersect1d(ours, theirs)) / len(ours)
+
+    def draw(policy, seed):
+        observation, _ = environment.reset(seed=seed)
+        return policy.demand(Belief.from_observation(observation)).layers[0][0]
+
+    draws = [draw(policy, seed) for seed in range(4)]
+    assert np.array_equal(draw(policy, 0), draws[0])
+    pairs = [common(ours, theirs) for ours, theirs in itertools.combinations([*draws, draw(other, 0)], 2)]
+    assert max(pairs) < share + 0.05
 
 
 def test_the_seed_of_random_points_is_checked(environment):

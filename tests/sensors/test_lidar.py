@@ -34,7 +34,7 @@ def street(bullet):
 
 
 def lidar(grid, bullet, seed=0, **noise):
-    return Lidar(grid, ENGINES["bullet"](bullet), Sensing(**noise), np.random.default_rng(seed))
+    return Lidar(grid, ENGINES["bullet"](bullet), Sensing(**noise), np.random.SeedSequence(seed))
 
 
 def everything(grid):
@@ -44,7 +44,7 @@ def everything(grid):
 def test_only_the_fired_cells_are_cast(grid, street):
     engine = Watched(street)
     cells = np.array([5, 300, 9000, 16383])
-    Lidar(grid, engine, Sensing(), np.random.default_rng(0)).fire(cells, SENSOR)
+    Lidar(grid, engine, Sensing(), np.random.SeedSequence(0)).fire(cells, SENSOR)
     assert len(engine.directions) == 1
     assert engine.directions[0] == pytest.approx(grid.directions[cells])
 
