@@ -1,9 +1,10 @@
 """Detection distances of actors that were never detected: censored, no zeros, and not dropped.
 
-All that is known of such a distance is that it is at most that of the nearest scan that passed the actor by.
-In medians and quartiles it ranks below every detection, and nothing is interpolated with it. In a paired
-difference it enters at that most, the reading that favours the policy that missed; the difference is then a
-bound on the true one, and says so.
+All that is known of such a distance is that it is at most that of the nearest scan that passed the actor by, and
+not below 0. In medians and quartiles it ranks below every detection, and nothing is interpolated with it. In a
+paired difference it enters at that most, the reading that favours the policy that missed; the difference is then
+a bound on the true one, and says so. A difference is claimed only when it holds wherever in its range each
+censored distance lies.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ FEWEST_PAIRS = 5
 
 
 class Reading(NamedTuple):
-    """A value measured in an episode; of a `censored` one is known that the truth is at most this."""
+    """A value measured in an episode; of a `censored` one is known that the truth lies between 0 and this."""
 
     value: float
     censored: bool = False
@@ -47,18 +48,21 @@ class Bound(StrEnum):
 
 @dataclass(frozen=True)
 class Difference:
-    """A mean paired difference with its interval; the true one lies as `bound` says."""
+    """A mean paired difference with its interval; the true one lies as `bound` says.
+
+    `cautious` is the same with every censored value at the end of its range that speaks most against the difference.
+    """
 
     interval: Interval
     bound: Bound
     pairs: int
+    cautious: Interval
 
     @property
     def excludes_zero(self) -> bool:
         """Whether the interval excludes zero, whatever the censored values were; never of fewer than 5 pairs."""
-        below = self.interval.high < 0 and self.bound in (Bound.EXACT, Bound.AT_MOST)
-        above = self.interval.low > 0 and self.bound in (Bound.EXACT, Bound.AT_LEAST)
-        return (below or above) and self.pairs >= FEWEST_PAIRS
+        away = self.cautious.low > 0 if self.interval.mean > 0 else self.cautious.high < 0
+        return away and self.pairs >= FEWEST_PAIRS
 
 
 def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
@@ -78,7 +82,16 @@ def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
 
 def difference(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Difference:
     """Mean of `ours - theirs`, entry by entry. Raises InvalidInput as `paired_difference` does."""
-    interval = paired_difference([reading.value for reading in ours], [reading.value for reading in theirs])
+    interval = paired_difference(_most(ours), _most(theirs))
+    against = (_least(ours), _most(theirs)) if interval.mean > 0 else (_most(ours), _least(theirs))
     missed = any(reading.censored for reading in ours), any(reading.censored for reading in theirs)
     bounds = {(True, False): Bound.AT_MOST, (False, True): Bound.AT_LEAST, (True, True): Bound.OPEN}
-    return Difference(interval, bounds.get(missed, Bound.EXACT), len(ours))
+    return Difference(interval, bounds.get(missed, Bound.EXACT), len(ours), paired_difference(*against))
+
+
+def _most(readings: Sequence[Reading]) -> list[float]:
+    return [reading.value for reading in readings]
+
+
+def _least(readings: Sequence[Reading]) -> list[float]:
+    return [0.0 if reading.censored else reading.value for reading in readings]

@@ -1,17 +1,17 @@
 """The paper's ablations (Sec. 5.4) in the closed loop: one thing varied at a time, and a fixed table each."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 from care_sim.forgetting import ForgettingRules
 from care_sim.study.config import EpisodeConfig
-from care_sim.study.contrasts import DETECTION, contrast
 from care_sim.study.entries import interval, spread
 from care_sim.study.episode import Row
 from care_sim.study.factors import USUAL, Level, Place
-from care_sim.study.summary import Cell, Groups, Key, grouped, summarise
+from care_sim.study.played import Played
+from care_sim.study.summary import Cell
 from care_sim.study.table import Table
 
 PLACES = (Place("dartout", 0.03), Place("dartout", 0.10), Place("dense", 0.02), Place("dense", 0.03))
@@ -19,11 +19,13 @@ PLACES = (Place("dartout", 0.03), Place("dartout", 0.10), Place("dense", 0.02), 
 below: with more the reserve holds every wedge whole, and nothing that is varied here could show.
 """
 OTHERS = ("history", "all-camera")
+MOST_SHOWN = 2
+"""References that 80 characters of a terminal leave room for."""
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """A policy at several levels of one thing, beside `references`, which feel its changes of conditions too."""
+    """A policy at several levels of one thing, beside `references` under the same conditions."""
 
     title: str
     policy: str
@@ -31,13 +33,10 @@ class Ablation:
     references: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def is_usual(self, level: Level) -> bool:
-        """Whether nothing departs from the defaults at this level."""
-        return level.key(PLACES[0], self.policy) == USUAL.key(PLACES[0], self.policy)
-
-    def beside(self, also: Sequence[str]) -> tuple[str, ...]:
-        """The references, and `also` wherever those of the paper stand."""
-        return (*self.references, *(also if self.references == OTHERS else ()))
+    @property
+    def varies_conditions(self) -> bool:
+        """Whether any policy feels what is varied."""
+        return any(level.changes for level in self.levels)
 
 
 def _conditions(name: str, values: Iterable[Any]) -> tuple[Level, ...]:
@@ -82,45 +81,60 @@ ABLATIONS = (
         "margin forgotten a keyframe, columns", "care-sbf", _rules("decay_per_keyframe", (0.25, 0.5, 1, 2)), ("care",)
     ),
 )
-POLICIES = {"full", *OTHERS, *(level.policy or ablation.policy for ablation in ABLATIONS for level in ablation.levels)}
-"""The policies of the study itself."""
 
 
 def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """Every ablation in every place, and the full scan; `also` are further policies to stand beside `care`."""
+    """Every ablation in every place, and the full scan; `also` are further policies that feel the conditions."""
     made = [config for place in PLACES for config in USUAL.configurations(place, ["full"], seeds)]
     for place, ablation in product(PLACES, ABLATIONS):
+        beside = [*ablation.references, *(also if ablation.varies_conditions else ())]
         for level in ablation.levels:
             made += level.configurations(place, [ablation.policy], seeds)
-            made += level.for_others().configurations(place, ablation.beside(also), seeds)
+            made += level.for_others().configurations(place, beside, seeds)
     return list(dict.fromkeys(made))
 
 
 def ablation_tables(rows: Sequence[Row]) -> list[Table]:
     """A table an ablation: levels and paired differences, place by place."""
-    cells, groups = {cell.key: cell for cell in summarise(rows)}, grouped(rows)
-    also = [policy for policy in dict.fromkeys(row["policy"] for row in rows) if policy not in POLICIES]
-    return [_table(ablation, cells, groups, also) for ablation in ABLATIONS]
+    played = Played(rows)
+    return [_table(ablation, played) for ablation in ABLATIONS]
 
 
-def _table(ablation: Ablation, cells: Mapping[Key, Cell], groups: Groups, also: Sequence[str]) -> Table:
-    beside = ablation.beside(also)
-    columns = ("level", "first detection m", "braked", *(f"minus {other}" for other in ("usual", *beside)))
-    lines: list[tuple[str, ...]] = []
-    for place in PLACES:
-        lines.append((str(place),))
-        for level in ablation.levels:
-            ours = level.key(place, ablation.policy)
-            usual = None if ablation.is_usual(level) else USUAL.key(place, ablation.policy)
-            others = (usual, *(level.for_others().key(place, policy) for policy in beside))
-            differences = (_difference(ours, other, groups) for other in others)
-            name = level.label if usual else f"{level.label} (usual)"
-            lines.append((name, *_levels(cells.get(ours)), *differences))
-    return Table(f"{ablation.policy}: {ablation.title}", columns, tuple(lines), ablation.notes)
+def _table(ablation: Ablation, played: Played) -> Table:
+    beside = _beside(ablation, played)
+    columns = ("level", "first detection m", "braked", "minus usual", *(f"minus {played.marked(p)}" for p in beside))
+    lines = [line for place in PLACES for line in _block(ablation, place, beside, played)]
+    hidden = columns[4 + MOST_SHOWN :]
+    notes = (*ablation.notes, *played.notes(beside))
+    return Table(f"{ablation.policy}: {ablation.title}", columns, tuple(lines), notes, (), hidden, columns[1:])
 
 
-def _difference(ours: Key, other: Key | None, groups: Groups) -> str:
-    return interval(contrast(DETECTION, groups.get(ours), groups.get(other))) if other else ""
+def _block(ablation: Ablation, place: Place, beside: Sequence[str], played: Played) -> Iterator[tuple[str, ...]]:
+    yield (str(place),)
+    usual = USUAL.key(place, ablation.policy)
+    for level in ablation.levels:
+        ours = level.key(place, ablation.policy)
+        others = (level.for_others().key(place, policy) for policy in beside)
+        name = f"{level.label} (usual)" if ours == usual else level.label
+        change = "" if ours == usual else interval(played.difference(ours, usual))
+        yield (name, *_levels(played.cell(ours)), change, *(interval(played.difference(ours, o)) for o in others))
+
+
+def _beside(ablation: Ablation, played: Played) -> list[str]:
+    """The references, and the further policies that were played where the conditions depart from the usual."""
+    known = (ablation.policy, *ablation.references, "full")
+    levels = [level.for_others() for level in ablation.levels if level.changes]
+    joined = [
+        policy
+        for policy in played.policies
+        if policy not in known
+        and any(played.has(level.key(place, policy)) for level in levels for place in PLACES if _departs(level))
+    ]
+    return [*ablation.references, *joined]
+
+
+def _departs(level: Level) -> bool:
+    return level.key(PLACES[0], "care") != USUAL.key(PLACES[0], "care")
 
 
 def _levels(cell: Cell | None) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
 from care_sim.scenarios import SCENARIOS
-from care_sim.study.entries import MARKS, MEANINGS, marked, percent
+from care_sim.study.entries import marked, percent, tag_notes
 from care_sim.study.episode import Row
 from care_sim.study.styles import FULL, Style, styles
 from care_sim.study.summary import Cell, summarise
@@ -55,8 +55,7 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     counts = sorted({cell.episodes for cell in cells})
     seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     axes.set_title(f"{cells[0].setting.scenario}: {seeds} seeds a point", loc="left", fontsize=10)
-    meanings = [MEANINGS[tag] for tag in MARKS if any(tag in tags for _, tags in policies)]
-    axes.set_xlabel("\n".join(["budget (share of cells fired)", *meanings]))
+    axes.set_xlabel("\n".join(["budget (share of cells fired)", *tag_notes(tags for _, tags in policies)]))
     axes.set_ylabel("first detection (m, median and quartiles)")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.92")

@@ -8,10 +8,11 @@ READING = (
 )
 CENSORING = (
     "An actor that was never detected (counted under 'never') is neither a zero nor left out. Its detection distance "
-    "is at most that of the nearest scan that passed it by. In medians and quartiles it ranks below every detection; "
-    "one that falls on such episodes, or between them and a detection, reads 'not detected' (n.d.). In differences it "
-    "enters at that most, which favours the policy that missed; the difference is then a bound. ≤: the true "
-    "difference is at most what is printed; ≥: at least; ~: both sides missed actors, and it may lie on either side."
+    "is at most that of the nearest scan that passed it by, and at least 0. In medians and quartiles it ranks below "
+    "every detection; one that falls on such episodes, or between them and a detection, reads 'not detected' (n.d.). "
+    "In differences it enters at that most, which favours the policy that missed; the difference is then a bound. ≤: "
+    "the true difference is at most what is printed; ≥: at least; ~: both sides missed actors, and it may lie on "
+    "either side."
 )
 LEVELS = (
     "Pass: least distance of the centres, clearance: hull to hull, both from the moment the actor is in view; medians. "
@@ -20,9 +21,9 @@ LEVELS = (
 )
 STATISTICS = (
     "Differences are means, paired by seed (common random numbers), with 95% percentile bootstrap intervals of 10,000 "
-    "resamples; positive favours the first named. Bold: the interval excludes zero, whatever the censored distances "
-    "were, on five or more seeds. Asterisk: it does, and the mean reaches the gate stated in advance: "
-    f"{GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, 0.3 s) or "
+    "resamples; positive favours the first named. Bold: the interval excludes zero wherever in their range the "
+    "censored distances lie, on five or more seeds. Asterisk: it does, and the mean reaches the gate stated in "
+    f"advance: {GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, 0.3 s) or "
     f"{GATE_POINTS:.0f} points of a rate. No correction is made for the number of differences in a table."
 )
 COVERAGE = (

@@ -3,47 +3,28 @@
 What imports the simulator or draws is imported by the command that needs it: help stays quick.
 """
 
-import ast
 import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
+from care_sim.study.options import USUAL, Options, seeds_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from care_sim.study.config import EpisodeConfig, Parameters
+    from care_sim.study.config import EpisodeConfig
 
     Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
 
 DONE, FAILED = 0, 1
 PIPE_WIDTH = 180
 """Columns of a table that is not printed on a terminal."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Options(Conditions):
-    """Conditions that all episodes share."""
-
-    scenario_parameters: tuple[str, ...] = ()
-    """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
-    policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policy as NAME=VALUE, for example k_safe=0 for care-sbf."""
-
-    def arguments(self) -> dict[str, Any]:
-        """As arguments of `EpisodeConfig`."""
-        pairs = {
-            "scenario_parameters": _pairs(self.scenario_parameters),
-            "policy_parameters": _pairs(self.policy_parameters),
-        }
-        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +41,7 @@ class Run:
     """Draws scenario, camera faults, noise and floor."""
     picture: Path | None = None
     """PNG file for a picture of the first keyframe at which the brake is on."""
-    conditions: Annotated[Options, tyro.conf.arg(name="")] = Options()
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
     """Further conditions."""
 
     def __call__(self) -> int:
@@ -121,7 +102,7 @@ class Sweep(_Study):
     """Several of --camera-latency, in turn."""
     out: Path = Path("runs/sweep")
     """Folder of the results; an interrupted sweep goes on there."""
-    conditions: Annotated[Options, tyro.conf.arg(name="")] = Options()
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
     """Further conditions."""
 
     def __call__(self) -> int:
@@ -135,9 +116,11 @@ class Sweep(_Study):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
         scenarios, common = expanded(self.scenarios, SCENARIOS), self.conditions.arguments()
         policies, left_out = _playable(self.policies, scenarios, self.budgets[0], **common)
-        rate, latency = common.pop("false_negative_rate"), common.pop("camera_latency")
-        rates, latencies = self.false_negative_rates or (rate,), self.camera_latencies or (latency,)
-        configs = grid(scenarios, policies, self.budgets, _seeds(self.seeds), rates, latencies, **common)
+        if not policies:
+            raise InvalidInput("none of the policies can be played")
+        rates = _in_turn(self.false_negative_rates, "false_negative_rate", common)
+        latencies = _in_turn(self.camera_latencies, "camera_latency", common)
+        configs = grid(scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common)
         return self.conduct("sweep", configs, self.out, left_out)
 
 
@@ -153,7 +136,7 @@ class _SetStudy(_Study):
         from care_sim.scenarios import SCENARIOS
 
         also, left_out = _playable(self.also, list(SCENARIOS), 0.1)
-        return self.conduct(study, configurations(_seeds(self.seeds), also), out, left_out)
+        return self.conduct(study, configurations(seeds_of(self.seeds), also), out, left_out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,47 +217,27 @@ class Report:
 def _playable(
     names: Sequence[str], scenarios: Sequence[str], budget: float, **common: Any
 ) -> tuple[list[str], list[str]]:
-    """The policies that can be played, and a line for each that cannot, which is printed too.
-
-    Raises InvalidInput when none of them can.
-    """
+    """The policies that can be played, and a line for each that cannot, which is printed too."""
     from care_sim.policies import policy_names
     from care_sim.study.selection import expanded, playable
 
     policies, broken = playable(expanded(names, policy_names()), scenarios, budget, **common)
-    if broken and not policies:
-        raise InvalidInput("; ".join(broken.values()))
     left_out = [f"left out: {reason}" for reason in broken.values()]
     _name(left_out)
     return policies, left_out
 
 
+def _in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
+    """The values of a condition that a sweep plays in turn; takes the one value out of `common`."""
+    one = common.pop(name)
+    if several and one != getattr(USUAL, name):
+        raise InvalidInput(f"give {name} one value or several, not both")
+    return several or (one,)
+
+
 def _name(problems: Sequence[str]) -> None:
     for problem in problems:
         print(f"care-sim: {problem}", file=sys.stderr)
-
-
-def _seeds(numbers: Sequence[int]) -> list[int]:
-    if len(numbers) != 1:
-        return list(numbers)
-    if numbers[0] < 1:
-        raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {numbers[0]}")
-    return list(range(numbers[0]))
-
-
-def _pairs(texts: Sequence[str]) -> "Parameters":
-    return tuple(_pair(text) for text in texts)
-
-
-def _pair(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise InvalidInput(f"parameters are given as NAME=VALUE, got {text!r}")
-    try:
-        literal = ast.literal_eval(value)
-    except (ValueError, SyntaxError):
-        literal = value
-    return name, tuple(literal) if isinstance(literal, list) else literal
 
 
 def _console() -> "Console":

@@ -67,8 +67,8 @@ class Contrast:
 
     @property
     def counts(self) -> bool:
-        """Whether the interval excludes zero and the mean difference reaches the gate."""
-        return self.excludes_zero and abs(self.mean) >= self.measure.gate
+        """Whether the interval excludes zero and the mean difference reaches the gate, whatever the censored were."""
+        return self.excludes_zero and abs(self.difference.cautious.mean) >= self.measure.gate
 
 
 def contrast(measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None) -> Contrast | None:

@@ -1,15 +1,14 @@
 """Where the all-camera reserve collapses as the number of tracked vehicles in the dense street grows."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
-from care_sim.evaluation.censoring import quartiles
-from care_sim.scenarios.dense import PLACES, Dense
+from care_sim.scenarios.dense import PLACES
 from care_sim.study.config import EpisodeConfig, grid
-from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
+from care_sim.study.contrasts import Contrast
 from care_sim.study.entries import interval, mean, median, percent
 from care_sim.study.episode import Row
+from care_sim.study.played import Played
+from care_sim.study.summary import Key, key_of
 from care_sim.study.table import Table
 
 BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
@@ -35,51 +34,27 @@ def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     ]
 
 
-def vehicles_of(row: Row) -> int:
-    """Standing vehicles in an episode of the dense street; the scenario's own number where the row names none."""
-    vehicles = row.get(COLUMN)
-    return Dense.vehicles if vehicles is None else int(vehicles)
-
-
-@dataclass(frozen=True)
 class Crowd:
-    """The rows of a crowding study by vehicles, policy and budget."""
+    """The rows of a crowding study by standing vehicles and budget."""
 
-    rows: Sequence[Row]
+    def __init__(self, rows: Sequence[Row]):
+        self.played = Played(rows)
+        self.counts = sorted({row[COLUMN] for row in rows})
+        self.budgets = sorted({row["budget"] for row in rows if row["policy"] != "full"})
+        self.others = ["all-camera", *(policy for policy in self.played.policies if policy not in POLICIES)]
 
-    @cached_property
-    def cells(self) -> dict[tuple[int, str, float], list[Row]]:
-        """The rows of every cell."""
-        cells: dict[tuple[int, str, float], list[Row]] = {}
-        for row in self.rows:
-            cells.setdefault((vehicles_of(row), row["policy"], row["budget"]), []).append(row)
-        return cells
-
-    @cached_property
-    def budgets(self) -> list[float]:
-        """Budgets of the policies that have one."""
-        return sorted({budget for _, policy, budget in self.cells if policy != "full"})
-
-    @cached_property
-    def counts(self) -> list[int]:
-        """Numbers of standing vehicles."""
-        return sorted({vehicles for vehicles, _, _ in self.cells})
-
-    @cached_property
-    def others(self) -> list[str]:
-        """The policies that are compared with CARE, all-camera first."""
-        return list(
-            dict.fromkeys(["all-camera", *(row["policy"] for row in self.rows if row["policy"] not in POLICIES)])
-        )
+    def key(self, vehicles: int, policy: str, budget: float) -> Key:
+        """Where the rows are found."""
+        return key_of({"scenario": "dense", "policy": policy, "budget": budget, COLUMN: vehicles})
 
     def gap(self, vehicles: int, budget: float, other: str = "all-camera") -> Contrast | None:
         """First detection of another policy minus that of CARE, metres; negative where the other is later."""
-        theirs, care = (self.cells.get((vehicles, policy, budget)) for policy in (other, "care"))
-        return contrast(DETECTION, theirs, care)
+        return self.played.difference(self.key(vehicles, other, budget), self.key(vehicles, "care", budget))
 
     def median(self, vehicles: int, policy: str, budget: float) -> str:
         """A median first detection, as text."""
-        return median(quartiles([detection(row) for row in self.cells.get((vehicles, policy, budget), ())]))
+        cell = self.played.cell(self.key(vehicles, policy, budget))
+        return median(cell.detection if cell else None)
 
     def collapsed(self, budget: float) -> list[int]:
         """Numbers of vehicles at which all-camera has collapsed."""
@@ -99,8 +74,8 @@ def crowding_tables(rows: Sequence[Row]) -> list[Table]:
 def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
     entry, more = (interval, ", with intervals") if intervals else (mean, "")
     lines = [(str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets)) for n in crowd.counts]
-    title = f"{TITLE}first detection of {other} minus care, m{more}"
-    notes = (_collapse_note(crowd),) if other == "all-camera" and not intervals else ()
+    title = f"{TITLE}first detection of {crowd.played.marked(other)} minus care, m{more}"
+    notes = (_collapse_note(crowd),) if other == "all-camera" and not intervals else crowd.played.notes([other])
     return Table(title, ("vehicles", *map(percent, crowd.budgets)), tuple(lines), notes, terminal=not intervals)
 
 
@@ -110,9 +85,9 @@ def _medians_table(crowd: Crowd) -> Table:
         (str(n), *(_medians(crowd, n, policies, budget) for budget in crowd.budgets), crowd.median(n, "full", 1.0))
         for n in crowd.counts
     ]
-    title = f"{TITLE}median first detection, {'/'.join(policies)}, m"
+    title = f"{TITLE}median first detection, {'/'.join(map(crowd.played.marked, policies))}, m"
     columns = ("vehicles", *map(percent, crowd.budgets), "full")
-    return Table(title, columns, tuple(lines), ("n.d.: not detected.",), terminal=False)
+    return Table(title, columns, tuple(lines), ("n.d.: not detected.", *crowd.played.notes(policies)), terminal=False)
 
 
 def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:

@@ -61,7 +61,7 @@ def _finish(axes: Axes, crowd: Crowd) -> None:
     axes.set_yticks(range(len(crowd.counts)), [str(n) for n in crowd.counts])
     axes.set_xlabel("budget (share of cells fired)")
     axes.set_ylabel("standing vehicles")
-    seeds = len({row["seed"] for row in crowd.rows})
+    seeds = len({row["seed"] for row in crowd.played.rows})
     title = f"dense, {seeds} seeds. Bold: interval without zero; asterisk: gate met; frame: collapsed"
     axes.set_title(title, loc="left", fontsize=8)
     axes.tick_params(length=0)

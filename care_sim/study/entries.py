@@ -1,5 +1,7 @@
 """How measured values are written in tables."""
 
+from collections.abc import Iterable
+
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.study.contrasts import Contrast
 from care_sim.study.table import Bold
@@ -22,6 +24,12 @@ def marked(policy: str, tags: tuple[str, ...]) -> str:
     """The policy, with a mark when no car can have it."""
     marks = "".join(mark for tag, mark in MARKS.items() if tag in tags)
     return f"{policy} {marks}".rstrip()
+
+
+def tag_notes(tags: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
+    """What the marks of policies with these tags mean."""
+    held = {tag for each in tags for tag in each}
+    return tuple(meaning for tag, meaning in MEANINGS.items() if tag in held)
 
 
 def median(values: Quartiles | None) -> str:

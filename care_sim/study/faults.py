@@ -1,16 +1,17 @@
 """How detection, braking and clearance hold up as every fault grows, and where the order of policies changes."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import Any
 
 from care_sim.study.config import EpisodeConfig
-from care_sim.study.contrasts import DETECTION, Contrast, contrast
+from care_sim.study.contrasts import Contrast
 from care_sim.study.entries import interval, median
 from care_sim.study.episode import Row
 from care_sim.study.factors import Level, Place
-from care_sim.study.summary import Cell, Groups, Key, grouped, summarise
+from care_sim.study.played import Played
+from care_sim.study.summary import Cell
 from care_sim.study.table import Bold, Table
 
 PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
@@ -21,6 +22,12 @@ BLACKOUT_START_S = 2.0
 """The person comes into the camera's view 2.4 to 2.9 s after the start."""
 DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
 """Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees below the horizon."""
+
+
+ORDER = (
+    "How the first named stands to the second at the first strength, and from which strength on otherwise. > : it "
+    "detects earlier, interval without zero and gate met; < : it detects later, likewise; = : neither."
+)
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,7 @@ class Fault:
     title: str
     unit: str
     strengths: tuple[Strength, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -69,7 +77,12 @@ FAULTS = (
     Fault("camera turned", "sigma in degrees", _growing("camera_rotation_sigma_deg", 0.5, 1.0, 2.0, 4.0)),
     Fault("camera shifted", "sigma in m", _growing("camera_position_sigma_m", 0.05, 0.1, 0.2)),
     Fault("lost returns", "share", _growing("lidar_dropout", 0.1, 0.2, 0.4, 0.6)),
-    Fault("range noise", "sigma in m", _growing("lidar_range_sigma", 0.02, 0.1, 0.5)),
+    Fault(
+        "range noise",
+        "sigma in m",
+        _growing("lidar_range_sigma", 0.02, 0.1, 0.5),
+        ("The proxy detector's boxes are true whatever the ranges; of the study's policies none reads ranges.",),
+    ),
     Fault(
         "dead rows",
         "rows",
@@ -93,27 +106,14 @@ def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     return list(dict.fromkeys(made))
 
 
-class Played:
-    """The rows of the study by policy, place and strength."""
+def pairs_of(played: Played) -> list[tuple[str, str]]:
+    """The pairs of policies whose order is followed."""
+    return [*PAIRS, *(("care", policy) for policy in played.policies if policy not in POLICIES)]
 
-    def __init__(self, rows: Sequence[Row]):
-        self.policies = list(dict.fromkeys([*POLICIES, *(row["policy"] for row in rows)]))
-        self._cells: Mapping[Key, Cell] = {cell.key: cell for cell in summarise(rows)}
-        self._groups: Groups = grouped(rows)
 
-    @property
-    def pairs(self) -> list[tuple[str, str]]:
-        """The pairs of policies whose order is followed."""
-        return [*PAIRS, *(("care", policy) for policy in self.policies if policy not in POLICIES)]
-
-    def cell(self, place: Place, policy: str, strength: Strength) -> Cell | None:
-        """What a policy does at a strength."""
-        return self._cells.get(strength.level.key(place, policy))
-
-    def difference(self, place: Place, pair: tuple[str, str], strength: Strength) -> Contrast | None:
-        """First detection of one policy minus that of another at the same strength."""
-        ours, theirs = (self._groups.get(strength.level.key(place, policy)) for policy in pair)
-        return contrast(DETECTION, ours, theirs)
+def policies_of(played: Played) -> list[str]:
+    """The policies of the study, then those that joined in."""
+    return list(dict.fromkeys([*POLICIES, *played.policies]))
 
 
 def fault_tables(rows: Sequence[Row]) -> list[Table]:
@@ -124,53 +124,53 @@ def fault_tables(rows: Sequence[Row]) -> list[Table]:
 
 def order(pair: tuple[str, str], fault: Fault, place: Place, played: Played) -> str:
     """How two policies stand as the fault grows: '>' where the first detects earlier by a difference that counts,
-    '<' where the second does, '=' elsewhere; bold when it changes.
+    '<' where the second does, '=' elsewhere; bold when it changes. Strengths that were not played are passed over.
     """
-    signs = [(strength, _sign(played.difference(place, pair, strength))) for strength in fault.strengths]
-    changes = [
-        f"{sign} from {strength.level.label}" for (_, before), (strength, sign) in pairwise(signs) if sign != before
-    ]
-    text = ", ".join([signs[0][1], *changes])
+    found = [(strength.level.label, _difference(pair, strength, place, played)) for strength in fault.strengths]
+    signs = [(label, _sign(difference)) for label, difference in found if difference]
+    changes = [f"{sign} from {label}" for (_, before), (label, sign) in pairwise(signs) if sign != before]
+    text = ", ".join([*(sign for _, sign in signs[:1]), *changes])
     return Bold(text) if changes else text
 
 
-def _sign(difference: Contrast | None) -> str:
-    if difference is None:
-        return ""
+def _difference(pair: tuple[str, str], strength: Strength, place: Place, played: Played) -> Contrast | None:
+    ours, theirs = (strength.level.key(place, policy) for policy in pair)
+    return played.difference(ours, theirs)
+
+
+def _sign(difference: Contrast) -> str:
     return "=" if not difference.counts else ">" if difference.mean > 0 else "<"
 
 
 def _order_table(played: Played) -> Table:
+    pairs = pairs_of(played)
     lines: list[tuple[str, ...]] = []
     for place in PLACES:
         lines.append((str(place),))
-        lines += [(fault.label, *(order(pair, fault, place, played) for pair in played.pairs)) for fault in FAULTS]
-    columns = ("fault", *(f"{ours} : {theirs}" for ours, theirs in played.pairs))
-    note = (
-        "How the first named stands to the second without the fault, and from which strength on otherwise. > : it "
-        "detects earlier, interval without zero and gate met; < : it detects later, likewise; = : neither."
-    )
-    return Table("Where the order of policies changes", columns, tuple(lines), (note,))
+        lines += [(fault.label, *(order(pair, fault, place, played) for pair in pairs)) for fault in FAULTS]
+    columns = ("fault", *(" : ".join(map(played.marked, pair)) for pair in pairs))
+    return Table("Where the order of policies changes", columns, tuple(lines), (ORDER, *played.notes(played.policies)))
 
 
 def _fault_table(fault: Fault, played: Played) -> Table:
     columns = (fault.unit, *(strength.level.label for strength in fault.strengths))
     lines = [line for place in PLACES for line in _blocks(fault, place, played)]
-    return Table(fault.title, columns, tuple(lines), terminal=False)
+    notes = (*fault.notes, *played.notes(played.policies))
+    return Table(fault.title, columns, tuple(lines), notes, terminal=False)
 
 
 def _blocks(fault: Fault, place: Place, played: Played) -> Iterator[tuple[str, ...]]:
     """A block of policies for each measure, and one of paired differences."""
     for name, entry in (("first detection, m", _detection), ("braked", _braked), ("clearance, m", _clearance)):
         yield (f"{place}: {name}",)
-        for policy in played.policies:
-            cells = (played.cell(place, policy, strength) for strength in fault.strengths)
-            yield (policy, *(entry(cell) if cell else "" for cell in cells))
+        for policy in policies_of(played):
+            cells = (played.cell(strength.level.key(place, policy)) for strength in fault.strengths)
+            yield (played.marked(policy), *(entry(cell) if cell else "" for cell in cells))
     yield (f"{place}: first detection of care minus, m",)
-    for policy in played.policies:
+    for policy in policies_of(played):
         if policy != "care":
-            differences = (played.difference(place, ("care", policy), strength) for strength in fault.strengths)
-            yield (policy, *map(interval, differences))
+            differences = (_difference(("care", policy), strength, place, played) for strength in fault.strengths)
+            yield (played.marked(policy), *map(interval, differences))
 
 
 def _detection(cell: Cell) -> str:

@@ -34,8 +34,9 @@ def conduct(
 ) -> list[Failure]:
     """Run a study into `folder`, going on where an earlier run stopped; returns the episodes that failed.
 
-    Writes `journal.jsonl` as episodes finish, then `config.json`, `episodes.parquet` with the rows of `configs` in
-    their order and the columns of `care_sim.study.annotation`, `tables.md`, `tables.tex` and the figures of `study`.
+    Writes `journal.jsonl` as episodes finish; then, if there are any, `config.json` with the configurations and what
+    failed, `episodes.parquet` with the rows of `configs` in their order and the columns of
+    `care_sim.study.annotation`, `tables.md`, `tables.tex` and the figures of `study`.
     Raises InvalidInput for no episode or no worker, and when the folder cannot be written.
     """
     if not configs:
@@ -44,11 +45,11 @@ def conduct(
         raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
     with _journal(folder) as journal:
         _say_what_is_found(configs, journal, folder)
-        (folder / "config.json").write_text(_description(configs, study))
         failures = run_with_progress(configs, journal, workers, make_executor)
         rows = [journal[digest] for digest in (config.digest() for config in configs) if digest in journal]
     if rows:
         rows = annotated(rows)
+        (folder / "config.json").write_text(_description(configs, study, failures))
         write_rows(rows, folder / ROWS, study.name)
         write_report(rows, folder, study)
     return failures
@@ -78,8 +79,8 @@ def print_report(rows: Sequence[Row], console: Console, study: Study = SWEEP) ->
         console.print(sentence, markup=False)
 
 
-def _description(configs: Sequence[EpisodeConfig], study: Study) -> str:
-    settings = {"study": study.name, "versions": versions(), "machine": machine()}
+def _description(configs: Sequence[EpisodeConfig], study: Study, failures: Sequence[Failure]) -> str:
+    settings = {"study": study.name, "versions": versions(), "machine": machine(), "failed": [*map(str, failures)]}
     return json.dumps(settings | {"configurations": without_seeds(configs)}, indent=1) + "\n"
 
 

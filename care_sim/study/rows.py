@@ -14,8 +14,6 @@ from care_sim.types import Outcome
 
 REQUIRED = {*PLAIN_FIELDS, *Outcome.__dataclass_fields__}
 """Columns without which a file is none of ours."""
-
-
 STUDY = b"care_sim.study"
 """Where the schema of a file names the study that its rows belong to."""
 
@@ -54,7 +52,7 @@ def read_study(path: Path) -> str | None:
 
 def _read(path: Path) -> pa.Table:
     if not path.is_file():
-        raise InvalidInput(f"no results at {path}; expected a folder that a study wrote, or its Parquet file")
+        raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:
         return pq.read_table(path)
     except (pa.ArrowException, OSError) as error:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from care_sim.conditions import CAMERA_FAULTS, UNFELT_BY_FULL
+from care_sim.errors import is_number
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.study.config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
@@ -91,8 +92,13 @@ def key_of(row: Row) -> Key:
 
 def policy_of(row: Row) -> str:
     """The policy with its parameters."""
-    given = [f"{n.removeprefix('policy.')}={v}" for n, v in row.items() if n.startswith("policy.") and v is not None]
-    return " ".join([row["policy"], *given])
+    given = [(n.removeprefix("policy."), v) for n, v in row.items() if n.startswith("policy.") and v is not None]
+    return " ".join([row["policy"], *(f"{name}={_text(value)}" for name, value in given)])
+
+
+def _text(value: Any) -> str:
+    """The same for a number that was an int before a file held it."""
+    return f"{value:g}" if is_number(value) else f"{value}"
 
 
 def tags_of_row(row: Row) -> tuple[str, ...]:

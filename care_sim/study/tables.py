@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.study.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
-from care_sim.study.entries import MARKS, MEANINGS, ends, interval, marked, percent, spread, unsigned
+from care_sim.study.entries import ends, interval, marked, percent, spread, tag_notes, unsigned
 from care_sim.study.episode import Row
 from care_sim.study.paper import Published, paper_cells, published
 from care_sim.study.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
@@ -46,14 +46,10 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     sayings = [_published(cell) for cell in cells]
     sentences = dict.fromkeys(f'Paper: "{saying.sentence}"' for saying in sayings if saying)
     lines = (_line(cell, saying) for cell, saying in zip(cells, sayings, strict=True))
-    notes = () if any(cell.regret for cell in cells) else ("Regret: full not run.",)
+    missing = [] if any(cell.regret for cell in cells) else ["Regret: full not run."]
+    notes = [*tag_notes(cell.tags for cell in cells), *missing]
     hidden = FILES_ONLY if any(cell.never for cell in cells) else (*FILES_ONLY, "never")
-    return Table(title, COLUMNS, tuple(lines), (*tag_notes(cells), *notes), tuple(sentences), hidden, WHOLE)
-
-
-def tag_notes(cells: Sequence[Cell]) -> tuple[str, ...]:
-    """What the marks behind the policies of a table mean."""
-    return tuple(MEANINGS[tag] for tag in MARKS if any(tag in cell.tags for cell in cells))
+    return Table(title, COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, WHOLE)
 
 
 def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
@@ -68,7 +64,7 @@ def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> 
     lines = [line for measure in measures for line in _block(measure, setting, tags, budgets, groups)]
     columns = (f"{REFERENCE} minus", *map(percent, budgets))
     title = f"{setting.label}: {REFERENCE} minus each policy"
-    return [Table(title, columns, tuple(lines), tag_notes(cells), whole=columns[:1])]
+    return [Table(title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1])]
 
 
 def _block(

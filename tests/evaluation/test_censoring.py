@@ -2,8 +2,7 @@
 
 import pytest
 
-from care_sim.evaluation.bootstrap import Interval
-from care_sim.evaluation.censoring import Bound, Difference, Quartiles, Reading, difference, quartiles
+from care_sim.evaluation.censoring import Bound, Quartiles, Reading, difference, quartiles
 
 MISSED = Reading(3.0, censored=True)
 
@@ -51,22 +50,27 @@ def test_a_miss_counts_with_the_most_it_can_have_been_and_makes_a_bound(ours, th
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "bound", "excludes"),
+    ("ours", "theirs", "excludes", "cautious"),
     [
-        (1.0, 2.0, Bound.EXACT, True),
-        (-2.0, -1.0, Bound.EXACT, True),
-        (0.0, 2.0, Bound.EXACT, False),
-        (-1.0, 2.0, Bound.EXACT, False),
-        (1.0, 2.0, Bound.AT_LEAST, True),
-        (-2.0, -1.0, Bound.AT_LEAST, False),
-        (-2.0, -1.0, Bound.AT_MOST, True),
-        (1.0, 2.0, Bound.AT_MOST, False),
-        (1.0, 2.0, Bound.OPEN, False),
+        ([5.0] * 5, [4.0] * 5, True, 1.0),
+        ([5.0] * 5, [5.0] * 5, False, 0.0),
+        ([9.0] * 5, [2.0] * 4 + [None], True, 6.8),
+        ([9.0] * 4 + [None], [8.0] * 5, False, -0.2),
+        ([19.0] * 9 + [None], [8.0] * 10, True, 9.1),
+        ([2.0] * 4 + [None], [9.0] * 5, True, -6.8),
+        ([8.0] * 9 + [None], [19.0] * 9 + [None], True, -9.6),
+        ([None] * 5, [2.0] * 5, False, -2.0),
     ],
 )
-def test_a_bound_carries_a_claim_only_away_from_zero(low, high, bound, excludes):
-    assert Difference(Interval((low + high) / 2, low, high), bound, 5).excludes_zero == excludes
+def test_a_claim_holds_wherever_in_its_range_a_missed_distance_lies(ours, theirs, excludes, cautious):
+    """Missed, an actor was between 0 and 3 m away: at 0 where that speaks against the difference, else at 3."""
+    found, turned = difference(readings(*ours), readings(*theirs)), difference(readings(*theirs), readings(*ours))
+    assert found.excludes_zero == turned.excludes_zero == excludes
+    assert found.cautious.mean == pytest.approx(cautious)
+    if found.interval.mean:
+        assert turned.cautious.mean == pytest.approx(-cautious)
 
 
 def test_four_pairs_carry_no_claim():
-    assert not Difference(Interval(2.0, 1.0, 3.0), Bound.EXACT, 4).excludes_zero
+    assert difference(readings(*[5.0] * 5), readings(*[4.0] * 5)).excludes_zero
+    assert not difference(readings(*[5.0] * 4), readings(*[4.0] * 4)).excludes_zero

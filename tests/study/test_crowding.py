@@ -26,10 +26,6 @@ def test_a_collapse_needs_three_metres_and_an_interval_without_zero():
     assert crowd([8.0]).collapsed(0.03) == []
 
 
-def test_rows_that_name_no_number_have_the_streets_own():
-    assert Crowd(rows("care", [15.0])).counts == [7]
-
-
 def test_a_further_policy_is_compared_with_care_too():
     late = rows("uncertainty", [9.0] * 5, scenario_parameters=(("vehicles", 5),))
     tables = crowding_tables([*CROWD, *late])

@@ -1,0 +1,58 @@
+"""What several commands take: conditions that all episodes share, parameters as NAME=VALUE, seeds."""
+
+import ast
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from care_sim.conditions import Conditions
+from care_sim.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from care_sim.study.config import Parameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Conditions):
+    """Conditions that all episodes share."""
+
+    scenario_parameters: tuple[str, ...] = ()
+    """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policy as NAME=VALUE, for example k_safe=0 for care-sbf."""
+
+    def arguments(self) -> dict[str, Any]:
+        """As arguments of `EpisodeConfig`."""
+        pairs = {
+            "scenario_parameters": _pairs(self.scenario_parameters),
+            "policy_parameters": _pairs(self.policy_parameters),
+        }
+        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
+
+
+USUAL = Options()
+"""The defaults."""
+
+
+def seeds_of(numbers: Sequence[int]) -> list[int]:
+    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one."""
+    if len(numbers) != 1:
+        return list(numbers)
+    if numbers[0] < 1:
+        raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {numbers[0]}")
+    return list(range(numbers[0]))
+
+
+def _pairs(texts: Sequence[str]) -> "Parameters":
+    return tuple(_pair(text) for text in texts)
+
+
+def _pair(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InvalidInput(f"parameters are given as NAME=VALUE, got {text!r}")
+    try:
+        literal = ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        literal = value
+    return name, tuple(literal) if isinstance(literal, list) else literal
