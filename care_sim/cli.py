@@ -74,7 +74,10 @@ STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding")
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line and exit: 0 done, 1 some episode failed, 2 bad input, 130 interrupted."""
+    """Run the command line and exit.
+
+    0 done, 1 an episode failed or a policy was left out, 2 bad input, 130 interrupted.
+    """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

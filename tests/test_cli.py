@@ -7,8 +7,9 @@ import pytest
 from care_sim.cli import main
 from care_sim.policies import BUILT_IN
 from care_sim.scenarios import SCENARIOS
-from care_sim.study.commands import Options
-from care_sim.study.config import EpisodeConfig
+from care_sim.study.commands import Reproduce
+from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.options import Options
 from care_sim.study.report import ROWS
 from care_sim.study.rows import read_rows
 
@@ -100,12 +101,17 @@ def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
     assert (tmp_path / "tables.md").exists()
 
 
-def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_named(capsys, tmp_path, monkeypatch):
+@pytest.fixture
+def torn(tmp_path, monkeypatch):
+    """An installed package whose policy does not load."""
     package = tmp_path / "site" / "torn-1.5.dist-info"
     package.mkdir(parents=True)
     (package / "METADATA").write_text("Metadata-Version: 2.1\nName: torn\nVersion: 1.5\n")
     (package / "entry_points.txt").write_text("[care_sim.policies]\ntorn = torn_policy:Torn\n")
     monkeypatch.syspath_prepend(package.parent)
+
+
+def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_named(capsys, tmp_path, torn):
     out = tmp_path / "out"
     axes = ["--policies", "all", "--scenarios", "all", "--seeds", "1", "--workers", "1", "--out", out]
     short = ["--scenario-parameters", "duration_s=0.1"]
@@ -116,8 +122,28 @@ def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_name
     assert {row["policy"] for row in rows} == set(BUILT_IN)
     assert {row["scenario"] for row in rows} == set(SCENARIOS)
     code, _, err = run(capsys, "sweep", "--policies", "torn", "--seeds", "1", "--out", out)
-    assert (code, err.count("\n")) == (2, 1)
+    assert code == 2
     assert "policy torn cannot be loaded" in err
+    assert err.endswith("care-sim: none of the policies can be played\n")
+
+
+def test_further_policies_join_a_set_study_and_a_broken_one_is_left_out(capsys, tmp_path, torn):
+    def short(seeds, also):
+        return grid(["dartout"], ["care", *also], [0.1], seeds, scenario_parameters=(("duration_s", 0.1),))
+
+    study = Reproduce(seeds=(1,), workers=1, also=("torn", "uncertainty"))
+    assert study.play("sweep", short, tmp_path / "out") == 1
+    assert "left out: policy torn cannot be loaded" in capsys.readouterr().err
+    assert {row["policy"] for row in read_rows(tmp_path / "out" / ROWS)} == {"care", "uncertainty"}
+    assert Reproduce(seeds=(1,), workers=1, also=("torn",)).play("sweep", short, tmp_path / "alone") == 1
+    assert {row["policy"] for row in read_rows(tmp_path / "alone" / ROWS)} == {"care"}
+
+
+def test_a_condition_has_one_value_or_several(capsys, tmp_path):
+    rates = ["--false-negative-rate", "0.3", "--false-negative-rates", "0.1", "0.2"]
+    code, _, err = run(capsys, "sweep", *rates, "--out", tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "give false_negative_rate one value or several, not both" in err
 
 
 def test_the_lists(capsys):
@@ -145,7 +171,7 @@ def test_the_defaults_are_those_of_an_episode():
     assert all(getattr(usual, name) == value for name, value in Options().arguments().items())
 
 
-@pytest.mark.parametrize("command", ["", "run", "sweep", "reproduce", "crowding", "report"])
+@pytest.mark.parametrize("command", ["", "run", "sweep", "reproduce", "ablate", "faults", "crowding", "report"])
 def test_help_is_quick_and_complete(command):
     code = "import sys; from care_sim.cli import main; main(sys.argv[1:])"
     started = time.perf_counter()

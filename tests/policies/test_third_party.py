@@ -128,6 +128,17 @@ class Deaf(care_sim.Policy):
 
 def nothing(rig): ...
 
+class Nested(Mistagged):
+    tags = (["causal"],)
+
+class Untagged(Mistagged):
+    tags = ()
+
+class Sourced(Mistagged):
+    tags, source = ("causal",), ("a book", "a page")
+
+silent = max
+
 def honest(rig, bins=3):
     return care_sim.policies.BUILT_IN["history"](rig)
 """
@@ -135,9 +146,13 @@ def honest(rig, bins=3):
 REASONS = {
     "abstract": r"broken:Abstract is abstract: it lacks demand",
     "mistagged": r"broken:Mistagged has tags \('wise',\); allowed is a tuple of causal, privileged, .*",
+    "nested": r"broken:Nested has tags \(\['causal'\],\); allowed is a tuple of causal",
     "other": r"broken:Other is no Policy",
+    "silent": r"broken:silent tells no parameters",
+    "sourced": r"broken:Sourced has the source \('a book', 'a page'\); allowed is one line of text",
     "string": r"broken:module is no Policy",
     "torn": r"AttributeError: .*Nowhere",
+    "untagged": r"broken:Untagged has tags \(\); allowed is a tuple of causal",
 }
 
 
@@ -150,6 +165,10 @@ def broken(install):
         other="Other",
         string="module",
         mistagged="Mistagged",
+        nested="Nested",
+        untagged="Untagged",
+        sourced="Sourced",
+        silent="silent",
         torn="Nowhere",
         exploding="Exploding",
         deaf="Deaf",

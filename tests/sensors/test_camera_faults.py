@@ -176,6 +176,12 @@ def test_every_policy_meets_the_same_faults():
         ({"camera_rotation_sigma_deg": -1.0}, "camera_rotation_sigma_deg"),
         ({"camera_position_sigma_m": float("nan")}, "camera_position_sigma_m"),
         ({"lidar_dead_rows": (-1,)}, "lidar_dead_rows"),
+        ({"lidar_dead_rows": 3}, "lidar_dead_rows must be a list of rows"),
+        ({"lidar_dead_rows": None}, "lidar_dead_rows must be a list of rows"),
+        ({"false_positive_rate": 1e20}, "false_positive_rate"),
+        ({"camera_jitter": 2**70}, "camera_jitter must be at most"),
+        ({"false_negative_burst": 10**19}, "false_negative_burst must be at most"),
+        ({"engine": ["bullet"]}, "engine must be a name"),
         ({"ego_speed_sigma": -0.1}, "ego_speed_sigma"),
         ({"camera_confidence": 1.5}, "camera_confidence"),
     ],
@@ -189,6 +195,37 @@ def test_impossible_faults_are_refused_by_name(fault, named):
 def test_impossible_conditions_are_refused_by_name(change):
     with pytest.raises(InvalidInput, match=next(iter(change))):
         gymnasium.make("CARE-Dense-v0", **change)
+
+
+@pytest.mark.parametrize("rows", [[12, 9], (9, 12, 12), np.array([9, 12])])
+def test_dead_rows_are_a_set_however_they_are_given(rows):
+    assert Sensing(lidar_dead_rows=rows) == Sensing(lidar_dead_rows=(9, 12))
+
+
+def test_equal_numbers_are_equal_conditions():
+    ours = Conditions(false_negative_rate=np.float64(0), floor_seed=np.int64(1), lidar_dropout=1)
+    assert ours == Conditions(floor_seed=1, lidar_dropout=1.0)
+    assert [type(value) for value in (ours.false_negative_rate, ours.floor_seed, ours.lidar_dropout)] == [
+        float,
+        int,
+        float,
+    ]
+
+
+def test_the_scoring_looks_through_a_camera_that_stands_straight():
+    """A crooked mount changes what is detected, not when the person counts as in view."""
+
+    def in_view(**faults):
+        env = gymnasium.make("CARE-Dartout-v0", floor=False, disable_env_checker=True, **faults)
+        env.reset(seed=0)
+        nothing = np.zeros(env.action_space.shape, np.float32)
+        seen = [env.step(nothing)[-1]["in_view"] for _ in range(40)]
+        env.close()
+        return seen
+
+    straight = in_view()
+    assert any(straight)
+    assert in_view(camera_rotation_sigma_deg=40.0) == straight
 
 
 def test_all_faults_are_off_by_default():

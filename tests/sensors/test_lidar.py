@@ -118,6 +118,18 @@ def test_total_dropout_returns_nothing(grid, street):
     assert np.all(bodies == -1)
 
 
+def test_noise_does_not_move_what_drops_out(grid, street):
+    plain, _ = lidar(grid, street, lidar_dropout=0.3).fire(everything(grid), SENSOR)
+    noisy, _ = lidar(grid, street, lidar_dropout=0.3, lidar_range_sigma=0.1).fire(everything(grid), SENSOR)
+    assert np.array_equal(np.isinf(plain.ranges), np.isinf(noisy.ranges))
+
+
+def test_a_peek_sees_no_more_than_live_rows_can_return(grid, street):
+    peeked = lidar(grid, street, lidar_dead_rows=(9, 12), lidar_dropout=0.5).peek(SENSOR)
+    fired, _ = lidar(grid, street, lidar_dead_rows=(9, 12)).fire(everything(grid), SENSOR)
+    assert np.array_equal(peeked.ranges, fired.ranges)
+
+
 def test_noise_of_a_cell_does_not_depend_on_which_others_fire(grid, street):
     noise = {"lidar_range_sigma": 0.1, "lidar_dropout": 0.3}
     everywhere, here = lidar(grid, street, **noise), lidar(grid, street, **noise)

@@ -9,10 +9,13 @@ SEEDS = range(5)
 
 
 def distance(config):
-    """A made-up law: CARE loses with a small reserve, history is late, the rest sees as far as the full scan."""
+    """A made-up law: CARE loses with a small reserve, history is late, the rest sees as far as the full scan; the
+    dense street lies 4 m nearer.
+    """
+    nearer = 4.0 if config.scenario == "dense" else 0.0
     if config.policy == "history":
-        return 8.0
-    return 10.0 if config.reserve_fraction == 0.15 and config.policy == "care" else 16.0
+        return 8.0 - nearer
+    return (10.0 if config.reserve_fraction == 0.15 and config.policy == "care" else 16.0) - nearer
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +49,9 @@ def test_a_level_is_compared_with_the_usual_one_and_with_others_at_its_level(tab
         "-6.0* [-6.0,-6.0]",
     )
     assert isinstance(small[3], Bold)
+    street = table.rows[9]
+    assert street[:2] == ("0.15", "6.0 [6.0, 6.0]")
+    assert street[3:] == small[3:]
     assert usual[0] == "0.3 (usual)"
     assert usual[3] == ""
     assert usual[4] == "+8.0* [8.0,8.0]"
@@ -77,3 +83,13 @@ def test_a_further_policy_stands_beside_the_papers_in_conditions_that_it_feels()
     assert sum("minus uncertainty" in names for names in columns) == 5
     assert not any("minus care" in names for names in columns[:5])
     assert all(line[-1] for table in tables[:5] for line in table.rows if len(line) > 1)
+
+
+@pytest.mark.parametrize("policy", ["care-sbf", "history-oracle"])
+def test_every_further_policy_that_is_played_is_shown_and_marked(policy):
+    rows = [row(config, distance(config)) for config in configurations(range(2), [policy])]
+    tags = {"history-oracle": "privileged"}
+    table = ablation_tables([each | {"tags": tags.get(each["policy"], "causal")} for each in rows])[0]
+    assert table.columns[-1] == {"care-sbf": "minus care-sbf", "history-oracle": "minus history-oracle †"}[policy]
+    assert bool(table.notes) == (policy == "history-oracle")
+    assert table.files_only == table.columns[-1:]

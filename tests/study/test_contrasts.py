@@ -56,6 +56,11 @@ def test_regret_is_what_the_full_scan_has_over_a_policy():
     assert cell("full").regret is None
 
 
+def test_a_miss_is_never_as_good_as_the_full_scan():
+    near = [*rows("care", [None] * 5), *rows("full", [2.0] * 5)]
+    assert cell("care", near).as_full == 0
+
+
 def test_a_fault_is_compared_with_the_full_scan_of_the_faultless_world():
     faulty = rows("care", [14.0] * 5, scenario="dartout", budget=0.1, false_negative_rates=(0.2,))
     study = [*faulty, *rows("full", [15.0] * 5, scenario="dartout")]

@@ -3,6 +3,7 @@ import sys
 from dataclasses import replace
 from importlib.machinery import ModuleSpec
 
+import numpy as np
 import pytest
 
 from care_sim.errors import InvalidInput
@@ -46,6 +47,22 @@ def test_bad_input_names_the_thing_and_what_is_allowed(change, names):
         replace(GOOD, **change)
     assert all(name in str(error.value) for name in names), error.value
     assert "\n" not in str(error.value)
+
+
+def test_the_digest_is_that_of_the_values_and_not_of_their_types():
+    ours = EpisodeConfig(
+        "dense",
+        "care-sbf",
+        seed=np.int64(1),
+        false_negative_rate=0,
+        floor_seed=np.int64(2),
+        lidar_dead_rows=[3],
+        policy_parameters=(("k_safe", np.float64(1.0)),),
+    )
+    theirs = EpisodeConfig(
+        "dense", "care-sbf", seed=1, floor_seed=2, lidar_dead_rows=(3,), policy_parameters=(("k_safe", 1.0),)
+    )
+    assert (ours, hash(ours), ours.digest()) == (theirs, hash(theirs), theirs.digest())
 
 
 def test_the_digest_tells_every_parameter_apart():

@@ -50,6 +50,31 @@ def test_the_tables_hold_every_fault_place_policy_and_strength(rows):
     assert detections[2] == ("care", "16.0", "16.0", "16.0", "11.0", "11.0", "not detected")
     assert braked[0] == ("history", *["0/5"] * 6)
     assert detections[3] == ("full", *["16.0"] * 6)
+    assert {line[1] for line in tables[0].rows[11:15]} == {"3.0"}
+    history, camera, full = tables[0].rows[16:19]
+    assert history[:2] == ("history", "+8.0* [8.0,8.0]")
+    assert camera[4] == "-3.0* [-3.0,-3.0]"
+    assert full[1] == "+0.0 [0.0,0.0]"
+
+
+def test_one_miss_in_thirty_does_not_change_the_order():
+    missed = BY_TITLE["missed objects"]
+    made = [row(config, distance(config)) for config in configurations(range(30)) if config.scenario == "dartout"]
+    for each in made:
+        if (each["policy"], each["seed"], each["false_negative_rate"]) == ("care", 3, 0.4):
+            each |= {"detection_distance_m": None, "undetected_to_m": 3.0}
+    assert order(("care", "history"), missed, DARTOUT, Played(made)) == ">, < from 1"
+
+
+def test_strengths_that_were_not_played_are_passed_over(rows):
+    def without(*rates):
+        kept = [r for r in rows if r["policy"] != "care" or r["false_negative_rate"] not in rates]
+        return order(("care", "history"), BY_TITLE["missed objects"], DARTOUT, Played(kept))
+
+    assert without(0.4) == ">, < from 1"
+    assert without(0.0) == ">, < from 1"
+    assert without(0.8, 1.0) == ">"
+    assert without(0.0, 0.2, 0.4, 0.6, 0.8, 1.0) == ""
 
 
 def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
@@ -74,6 +99,10 @@ def test_a_figure_for_every_place_and_measure(rows):
         panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
         assert [axes.get_title(loc="left") for axes in panels] == [fault.title for fault in FAULTS]
         assert all(len(axes.lines) >= 4 for axes in panels)
+        assert not any(axes.axison for axes in figure.axes if axes not in panels)
+    missed = figures["faults-dartout-detection"].axes[0]
+    hollow = [list(line.get_xdata()) for line in missed.lines if line.get_markerfacecolor() == "white"]
+    assert [1.0] in hollow
 
 
 def test_a_further_policy_is_played_shown_and_ordered():
