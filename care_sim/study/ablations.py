@@ -7,7 +7,7 @@ from typing import Any
 
 from care_sim.forgetting import ForgettingRules
 from care_sim.study.config import EpisodeConfig
-from care_sim.study.entries import interval, spread
+from care_sim.study.entries import interval, median, quarters
 from care_sim.study.episode import Row
 from care_sim.study.factors import USUAL, Level, Place
 from care_sim.study.played import Played
@@ -19,6 +19,7 @@ PLACES = (Place("dartout", 0.03), Place("dartout", 0.10), Place("dense", 0.02), 
 below: with more the reserve holds every wedge whole, and nothing that is varied here could show.
 """
 OTHERS = ("history", "all-camera")
+LEVELS = ("level", "first detection m", "quartiles m", "braked")
 MOST_SHOWN = 2
 """References that 80 characters of a terminal leave room for."""
 
@@ -102,11 +103,11 @@ def ablation_tables(rows: Sequence[Row]) -> list[Table]:
 
 def _table(ablation: Ablation, played: Played) -> Table:
     beside = _beside(ablation, played)
-    columns = ("level", "first detection m", "braked", "minus usual", *(f"minus {played.marked(p)}" for p in beside))
+    columns = (*LEVELS, "minus usual", *(f"minus {played.marked(policy)}" for policy in beside))
     lines = [line for place in PLACES for line in _block(ablation, place, beside, played)]
-    hidden = columns[4 + MOST_SHOWN :]
+    hidden = (*LEVELS[2:], *columns[len(LEVELS) + 1 + MOST_SHOWN :])
     notes = (*ablation.notes, *played.notes(beside))
-    return Table(f"{ablation.policy}: {ablation.title}", columns, tuple(lines), notes, (), hidden, columns[1:])
+    return Table(f"{ablation.policy}: {ablation.title}", columns, tuple(lines), notes, (), hidden, LEVELS)
 
 
 def _block(ablation: Ablation, place: Place, beside: Sequence[str], played: Played) -> Iterator[tuple[str, ...]]:
@@ -137,5 +138,7 @@ def _departs(level: Level) -> bool:
     return level.key(PLACES[0], "care") != USUAL.key(PLACES[0], "care")
 
 
-def _levels(cell: Cell | None) -> tuple[str, str]:
-    return (spread(cell.detection), f"{cell.braked}/{cell.episodes}") if cell else ("", "")
+def _levels(cell: Cell | None) -> tuple[str, str, str]:
+    if cell is None:
+        return "", "", ""
+    return median(cell.detection), quarters(cell.detection), f"{cell.braked}/{cell.episodes}"

@@ -39,12 +39,17 @@ def median(values: Quartiles | None) -> str:
     return NOT_DETECTED if values.median is None else f"{values.median:.1f}"
 
 
+def quarters(values: Quartiles) -> str:
+    """The quartiles around a median detection distance; nothing where all three are not detected."""
+    if values.high is None:
+        return ""
+    low, high = ("n.d." if value is None else f"{value:.1f}" for value in (values.low, values.high))
+    return f"[{low}, {high}]"
+
+
 def spread(values: Quartiles) -> str:
     """A median detection distance with its quartiles."""
-    if values.high is None:
-        return NOT_DETECTED
-    low, high = ("n.d." if value is None else f"{value:.1f}" for value in (values.low, values.high))
-    return f"{median(values)} [{low}, {high}]"
+    return f"{median(values)} {quarters(values)}".rstrip()
 
 
 def mean(contrast: Contrast | None) -> str:

@@ -31,20 +31,12 @@ ORDER = (
 
 
 @dataclass(frozen=True)
-class Strength:
-    """A level of a fault and its place on the axis of a figure."""
-
-    value: float
-    level: Level
-
-
-@dataclass(frozen=True)
 class Fault:
-    """A fault from none of it (the first strength) to much of it."""
+    """A fault from none of it (the first level) to much of it; the labels of the levels are its strength in `unit`."""
 
     title: str
     unit: str
-    strengths: tuple[Strength, ...]
+    levels: tuple[Level, ...]
     notes: tuple[str, ...] = ()
 
     @property
@@ -53,9 +45,9 @@ class Fault:
         return f"{self.title}, {self.unit}"
 
 
-def _growing(parameter: str, *values: float, start: float = 0, **given: Any) -> tuple[Strength, ...]:
-    levels = [Strength(start, Level(f"{start:g}", given if start else {}))]
-    return (*levels, *(Strength(value, Level(f"{value:g}", {parameter: value, **given})) for value in values))
+def _growing(parameter: str, *values: float, start: float = 0, **given: Any) -> tuple[Level, ...]:
+    first = Level(f"{start:g}", given if start else {})
+    return (first, *(Level(f"{value:g}", {parameter: value, **given}) for value in values))
 
 
 FAULTS = (
@@ -86,10 +78,7 @@ FAULTS = (
     Fault(
         "dead rows",
         "rows",
-        (
-            Strength(0, Level("0")),
-            *(Strength(len(rows), Level(f"{len(rows)}", {"lidar_dead_rows": rows})) for rows in DEAD_ROWS),
-        ),
+        (Level("0"), *(Level(f"{len(rows)}", {"lidar_dead_rows": rows}) for rows in DEAD_ROWS)),
     ),
     Fault("noise of the car's speed", "sigma in m/s", _growing("ego_speed_sigma", 0.25, 0.5, 1.0)),
 )
@@ -100,8 +89,8 @@ def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     made = [
         config
         for place, fault in product(PLACES, FAULTS)
-        for strength in fault.strengths
-        for config in strength.level.configurations(place, [*POLICIES, *also], seeds)
+        for level in fault.levels
+        for config in level.configurations(place, [*POLICIES, *also], seeds)
     ]
     return list(dict.fromkeys(made))
 
@@ -126,15 +115,15 @@ def order(pair: tuple[str, str], fault: Fault, place: Place, played: Played) -> 
     """How two policies stand as the fault grows: '>' where the first detects earlier by a difference that counts,
     '<' where the second does, '=' elsewhere; bold when it changes. Strengths that were not played are passed over.
     """
-    found = [(strength.level.label, _difference(pair, strength, place, played)) for strength in fault.strengths]
+    found = [(level.label, _difference(pair, level, place, played)) for level in fault.levels]
     signs = [(label, _sign(difference)) for label, difference in found if difference]
     changes = [f"{sign} from {label}" for (_, before), (label, sign) in pairwise(signs) if sign != before]
     text = ", ".join([*(sign for _, sign in signs[:1]), *changes])
     return Bold(text) if changes else text
 
 
-def _difference(pair: tuple[str, str], strength: Strength, place: Place, played: Played) -> Contrast | None:
-    ours, theirs = (strength.level.key(place, policy) for policy in pair)
+def _difference(pair: tuple[str, str], level: Level, place: Place, played: Played) -> Contrast | None:
+    ours, theirs = (level.key(place, policy) for policy in pair)
     return played.difference(ours, theirs)
 
 
@@ -153,7 +142,7 @@ def _order_table(played: Played) -> Table:
 
 
 def _fault_table(fault: Fault, played: Played) -> Table:
-    columns = (fault.unit, *(strength.level.label for strength in fault.strengths))
+    columns = (fault.unit, *(level.label for level in fault.levels))
     lines = [line for place in PLACES for line in _blocks(fault, place, played)]
     notes = (*fault.notes, *played.notes(played.policies))
     return Table(fault.title, columns, tuple(lines), notes, terminal=False)
@@ -164,12 +153,12 @@ def _blocks(fault: Fault, place: Place, played: Played) -> Iterator[tuple[str, .
     for name, entry in (("first detection, m", _detection), ("braked", _braked), ("clearance, m", _clearance)):
         yield (f"{place}: {name}",)
         for policy in policies_of(played):
-            cells = (played.cell(strength.level.key(place, policy)) for strength in fault.strengths)
+            cells = (played.cell(level.key(place, policy)) for level in fault.levels)
             yield (played.marked(policy), *(entry(cell) if cell else "" for cell in cells))
     yield (f"{place}: first detection of care minus, m",)
     for policy in policies_of(played):
         if policy != "care":
-            differences = (_difference(("care", policy), strength, place, played) for strength in fault.strengths)
+            differences = (_difference(("care", policy), level, place, played) for level in fault.levels)
             yield (played.marked(policy), *map(interval, differences))
 
 

@@ -32,29 +32,30 @@ def test_every_ablation_has_its_table_filled_in_every_place(tables):
         assert len(lines) == len(PLACES) * len(ablation.levels)
         assert all(line[1] for line in lines)
         assert sum("(usual)" in line[0] for line in lines) == len(PLACES)
-        assert all(entry for line in lines for entry in line[4:])
-        assert all(bool(line[3]) != ("(usual)" in line[0]) for line in lines)
+        assert all(entry for line in lines for entry in line[5:])
+        assert all(bool(line[4]) != ("(usual)" in line[0]) for line in lines)
 
 
 def test_a_level_is_compared_with_the_usual_one_and_with_others_at_its_level(tables):
     table = tables["care: reserve fraction rho"]
-    assert table.columns[3:] == ("minus usual", "minus history", "minus all-camera")
+    assert table.columns[4:] == ("minus usual", "minus history", "minus all-camera")
     small, usual = table.rows[1], table.rows[2]
     assert small == (
         "0.15",
-        "10.0 [10.0, 10.0]",
+        "10.0",
+        "[10.0, 10.0]",
         "5/5",
         "-6.0* [-6.0,-6.0]",
         "+2.0 [2.0,2.0]",
         "-6.0* [-6.0,-6.0]",
     )
-    assert isinstance(small[3], Bold)
+    assert isinstance(small[4], Bold)
     street = table.rows[9]
-    assert street[:2] == ("0.15", "6.0 [6.0, 6.0]")
-    assert street[3:] == small[3:]
+    assert street[:3] == ("0.15", "6.0", "[6.0, 6.0]")
+    assert street[4:] == small[4:]
     assert usual[0] == "0.3 (usual)"
-    assert usual[3] == ""
-    assert usual[4] == "+8.0* [8.0,8.0]"
+    assert usual[4] == ""
+    assert usual[5] == "+8.0* [8.0,8.0]"
 
 
 def test_the_levels_are_the_papers():
@@ -92,4 +93,4 @@ def test_every_further_policy_that_is_played_is_shown_and_marked(policy):
     table = ablation_tables([each | {"tags": tags.get(each["policy"], "causal")} for each in rows])[0]
     assert table.columns[-1] == {"care-sbf": "minus care-sbf", "history-oracle": "minus history-oracle †"}[policy]
     assert bool(table.notes) == (policy == "history-oracle")
-    assert table.files_only == table.columns[-1:]
+    assert table.files_only == ("quartiles m", "braked", table.columns[-1])

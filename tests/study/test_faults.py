@@ -42,7 +42,7 @@ def test_the_tables_hold_every_fault_place_policy_and_strength(rows):
     assert [table.title for table in tables] == [fault.title for fault in FAULTS]
     assert sum(len(line) > 1 for line in orders.rows) == len(PLACES) * len(FAULTS)
     for table, fault in zip(tables, FAULTS, strict=True):
-        assert table.columns[1:] == tuple(strength.level.label for strength in fault.strengths)
+        assert table.columns[1:] == tuple(level.label for level in fault.levels)
         lines = [line for line in table.rows if len(line) > 1]
         assert len(lines) == len(PLACES) * (3 * 4 + 3)
         assert all(all(line) for line in lines)
@@ -78,11 +78,11 @@ def test_strengths_that_were_not_played_are_passed_over(rows):
 
 
 def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
-    varied = {name for fault in FAULTS for strength in fault.strengths for name in strength.level.changes}
+    varied = {name for fault in FAULTS for level in fault.levels for name in level.changes}
     faults = set(Sensing.__dataclass_fields__) - {"engine", "min_returns", "camera_confidence"}
     assert varied == faults
     for fault in FAULTS:
-        values = [strength.value for strength in fault.strengths]
+        values = [float(level.label) for level in fault.levels]
         assert values == sorted(set(values))
         assert values[0] == (1 if "burst" in fault.title else 0)
 
@@ -102,7 +102,7 @@ def test_a_figure_for_every_place_and_measure(rows):
         assert not any(axes.axison for axes in figure.axes if axes not in panels)
     missed = figures["faults-dartout-detection"].axes[0]
     hollow = [list(line.get_xdata()) for line in missed.lines if line.get_markerfacecolor() == "white"]
-    assert [1.0] in hollow
+    assert [5] in hollow
 
 
 def test_a_further_policy_is_played_shown_and_ordered():
