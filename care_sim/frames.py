@@ -1,9 +1,11 @@
-"""A frame of reference on the ground plane: where a car or a sensor is, and how it is turned."""
+"""A frame of reference: where a car or a sensor is, and how it is turned."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 Pose = tuple[float, float, float]
@@ -32,12 +34,16 @@ def box_corners(boxes: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Frame:
-    """Origin (world x, y, z in metres) and heading `yaw` (radians) of a frame whose z axis is up."""
+    """Origin (world x, y, z in metres) and orientation of a frame: turned by `yaw` about z, then by `pitch` about
+    its own y, which lowers its front, then by `roll` about its own x, which lowers its right (radians; ISO 8855).
+    """
 
     x: float
     y: float
     z: float
     yaw: float
+    roll: float = 0.0
+    pitch: float = 0.0
 
     @classmethod
     def mounted(cls, pose: Pose, at: tuple[float, float, float]) -> "Frame":
@@ -45,23 +51,63 @@ class Frame:
         x, y = turned(np.array(at[:2]), pose[2])
         return cls(pose[0] + float(x), pose[1] + float(y), at[2], pose[2])
 
+    @classmethod
+    def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":
+        """The frame at `origin` (3,) whose axes are those of the world after `rotation`."""
+        yaw, pitch, roll = rotation.as_euler("ZYX").tolist()
+        x, y, z = origin.tolist()
+        return cls(x, y, z, yaw, roll, pitch)
+
+    def holding(self, origin: Floats, rotation: Rotation | None = None) -> "Frame":
+        """The world frame of what is fixed in this one at `origin` (3,) and turned by `rotation`."""
+        turn = self.rotation if rotation is None else self.rotation * rotation
+        return Frame.turned_by(turn, self.origin + self.vectors_to_world(origin))
+
     @property
     def origin(self) -> Floats:
         """(3,) world position."""
         return np.array([self.x, self.y, self.z])
 
     @property
-    def _offset(self) -> Floats:
-        return np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0, self.yaw])
+    def rotation(self) -> Rotation:
+        """From the axes of this frame to those of the world."""
+        return Rotation.from_euler("ZYX", [self.yaw, self.pitch, self.roll])
+
+    def vectors_to_world(self, vectors: Floats) -> Floats:
+        """Vectors (..., 3) of this frame along the axes of the world."""
+        return turned(vectors, self.yaw) if self._upright else vectors @ self.rotation.as_matrix().T
+
+    def vectors_to_local(self, vectors: Floats) -> Floats:
+        """World vectors (..., 3) along the axes of this frame."""
+        return turned(vectors, -self.yaw) if self._upright else vectors @ self.rotation.as_matrix()
 
     def boxes_to_local(self, boxes: Floats) -> Floats:
-        """World boxes (n, 7) seen in this frame."""
-        return _moved(boxes - self._offset, -self.yaw)
+        """World boxes (n, 7) seen in this frame: exact centres, headings projected on its x, y plane."""
+        if self._upright:
+            return _moved(boxes - self._offset, -self.yaw)
+        return _replaced(boxes, self.vectors_to_local(boxes[:, :3] - self.origin), self.vectors_to_local)
 
     def boxes_to_world(self, boxes: Floats) -> Floats:
-        """Boxes (n, 7) of this frame in the world."""
-        return _moved(boxes, self.yaw) + self._offset
+        """Boxes (n, 7) of this frame in the world: exact centres, headings projected on the ground."""
+        if self._upright:
+            return _moved(boxes, self.yaw) + self._offset
+        return _replaced(boxes, self.origin + self.vectors_to_world(boxes[:, :3]), self.vectors_to_world)
+
+    @property
+    def _upright(self) -> bool:
+        return self.roll == 0 and self.pitch == 0
+
+    @property
+    def _offset(self) -> Floats:
+        return np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0, self.yaw])
 
 
 def _moved(boxes: Floats, yaw: float) -> Floats:
     return np.concatenate([turned(boxes[:, :3], yaw), boxes[:, 3:]], axis=1)
+
+
+def _replaced(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:
+    """Boxes of the same sizes at `centres` (n, 3), their headings turned by `turn`."""
+    yaw = boxes[:, 6]
+    heading = turn(np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))]))
+    return np.column_stack([centres, boxes[:, 3:6], np.arctan2(heading[:, 1], heading[:, 0])])

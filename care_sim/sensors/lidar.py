@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from care_sim.conditions import LidarFaults
 from care_sim.errors import InvalidInput
-from care_sim.frames import Frame, turned
+from care_sim.frames import Frame
 from care_sim.grid import AngularGrid, Cells
 from care_sim.sensors.engines import RayEngine
 from care_sim.types import Scan
@@ -33,7 +33,7 @@ class Lidar:
 
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
-        directions = turned(self.grid.directions, sensor.yaw)
+        directions = sensor.vectors_to_world(self.grid.directions)
         ranges, _ = self._engine.cast(sensor.origin, directions, self.grid.range_m)
         return Scan(np.arange(self.grid.size), np.where(self._dead, np.inf, ranges))
 
@@ -42,7 +42,7 @@ class Lidar:
 
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
-        directions = turned(self.grid.directions[cells], sensor.yaw)
+        directions = sensor.vectors_to_world(self.grid.directions[cells])
         ranges, ids = self._engine.cast(sensor.origin, directions, self.grid.range_m)
         if self._faults.lidar_range_sigma > 0:
             draws = self._noise.standard_normal(self.grid.size)[cells]

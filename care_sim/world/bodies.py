@@ -5,7 +5,7 @@ height in metres. Unless a line says otherwise they are the mean annotated sizes
 anchors of MMDetection3D's configurations for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Triple = tuple[float, float, float]
@@ -124,3 +124,26 @@ CATALOGUE = {
         ),
     )
 }
+
+
+def sized(name: str, label: str | None, size: Triple) -> BodyKind:
+    """A body of any size: the parts of the catalogue's kind for `label`, scaled to it, and a block without label.
+
+    Round parts stay round and within the box.
+    """
+    if label is None:
+        return _block(name, None, size, (0.5, 0.5, 0.5))
+    kind = CATALOGUE[label]
+    x, y, z = (new / old for new, old in zip(size, kind.size, strict=True))
+    turn = min(x, y)
+    scales = {"box": (x, y, z), "cylinder": (turn, turn, z), "sphere": (min(turn, z),) * 3}
+    parts = tuple(
+        replace(part, size=_scaled(part.size, scales[part.shape]), centre=_scaled(part.centre, (x, y, z)))
+        for part in kind.parts
+    )
+    return BodyKind(name, label, size, parts)
+
+
+def _scaled(triple: Triple, scale: Triple) -> Triple:
+    x, y, z = (float(value * factor) for value, factor in zip(triple, scale, strict=True))
+    return x, y, z

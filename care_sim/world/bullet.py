@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.frames import Floats, Frame, Pose, turned
+from care_sim.frames import Floats, Frame, Pose
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.quiet_pybullet import pybullet
@@ -25,17 +25,22 @@ _FAR_M = 120.0
 
 
 class BulletWorld:
-    """Bodies standing on a ground plane, in one DIRECT client. Not to be shared between processes.
+    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False. Not to be shared between
+    processes.
 
     The ground, transparent bodies and backdrops have no look: no camera needs their ids, and rendering them
     costs more than everything else in the picture.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, ground: bool = True) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
+        self.ground = self._lay_ground() if ground else NOTHING
+
+    def _lay_ground(self) -> int:
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
-        self.ground = pybullet.createMultiBody(0, plane, self._no_look(), physicsClientId=self._client)
-        self._set_group(self.ground, _OPAQUE)
+        ground = pybullet.createMultiBody(0, plane, self._no_look(), physicsClientId=self._client)
+        self._set_group(ground, _OPAQUE)
+        return int(ground)
 
     def close(self) -> None:
         """Free the client; calling it again does nothing."""
@@ -43,7 +48,7 @@ class BulletWorld:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = -1
 
-    def add(self, kind: BodyKind, pose: Pose, *, transparent: bool = False, backdrop: bool = False) -> int:
+    def add(self, kind: BodyKind, pose: Pose | Frame, *, transparent: bool = False, backdrop: bool = False) -> int:
         """Place a body and return its id. A `transparent` one is neither hit by rays nor seen.
 
         A `backdrop` stands behind all that perception reports: rays hit it, cameras need not render it.
@@ -58,11 +63,10 @@ class BulletWorld:
         self.move(body, pose)
         return int(body)
 
-    def move(self, body: int, pose: Pose) -> None:
-        """Put a body at a pose."""
-        x, y, yaw = pose
-        turn = (0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
-        pybullet.resetBasePositionAndOrientation(body, (x, y, 0.0), turn, physicsClientId=self._client)
+    def move(self, body: int, pose: Pose | Frame) -> None:
+        """Put a body at a pose on the ground plane, or at a frame: anywhere, turned in any way."""
+        place, turn = _standing(pose)
+        pybullet.resetBasePositionAndOrientation(body, place, turn, physicsClientId=self._client)
 
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.
@@ -104,8 +108,8 @@ class BulletWorld:
         return float(min((point[8] for point in points), default=np.inf))
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: Window) -> tuple[Any, ...]:
-        eye = sensor.origin + turned(np.array(camera.position), sensor.yaw)
-        forward, _, up = turned(camera.axes, sensor.yaw)
+        eye = sensor.origin + sensor.vectors_to_world(np.array(camera.position))
+        forward, _, up = sensor.vectors_to_world(camera.axes)
         left, top, right, bottom = window
         scale = NEAR_M / camera.focal
         across = [(u - camera.width / 2) * scale for u in (left, right)]
@@ -130,6 +134,14 @@ class BulletWorld:
     def _no_look(self) -> int:
         """A speck deep below: without a visual shape PyBullet would draw the collision shape."""
         return self._look([Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))])
+
+
+def _standing(pose: Pose | Frame) -> tuple[Sequence[float], Sequence[float]]:
+    """Position and quaternion (x, y, z, w)."""
+    if isinstance(pose, Frame):
+        return pose.origin.tolist(), pose.rotation.as_quat().tolist()
+    x, y, yaw = pose
+    return (x, y, 0.0), (0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
 
 
 def _collision(parts: Sequence[Part]) -> dict[str, Any]:

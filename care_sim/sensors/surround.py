@@ -1,0 +1,64 @@
+"""Six cameras and a LiDAR around the car: everything that a world shows of itself at one moment.
+
+The ring is that of nuScenes (Caesar et al. 2020, Fig. 4): front and sides 70 degrees wide and 55 degrees apart, the
+back 110 degrees wide, at the places of one of its calibrations, seen from LIDAR_TOP.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from care_sim.film import NOBODY, Cloud, Sights
+from care_sim.frames import Floats, Frame
+from care_sim.grid import AngularGrid, Cells
+from care_sim.pinhole import PinholeCamera
+from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
+from care_sim.world.bullet import BulletWorld, Integers
+
+
+def _camera(yaw: float, position: tuple[float, float, float], width: float = 70.0) -> PinholeCamera:
+    return PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(width), position, np.deg2rad(yaw))
+
+
+SURROUND_CAMERAS = (
+    _camera(0.0, CAMERA_FROM_LIDAR),
+    _camera(55.0, (0.58, 0.49, -0.33)),
+    _camera(-55.0, (0.61, -0.49, -0.34)),
+    _camera(110.0, (0.09, 0.48, -0.25)),
+    _camera(-110.0, (0.07, -0.48, -0.28)),
+    _camera(180.0, (-0.92, 0.0, -0.26), width=110.0),
+)
+"""Front, front left, front right, back left, back right, back."""
+
+
+def look_around(
+    world: BulletWorld,
+    cameras: tuple[PinholeCamera, ...],
+    sensor: Frame,
+    labels: Mapping[int, int],
+    boxes: Floats,
+) -> Sights:
+    """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes, by body id.
+
+    `boxes` (n, 7) are those of the bodies in the sensor frame; nothing outside them is rendered.
+    """
+    windows = [window_on(camera, boxes) for camera in cameras]
+    views = zip(cameras, windows, strict=True)
+    return sights_of([Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views], labels)
+
+
+def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame) -> Cloud:
+    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids."""
+    ranges, bodies = world.cast(sensor.origin, sensor.vectors_to_world(grid.directions), grid.range_m)
+    return cloud_of(grid, ranges, bodies)
+
+
+def cloud_of(grid: AngularGrid, ranges: Floats, objects: Cells) -> Cloud:
+    """Returns from the range (N,) of every cell, inf without one, and the object (N,) behind it."""
+    (cells,) = np.nonzero(np.isfinite(ranges))
+    return Cloud(cells, grid.directions[cells] * ranges[cells, None], objects[cells])
+
+
+def numbers_of(bodies: Integers, numbers: Mapping[int, int]) -> Cells:
+    """(n,) the number of the annotated object behind each body, NOBODY where there is none."""
+    return np.array([numbers.get(body, NOBODY) for body in bodies.tolist()], dtype=np.int64)
