@@ -7,6 +7,7 @@ in it depends on a policy. It holds truth; policies see of it what `care_sim.typ
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.frames import Floats, Frame
 from care_sim.grid import Cells
@@ -46,7 +47,10 @@ class Cloud:
 
     def within(self, fired: Cells) -> "Cloud":
         """The returns of the fired cells (k,), and no others."""
-        kept = np.isin(self.cells, fired)
+        return self.take(np.isin(self.cells, fired))
+
+    def take(self, kept: NDArray[np.bool_]) -> "Cloud":
+        """Some of the returns, by mask (P,)."""
         return Cloud(self.cells[kept], self.points[kept], self.objects[kept])
 
 

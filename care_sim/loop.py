@@ -1,7 +1,6 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,13 +10,15 @@ from care_sim.conditions import Sensing
 from care_sim.control import BrakingController
 from care_sim.frames import Floats, Frame
 from care_sim.grid import Cells
+from care_sim.odometry import Odometry
 from care_sim.perception.detectors import ReturnsDetector
+from care_sim.perception.identities import Identities
 from care_sim.perception.memory import TrackMemory
 from care_sim.pinhole import PinholeCamera
-from care_sim.sensors.camera import CameraDetector, Picture, window_on
+from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_on
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
-from care_sim.types import Belief, Ego, Keyframe, Rig, Scan, Tracks
+from care_sim.types import Belief, Keyframe, Rig, Scan, Tracks
 from care_sim.world.bullet import Integers
 from care_sim.world.world import World
 
@@ -33,11 +34,14 @@ class ClosedLoop:
         camera_seed, lidar_seed, odometry_seed = seeds
         engine = ENGINES[sensing.engine](world.bullet)
         self._lidar = Lidar(rig.grid, engine, sensing, lidar_seed)
-        self._camera = CameraDetector(labels, sensing, rig.keyframe_s, camera_seed, rig.cameras[0], rig.sensor_height_m)
-        self._speed_sigma, self._odometry = sensing.ego_speed_sigma, np.random.default_rng(odometry_seed)
+        self._labels = labels
+        self._camera = CameraDetector(
+            list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, rig.sensor_height_m
+        )
+        self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._memory = TrackMemory(rig.keyframe_s)
-        self._objects: dict[int, int] = {}
+        self._identities = Identities()
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
             world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
@@ -58,7 +62,7 @@ class ClosedLoop:
         scan, bodies = self._lidar.fire(fired, sensor)
         detections, detected = self._detector.detect(bodies, partial(self._local_boxes, sensor))
         tracks = self._memory.update(detections, sensor)
-        self._objects.update(zip(tracks.tolist(), detected.tolist(), strict=True))
+        self._identities.note(tracks, detected)
         command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
 
         distance = self._distance_to_first_sighting(sensor)
@@ -86,11 +90,10 @@ class ClosedLoop:
         """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object
         keeps its forecast. Truth: for the privileged alone.
         """
-        boxes = tracks.boxes.copy()
-        known = [(row, self._objects[track]) for row, track in enumerate(tracks.ids.tolist()) if track in self._objects]
-        actors = [self._actors[body] for _, body in known]
-        boxes[[row for row, _ in known]] = self.sensor.boxes_to_local(self.world.boxes(actors))
-        return boxes
+        sensor = self.sensor
+        return self._identities.boxes(
+            tracks, lambda bodies: dict(zip(bodies, self._local_boxes(sensor, np.array(bodies)), strict=True))
+        )
 
     def full_scan(self) -> Scan:
         """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
@@ -100,13 +103,14 @@ class ClosedLoop:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
         sensor = self.sensor
         boxes = sensor.boxes_to_local(self.world.boxes(self._reported))
-        nominal, mounted = self.rig.cameras[0], self._camera.mounted
+        (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
+        sights = sights_of([taken], self._labels)
         self.belief = Belief(
-            self._odometry_reading(),
+            self._odometry.reading(self.world.ego_motion),
             self.rig.budget,
-            self._camera.detect(taken, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._camera.detect(sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
             self._memory.tracks(sensor),
             ranges,
         )
@@ -114,13 +118,6 @@ class ClosedLoop:
     def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
         window = window_on(camera, boxes)
         return Picture.of(self.world.bullet.body_ids(camera, sensor, window), window)
-
-    def _odometry_reading(self) -> Ego:
-        """The car's own motion as its software reads it."""
-        motion = self.world.ego_motion
-        if not self._speed_sigma:
-            return motion
-        return replace(motion, speed=max(motion.speed + self._speed_sigma * self._odometry.standard_normal(), 0.0))
 
     def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)

@@ -1,13 +1,13 @@
 """A ground-truth camera: boxes read off the visible pixels."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from care_sim.conditions import Sensing
+from care_sim.film import Sights
 from care_sim.frames import Floats
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera_faults import Delay, Ghosts, Misses, mounted
@@ -70,48 +70,53 @@ class Picture:
         return bool(np.any((self.bodies == body) & (self.pixels >= MIN_PIXELS)))
 
 
-class CameraDetector:
-    """Turns pictures into detections: knows the classes of the reported bodies, and errs as `faults` say.
+def sights_of(pictures: Sequence[Picture], labels: Mapping[int, int]) -> Sights:
+    """What the unimpaired camera detector reports of pictures, one a camera of the rig: a box for every body that
+    `labels` maps to a class and that shows enough pixels.
+    """
+    rows, bodies = [np.empty((0, len(ImageDetections.COLUMNS)))], [np.empty(0, np.int64)]
+    for camera, picture in enumerate(pictures):
+        known = np.array([body in labels for body in picture.bodies.tolist()], dtype=bool)
+        seen = known & (picture.pixels >= MIN_PIXELS)
+        bodies.append(picture.bodies[seen])
+        classes = np.array([labels[body] for body in bodies[-1].tolist()], dtype=np.int64)
+        pixels, zeros = picture.pixels[seen], np.zeros(len(classes))
+        confidences = pixels / (pixels + FULL_CONFIDENCE)
+        rows.append(np.column_stack([classes, confidences, picture.boxes[seen], zeros + camera, zeros, zeros]))
+    return Sights(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(bodies))
 
-    `labels` maps body ids to classes; bodies that it does not hold are not detected. `camera` is the camera
-    that the rig knows, `height_m` that of the sensor frame above the road.
+
+class CameraDetector:
+    """Detections as they arrive: sights that err and lag as `sensing` says.
+
+    `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows, `height_m` that of
+    the sensor frame above the road.
     """
 
     def __init__(
         self,
-        labels: Mapping[int, int],
+        objects: Sequence[int],
         sensing: Sensing,
         keyframe_s: float,
         seed: np.random.SeedSequence,
-        camera: PinholeCamera = FRONT_CAMERA,
-        height_m: float = 1.84,
+        cameras: Sequence[PinholeCamera],
+        height_m: float,
     ):
         ghosts, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
-        self._labels, self._sensing = labels, sensing
-        self._misses = Misses(len(labels), sensing, np.random.default_rng(seed))
-        self._ghosts = Ghosts(camera, height_m, sensing.false_positive_rate, ghosts)
+        self._objects, self._sensing = np.asarray(objects, np.int64), sensing
+        self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
+        self._ghosts = Ghosts(cameras, height_m, sensing.false_positive_rate, ghosts)
         self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
-        self.mounted = mounted(camera, sensing, mount)
-        """The camera as it really stands."""
+        self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
+        """The cameras as they really stand."""
 
-    def detect(self, picture: Picture, heading: float, ranges: Floats, time_s: float) -> ImageDetections:
-        """The newest detections that are due, the surest first; `picture` is the latest, taken at `heading`.
+    def detect(self, sights: Sights, heading: float, ranges: Floats, time_s: float) -> ImageDetections:
+        """The newest detections that are due, the surest first; `sights` are the latest, taken at `heading`.
 
-        `ranges` (n,) are the distances of the labelled bodies in metres, in the order of the labels.
+        `ranges` (n,) are the distances of the objects in metres, in their order.
         """
-        seen = self._seen(picture, self._misses.draw(ranges)), self._ghosts.draw()
-        rows = np.concatenate([detections.rows() for detections in seen])
+        missed = np.isin(sights.objects, self._objects[self._misses.draw(ranges)])
+        rows = np.concatenate([sights.detections.rows()[~missed], self._ghosts.draw().rows()])
         kept = rows[(rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))]
         surest_first = kept[np.lexsort((kept[:, 2], -kept[:, 1]))]
         return self._delay.newest(ImageDetections.from_rows(surest_first), heading)
-
-    def _seen(self, picture: Picture, missed: NDArray[np.bool_]) -> ImageDetections:
-        found = {body for body, is_missed in zip(self._labels, missed.tolist(), strict=True) if not is_missed}
-        seen = (picture.pixels >= MIN_PIXELS) & np.array(
-            [body in found for body in picture.bodies.tolist()], dtype=bool
-        )
-        pixels, bodies = picture.pixels[seen], picture.bodies[seen].tolist()
-        classes = np.array([self._labels[body] for body in bodies], dtype=np.int64)
-        zeros = np.zeros(len(bodies))
-        confidences = pixels / (pixels + FULL_CONFIDENCE)
-        return ImageDetections(classes, confidences, picture.boxes[seen], zeros.astype(np.int64), zeros, zeros)

@@ -1,5 +1,6 @@
 """What goes wrong between a picture and the detections that arrive: misses, ghosts, delays, a crooked mount."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -52,18 +53,19 @@ class Ghosts:
     stands somewhere on the road in view; confidences are even from the detector's threshold to 1.
     """
 
-    def __init__(self, camera: PinholeCamera, height_m: float, rate: float, rng: np.random.Generator):
-        self._camera, self._height_m, self._rate, self._rng = camera, height_m, rate, rng
+    def __init__(self, cameras: Sequence[PinholeCamera], height_m: float, rate: float, rng: np.random.Generator):
+        self._cameras, self._height_m, self._rate, self._rng = cameras, height_m, rate, rng
 
     def draw(self) -> ImageDetections:
-        """The ghosts of this picture."""
+        """The ghosts of the pictures of this keyframe."""
         if not self._rate:
             return NOTHING_SEEN
-        rows = [self._row() for _ in range(self._rng.poisson(self._rate))]
+        numbers = [n for n in range(len(self._cameras)) for _ in range(self._rng.poisson(self._rate))]
+        rows = [self._row(number) for number in numbers]
         return ImageDetections.from_rows(np.array(rows).reshape(-1, len(ImageDetections.COLUMNS)))
 
-    def _row(self) -> list[float]:
-        camera, rng = self._camera, self._rng
+    def _row(self, number: int) -> list[float]:
+        camera, rng = self._cameras[number], self._rng
         label = int(rng.integers(len(CLASSES)))
         bearing, distance, yaw, confidence = rng.random(4)
         azimuth = camera.yaw + (bearing - 0.5) * 0.95 * camera.horizontal_fov
@@ -74,7 +76,7 @@ class Ghosts:
         low, high = np.floor(box[:2]), np.ceil(box[2:])
         limits = np.array([camera.width, camera.height])
         corners = (*np.clip(low, 0, limits - 1), *np.clip(high, 1, limits))
-        return [label, CONFIDENCE + confidence * (1 - CONFIDENCE), *map(float, corners), 0, 0, 0]
+        return [label, CONFIDENCE + confidence * (1 - CONFIDENCE), *map(float, corners), number, 0, 0]
 
 
 class _Taken(NamedTuple):

@@ -11,7 +11,7 @@ from care_sim.frames import Frame
 from care_sim.grid import AngularGrid
 from care_sim.residual import wedges
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture
+from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, sights_of
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.types import Demand, Rig
 
@@ -49,8 +49,8 @@ def scene(world, sensor, person):
     nearest_first = boxes[np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]))]
     labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
-    camera = CameraDetector(labels, Sensing(), 0.1, np.random.SeedSequence(0))
-    seen = camera.detect(picture, 0.0, np.full(len(labels), 20.0), 0.0)
+    camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA], 1.84)
+    seen = camera.detect(sights_of([picture], labels), 0.0, np.full(len(labels), 20.0), 0.0)
     (of_person,) = [n for n in range(len(seen)) if seen.classes[n] == person.label]
     cells = wedges(seen, RIG)
     return GRID.hulls(nearest_first), cells, cells[of_person]

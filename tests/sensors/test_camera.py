@@ -10,6 +10,7 @@ from care_sim.sensors.camera import (
     MIN_PIXELS,
     CameraDetector,
     Picture,
+    sights_of,
     window_on,
 )
 from care_sim.types import CLASSES
@@ -23,12 +24,13 @@ class Detector(CameraDetector):
     """Everybody 20 m away, one picture a keyframe."""
 
     def __init__(self, labels, sensing, keyframe_s, seed):
-        super().__init__(labels, sensing, keyframe_s, seed)
+        super().__init__(list(labels), sensing, keyframe_s, seed, [FRONT_CAMERA], 1.84)
+        self.labels = labels
         self.ranges, self.keyframe_s, self.frame = np.full(len(labels), 20.0), keyframe_s, -1
 
     def detect(self, picture, heading):
         self.frame += 1
-        return super().detect(picture, heading, self.ranges, self.frame * self.keyframe_s)
+        return super().detect(sights_of([picture], self.labels), heading, self.ranges, self.frame * self.keyframe_s)
 
 
 def detector(labels, keyframe_s=0.1, seed=0, **faults):

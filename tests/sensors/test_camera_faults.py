@@ -57,7 +57,7 @@ def test_misses_grow_with_the_distance_up_to_all():
 
 
 def ghosts(rate, pictures, seed=0):
-    haunted = Ghosts(FRONT_CAMERA, 1.84, rate, np.random.default_rng(seed))
+    haunted = Ghosts([FRONT_CAMERA], 1.84, rate, np.random.default_rng(seed))
     return [haunted.draw() for _ in range(pictures)]
 
 
