@@ -1,0 +1,1 @@
+"""Recorded drives as films: Argoverse 2 logs and nuScenes databases."""
