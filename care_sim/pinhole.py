@@ -21,7 +21,7 @@ class PinholeCamera:
     """Intrinsics and extrinsics of one camera.
 
     `position` is the optical centre in the sensor frame (metres); `yaw` turns the optical axis
-    about z and `pitch` raises it (radians). `horizontal_fov` in radians.
+    about z, `pitch` raises it and `roll` lowers the camera's right (radians). `horizontal_fov` in radians.
     """
 
     width: int = 320
@@ -30,6 +30,7 @@ class PinholeCamera:
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     yaw: float = 0.0
     pitch: float = 0.0
+    roll: float = 0.0
 
     @property
     def focal(self) -> float:
@@ -40,7 +41,12 @@ class PinholeCamera:
     def axes(self) -> Floats:
         """(3, 3): rows are forward, left and up of the camera in the sensor frame."""
         cy, sy, cp, sp = np.cos(self.yaw), np.sin(self.yaw), np.cos(self.pitch), np.sin(self.pitch)
-        return np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
+        upright = np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
+        if not self.roll:
+            return upright
+        cr, sr = np.cos(self.roll), np.sin(self.roll)
+        rolled: Floats = np.array([[1.0, 0.0, 0.0], [0.0, cr, sr], [0.0, -sr, cr]]) @ upright
+        return rolled
 
     def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Pixels (..., 2) and depths (...) of sensor-frame points (..., 3).

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.frames import Frame
 from care_sim.pinhole import NEAR_M, PinholeCamera
 
 cameras = st.builds(
@@ -103,3 +104,17 @@ def test_a_projected_box_is_the_tightest_around_what_lies_ahead_of_the_near_plan
 
 def test_a_box_behind_the_camera_has_no_rectangle():
     assert np.all(np.isnan(PinholeCamera().project_boxes(np.array([[-10.0, 0, 0, 2, 2, 2, 0]]))))
+
+
+def test_roll_lowers_the_right_of_the_camera():
+    """A camera that leans right sees the level horizon climb to its right."""
+    camera = PinholeCamera(roll=0.1)
+    (left, right), _ = camera.project([[10.0, 2.0, 0.0], [10.0, -2.0, 0.0]])
+    assert left[1] > 90 > right[1]
+    assert np.arctan2(left[1] - right[1], right[0] - left[0]) == pytest.approx(0.1)
+
+
+@given(st.floats(-3, 3), st.floats(-1, 1), st.floats(-1, 1))
+def test_the_axes_of_a_camera_are_those_of_the_frame_it_stands_in(yaw, pitch, roll):
+    frame = Frame(0.0, 0.0, 0.0, yaw, roll=roll, pitch=-pitch)
+    assert PinholeCamera(yaw=yaw, pitch=pitch, roll=roll).axes == pytest.approx(frame.rotation.as_matrix().T)

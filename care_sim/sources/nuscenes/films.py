@@ -1,0 +1,166 @@
+"""nuScenes scenes as films: recorded sweeps, annotations of the 2 Hz keyframes, six recorded cameras.
+
+Boxes without a LiDAR or radar point inside are left out, as the official evaluation leaves them out. The car's motion
+is that of the keyframes' poses. The cameras' pictures are taken within 50 ms of the sweep; the way that the car drives
+meanwhile is neglected.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from care_sim.errors import InvalidInput
+from care_sim.film import Annotations, Film, Shot, Sights
+from care_sim.frames import Floats, Frame
+from care_sim.grid import AngularGrid
+from care_sim.sources.motion import motions
+from care_sim.sources.nuscenes.cameras import (
+    CHANNELS,
+    VISIBLE_SHARES,
+    RecordedCamera,
+    projected_sights,
+    recorded_camera,
+)
+from care_sim.sources.nuscenes.categories import class_of
+from care_sim.sources.nuscenes.detections import DetectionFile
+from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
+from care_sim.sources.nuscenes.tables import Database, Row
+from care_sim.types import CLASSES, Ego
+
+KEYFRAME_S = 0.5
+"""nuScenes annotates its keyframes at 2 Hz."""
+LIDAR = "LIDAR_TOP"
+_FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
+"""In LIDAR_TOP's own frame x points right and y forward."""
+
+
+def film(
+    database: Database, scene: Row, grid: AngularGrid | None = None, detections: DetectionFile | None = None
+) -> Film:
+    """The film of a scene, in the cells of `grid` (the paper's, unless given). The cameras' boxes come from
+    `detections`, else from projected annotations.
+
+    Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated sweep.
+    """
+    samples = database.samples(scene)
+    data = [_recordings(database, sample) for sample in samples]
+    stage = _stage(database, samples, data[0], grid or AngularGrid(), detections)
+    cars = [_frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data]
+    times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
+    egos = motions(times, cars)
+    shots = tuple(stage.shot(*moment) for moment in zip(samples, data, times.tolist(), cars, egos, strict=True))
+    return Film(scene["name"], tuple(camera.pinhole for camera in stage.cameras), stage.lidar.z, KEYFRAME_S, shots)
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number for every instance."""
+
+    database: Database
+    lidar: Frame
+    cameras: tuple[RecordedCamera, ...]
+    numbers: dict[str, int]
+    grid: AngularGrid
+    detections: DetectionFile | None
+
+    def shot(self, sample: Row, recordings: dict[str, Row], time_s: float, car: Frame, ego: Ego) -> Shot:
+        sensor = car.holding(self.lidar.origin, self.lidar.rotation)
+        boxes = [box for box in self.database.annotations(sample["token"]) if _counts(self.database, box)]
+        annotations = _annotations(self.database, boxes, self.numbers, sensor)
+        points = read_points(self.database.root / recordings[LIDAR]["filename"])
+        cloud = recorded_cloud(points, self.grid, annotations)
+        sights = self._sights(recordings, boxes, annotations)
+        return Shot(time_s, sample["token"], sensor, ego, annotations, sights, cloud)
+
+    def _sights(self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations) -> Sights:
+        if self.detections is None:
+            return projected_sights(self.cameras, annotations, _shares(self.database, boxes))
+        return self.detections.sights(self.cameras, [recordings[channel] for channel in CHANNELS], annotations)
+
+
+def _stage(
+    database: Database,
+    samples: list[Row],
+    recordings: dict[str, Row],
+    grid: AngularGrid,
+    detections: DetectionFile | None,
+) -> _Stage:
+    lidar = _lidar_mount(database, recordings[LIDAR])
+    cameras = tuple(_camera(database, recordings[channel], lidar) for channel in CHANNELS)
+    return _Stage(database, lidar, cameras, _object_numbers(database, samples), grid, detections)
+
+
+def _recordings(database: Database, sample: Row) -> dict[str, Row]:
+    found = database.keyframe_data(sample["token"])
+    for channel in (LIDAR, *CHANNELS):
+        if channel not in found:
+            raise InvalidInput(f"{database.path('sample_data')}: no {channel} of the sample {sample['token']!r}")
+    return found
+
+
+def _frame(database: Database, table: str, token: str) -> Frame:
+    row = database.row(table, token)
+    try:
+        w, x, y, z = map(float, row["rotation"])
+        return Frame.turned_by(Rotation.from_quat([x, y, z, w]), np.array(row["translation"], dtype=float).reshape(3))
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{database.path(table)}: {token!r} has no translation and rotation ({error})") from error
+
+
+def _lidar_mount(database: Database, data: Row) -> Frame:
+    """The sensor frame in the car's: x forward where LIDAR_TOP has y forward."""
+    own = _frame(database, "calibrated_sensor", data["calibrated_sensor_token"])
+    return Frame.turned_by(own.rotation * _FORWARD_FROM_RIGHT, own.origin)
+
+
+def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
+    token = data["calibrated_sensor_token"]
+    intrinsic = np.array(database.row("calibrated_sensor", token)["camera_intrinsic"], dtype=float)
+    if intrinsic.shape != (3, 3):
+        raise InvalidInput(f"{database.path('calibrated_sensor')}: {token!r} has no 3 x 3 camera_intrinsic")
+    return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
+
+
+def _class_name(database: Database, box: Row) -> str | None:
+    category = database.row("instance", box["instance_token"])["category_token"]
+    return class_of(database.row("category", category)["name"])
+
+
+def _counts(database: Database, box: Row) -> bool:
+    return box["num_lidar_pts"] + box["num_radar_pts"] > 0 and _class_name(database, box) is not None
+
+
+def _object_numbers(database: Database, samples: list[Row]) -> dict[str, int]:
+    """A number for every instance of a scene."""
+    tokens = {box["instance_token"] for sample in samples for box in database.annotations(sample["token"])}
+    return {token: number for number, token in enumerate(sorted(tokens))}
+
+
+def _annotations(database: Database, boxes: list[Row], numbers: dict[str, int], sensor: Frame) -> Annotations:
+    rows = np.array([_world_box(database, box) for box in boxes]).reshape(-1, 7)
+    classes = [CLASSES.index(str(_class_name(database, box))) for box in boxes]
+    objects = [numbers[box["instance_token"]] for box in boxes]
+    local = sensor.boxes_to_local(rows)
+    return Annotations(np.array(objects, dtype=np.int64), np.array(classes, dtype=np.int64), local)
+
+
+def _world_box(database: Database, box: Row) -> tuple[float, ...]:
+    """Sizes are width, length, height in the table."""
+    frame = _frame(database, "sample_annotation", box["token"])
+    width, length, height = map(float, box["size"])
+    return (*frame.origin.tolist(), length, width, height, frame.yaw)
+
+
+def _shares(database: Database, boxes: list[Row]) -> Floats:
+    return np.array([_share(database, box["visibility_token"]) for box in boxes])
+
+
+def _share(database: Database, token: str) -> float:
+    if not token:
+        return 1.0
+    level = database.row("visibility", token)["level"]
+    if level not in VISIBLE_SHARES:
+        known = ", ".join(VISIBLE_SHARES)
+        raise InvalidInput(f"{database.path('visibility')}: {token!r} has the unknown level {level!r}; known: {known}")
+    return VISIBLE_SHARES[level]

@@ -1,0 +1,33 @@
+"""Which scenes a split holds: the official validation split, and those of `splits.json`."""
+
+from care_sim.errors import InvalidInput, unknown
+from care_sim.sources.nuscenes.tables import Database, Row, read_json
+
+_VAL_NUMBERS = (
+    (3, 3), (12, 18), (35, 36), (38, 39), (92, 110), (221, 221), (268, 278), (329, 332), (344, 346), (519, 524),
+    (552, 565), (625, 627), (629, 630), (632, 638), (770, 771), (775, 775), (777, 778), (780, 784), (794, 800),
+    (802, 802), (904, 917), (919, 931), (962, 963), (966, 969), (971, 972), (1059, 1073),
+)  # fmt: skip
+
+VAL = tuple(f"scene-{number:04}" for first, last in _VAL_NUMBERS for number in range(first, last + 1))
+"""The 150 scenes of the official validation split (nuScenes devkit, utils/splits.py)."""
+
+
+def scenes(database: Database, split: str = "val") -> list[Row]:
+    """The scenes of a split that the database holds, by name: of `val`, of a split in `<root>/<version>/splits.json`
+    (a map from names of splits to lists of names of scenes, which goes before), or `all`.
+
+    Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and an empty split.
+    """
+    by_name = {row["name"]: row for row in database.rows("scene").values()}
+    path = database.folder / "splits.json"
+    custom = read_json(path) if path.exists() else {}
+    known = {"all": sorted(by_name), "val": [name for name in VAL if name in by_name], **custom}
+    if split not in known:
+        raise unknown("split", split, known)
+    for name in known[split]:
+        if name not in by_name:
+            raise InvalidInput(f"{path}: the split {split!r} names {name!r}, which {database.path('scene')} lacks")
+    if not known[split]:
+        raise InvalidInput(f"{database.path('scene')}: holds no scene of the split {split!r}")
+    return [by_name[name] for name in known[split]]

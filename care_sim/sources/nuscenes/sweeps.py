@@ -1,0 +1,49 @@
+"""Recorded LiDAR sweeps as clouds of the angular grid."""
+
+from pathlib import Path
+
+import numpy as np
+
+from care_sim.errors import InvalidInput
+from care_sim.film import NOBODY, Annotations, Cloud
+from care_sim.frames import Floats, turned
+from care_sim.grid import AngularGrid, Cells
+
+VALUES_A_POINT = 5
+"""float32 x, y, z, intensity and ring."""
+OWN_CAR_M = 1.0
+"""Points nearer than this lie on the recording car (the radius within which the devkit drops them from sweeps)."""
+
+
+def read_points(path: Path) -> Floats:
+    """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is right, y forward.
+
+    Raises InvalidInput for a missing or truncated file.
+    """
+    if not path.is_file():
+        raise InvalidInput(f"{path}: no such file")
+    values = np.fromfile(path, np.uint8)
+    if values.size % (4 * VALUES_A_POINT) or not values.size:
+        raise InvalidInput(f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} bytes")
+    points = values.view("<f4").reshape(-1, VALUES_A_POINT).astype(float)
+    return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
+
+
+def recorded_cloud(points: Floats, grid: AngularGrid, annotations: Annotations) -> Cloud:
+    """The points (n, 3) that a ray of `grid` could have returned, each with the annotated box that it lies in."""
+    ranges = np.linalg.norm(points, axis=1)
+    cells = grid.cells_of(points)
+    (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & (ranges <= grid.range_m))
+    order = kept[np.argsort(cells[kept], kind="stable")]
+    return Cloud(cells[order], points[order], owners(points[order], annotations))
+
+
+def owners(points: Floats, annotations: Annotations) -> Cells:
+    """(n,) the annotated object whose box holds each point, the smallest of several, NOBODY where there is none."""
+    found = np.full(len(points), NOBODY, np.int64)
+    volumes = annotations.boxes[:, 3:6].prod(axis=1)
+    for row in np.argsort(-volumes, kind="stable").tolist():
+        box = annotations.boxes[row]
+        inside = np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1)
+        found[inside] = annotations.objects[row]
+    return found
