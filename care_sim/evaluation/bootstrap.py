@@ -1,5 +1,6 @@
 """Paired bootstrap: how sure a difference is between two policies that met the same episodes."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -14,6 +15,9 @@ RESAMPLES = 10_000
 CONFIDENCE = 0.95
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Sums = tuple[ArrayLike, ArrayLike]
+"""Numerators and denominators (n,) of a group of scenes, scene by scene."""
 
 
 class Interval(NamedTuple):
@@ -41,6 +45,58 @@ def paired_difference(
     return _resampled(tuple(differences.tolist()), confidence, resamples, seed)
 
 
+def ratio_of_sums(
+    group: Sums, *, less: Sums | None = None, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
+) -> Interval:
+    """Ratio of the sums of a group of scenes with a percentile bootstrap interval; scenes are drawn with replacement.
+
+    With `ours - theirs` as numerators and the events as denominators it is the difference of two policies in which
+    every event weighs alike, paired by scene. With a second group, `less`, its ratio is taken off; scenes are then
+    drawn within each group. Groups whose scenes all have one ratio give the value for both ends. Raises InvalidInput
+    for sums that are empty, of unequal length or not finite, for a denominator that is not positive, and for one
+    scene beside a second group.
+    """
+    groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
+    value = _difference_of_ratios(groups, [np.arange(len(numerators)) for numerators, _ in groups])
+    if all(_constant(*sums) for sums in groups):
+        return Interval(float(value), float(value), float(value))
+    if any(len(numerators) < 2 for numerators, _ in groups):
+        raise InvalidInput("a group of scenes to be drawn from must have at least two")
+    result = stats.bootstrap(
+        [np.arange(len(numerators)) for numerators, _ in groups],
+        lambda *drawn, axis=-1: _difference_of_ratios(groups, drawn, axis),
+        n_resamples=resamples,
+        confidence_level=confidence,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(seed),
+    )
+    low, high = result.confidence_interval
+    return Interval(float(value), float(low), float(high))
+
+
+def _difference_of_ratios(groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Rows], axis: int = -1) -> Floats:
+    """Ratio of the drawn scenes of the first group, less that of the second where there is one."""
+    first, *second = (
+        numerators[rows].sum(axis) / denominators[rows].sum(axis)
+        for (numerators, denominators), rows in zip(groups, drawn, strict=True)
+    )
+    return np.asarray(first - sum(second))
+
+
+def _constant(numerators: Floats, denominators: Floats) -> bool:
+    ratios = numerators / denominators
+    return bool(np.ptp(ratios) <= 1e-12 * max(1.0, float(np.abs(ratios).max())))
+
+
+def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Floats]:
+    a, b = np.atleast_1d(np.asarray(numerators, float)), np.atleast_1d(np.asarray(denominators, float))
+    _check_pairs(a, b)
+    if np.any(b <= 0):
+        raise InvalidInput("the denominators of a ratio must be positive: leave out scenes without an event")
+    return a, b
+
+
 @lru_cache(maxsize=10_000)
 def _resampled(differences: tuple[float, ...], confidence: float, resamples: int, seed: int) -> Interval:
     result = stats.bootstrap(
@@ -56,10 +112,14 @@ def _resampled(differences: tuple[float, ...], confidence: float, resamples: int
 
 
 def _differences(ours: Floats, theirs: Floats) -> Floats:
+    _check_pairs(ours, theirs)
+    return ours - theirs
+
+
+def _check_pairs(ours: Floats, theirs: Floats) -> None:
     if ours.ndim != 1 or ours.shape != theirs.shape or not ours.size:
         raise InvalidInput(
             f"paired samples must be two lists of one length, at least one long; got {ours.shape} and {theirs.shape}"
         )
     if not np.all(np.isfinite(ours) & np.isfinite(theirs)):
         raise InvalidInput("paired samples must be finite")
-    return ours - theirs

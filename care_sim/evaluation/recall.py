@@ -1,0 +1,111 @@
+"""First-sighting recall, overall recall and time to first detection, as numerators and denominators of a scene.
+
+Time to first detection (TTFD) of an event is the number of keyframes from its first sighting to the first keyframe at
+which the object is found: 0 where it is found at once, and K where it is not found at the first sighting or at the
+K - 1 keyframes that follow it. Every event counts, also one nearer than K to the end of the scene or whose object
+leaves before: not found, it counts K. The paper names one censoring time, K = 6 keyframes, for all events (Remark 1),
+and a mean over the events that recall is taken over; a shorter time would make a miss cheaper where the scene happens
+to end or the object drives off. `Score.chances` says at how many of the K keyframes the object was in range, for
+whoever wants only the events that had them all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.errors import InvalidInput
+from care_sim.evaluation import matching
+from care_sim.evaluation.sightings import Sightings
+from care_sim.grid import Cells
+from care_sim.types import CLASSES, Detections
+
+CENSORED_AT = 6
+"""K, in keyframes: three seconds at 2 Hz (paper, Remark 1)."""
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Sums over a scene, or over several: they add.
+
+    `events`, of which `sighted` were found at their first keyframe; `delay` is the sum of their TTFD in keyframes.
+    `frames` are the object frames in range, of which `found` were found. An average over floor seeds is no whole
+    number.
+    """
+
+    events: float = 0.0
+    sighted: float = 0.0
+    delay: float = 0.0
+    frames: float = 0.0
+    found: float = 0.0
+
+    def __add__(self, other: "Tally") -> "Tally":
+        return Tally(*(getattr(self, column.name) + getattr(other, column.name) for column in fields(self)))
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a policy found of a scene.
+
+    `found` (r,) by row of `sightings.frames`; of the events (e,) `delays` are the TTFD in keyframes, `censored_at`
+    where not found, and `chances` the keyframes among the first `censored_at` at which the object was in range.
+    """
+
+    sightings: Sightings
+    found: Mask
+    delays: Cells
+    chances: Cells
+
+    def tally(self, within: Mask | None = None) -> Tally:
+        """The sums, of all or of the rows (r,) of `sightings.frames` that lie `within` a stratum.
+
+        An event belongs to the stratum of its first sighting, wherever the object is when it is found.
+        """
+        events = self.sightings.events
+        rows = np.ones(len(self.found), bool) if within is None else within
+        counted = rows[events]
+        sums = counted.sum(), self.found[events][counted].sum(), self.delays[counted].sum()
+        return Tally(*map(float, (*sums, rows.sum(), self.found[rows].sum())))
+
+    def event_rows(self) -> list[dict[str, Any]]:
+        """One row an event: where and what it was, whether it was found at once, its TTFD and its chances."""
+        events = self.sightings.frames.take(self.sightings.events)
+        columns = {
+            "keyframe": events.keyframes,
+            "object": events.objects,
+            "class": np.array(CLASSES)[events.classes],
+            "range_m": events.ranges,
+            "azimuth": events.azimuths,
+            "detected": self.found[self.sightings.events],
+            "ttfd": self.delays,
+            "chances": self.chances,
+        }
+        values = zip(*(column.tolist() for column in columns.values()), strict=True)
+        return [{"scene": self.sightings.scene, **dict(zip(columns, row, strict=True))} for row in values]
+
+
+def score(sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT) -> Score:
+    """Score what a policy's detector reported, one entry a keyframe.
+
+    Raises InvalidInput where the reports are not one a keyframe, and as `matching.found` does.
+    """
+    if len(reports) != len(sightings.keyframes):
+        raise InvalidInput(
+            f"scene {sightings.scene}: {len(sightings.keyframes)} keyframes need as many reports, got {len(reports)}"
+        )
+    matched = [matching.found(shown, report) for shown, report in zip(sightings.keyframes, reports, strict=True)]
+    found = np.concatenate(matched)[sightings.in_range]
+    ages = _ages(sightings, censored_at)
+    delays = np.where(found, ages, censored_at).min(axis=1, initial=censored_at)
+    return Score(sightings, found, delays, np.sum(ages < censored_at, axis=1))
+
+
+def _ages(sightings: Sightings, censored_at: int) -> Cells:
+    """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of other objects."""
+    rows, events = sightings.frames, sightings.frames.take(sightings.events)
+    late = rows.keyframes - events.keyframes[:, None]
+    return np.where(rows.objects == events.objects[:, None], late, censored_at)

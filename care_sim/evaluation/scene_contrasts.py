@@ -1,0 +1,143 @@
+"""Two policies on the same scenes: how much more one found, and how sure that is (paper, Sec. 3 and Table 1).
+
+Policies are paired by scene and whole scenes are resampled, for the events of a scene are not independent. Scenes
+without an event, or without an object frame, hold nothing of the measure and are left out of it.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from care_sim.errors import InvalidInput
+from care_sim.evaluation.bootstrap import Interval, paired_difference, ratio_of_sums
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.recall import Tally
+from care_sim.frames import Floats
+
+Tallies = Mapping[str, Tally]
+"""The tally of every scene, by its name."""
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A measure that is a ratio of sums of a tally, `scale` times, in `unit`."""
+
+    name: str
+    unit: str
+    scale: float
+    numerator: Callable[[Tally], float]
+    denominator: Callable[[Tally], float]
+
+    def of(self, tally: Tally) -> float | None:
+        """Its value, None where there is nothing to find."""
+        return self.scale * self.numerator(tally) / self.denominator(tally) if self.denominator(tally) else None
+
+
+FIRST_SIGHTING = Ratio("first-sighting recall", "points", 100.0, lambda t: t.sighted, lambda t: t.events)
+OVERALL = Ratio("overall recall", "points", 100.0, lambda t: t.found, lambda t: t.frames)
+TTFD = Ratio("censored TTFD", "keyframes", 1.0, lambda t: t.delay, lambda t: t.events)
+
+
+@dataclass(frozen=True)
+class Level:
+    """A measure of one policy: over all events alike, and with equal weight to every scene; None without any."""
+
+    by_event: float | None
+    by_scene: float | None
+
+
+@dataclass(frozen=True)
+class SceneContrast:
+    """One policy less another in the unit of `ratio`, over `scenes` with `weight` events (or object frames) in all.
+
+    `by_event`: every event weighs alike; `by_scene`: every scene does.
+    """
+
+    ratio: Ratio
+    by_event: Interval
+    by_scene: Interval
+    scenes: int
+    weight: float
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the interval of the events excludes zero; never of fewer than 5 scenes."""
+        return self.scenes >= FEWEST_PAIRS and (self.by_event.low > 0 or self.by_event.high < 0)
+
+
+def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
+    """The mean tally of every scene over floor seeds, of the scenes that all seeds have.
+
+    Raises InvalidInput where the seeds do not count the same events and object frames of a scene.
+    """
+    scenes = sorted(set.intersection(*(set(seed) for seed in seeds))) if seeds else []
+    return {scene: _mean(scene, [seed[scene] for seed in seeds]) for scene in scenes}
+
+
+def level(ratio: Ratio, tallies: Tallies) -> Level:
+    """The measure of one policy over its scenes."""
+    values = [value for value in map(ratio.of, tallies.values()) if value is not None]
+    return Level(ratio.of(sum(tallies.values(), Tally())), float(np.mean(values)) if values else None)
+
+
+def contrast(ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0) -> SceneContrast | None:
+    """`ours` less `theirs` on the scenes that both have; None where nothing is to be found in them.
+
+    Raises InvalidInput where the two do not count the same events or object frames of a scene.
+    """
+    pairs = _pairs(ratio, ours, theirs)
+    if not pairs:
+        return None
+    a, b, weights = _columns(ratio, pairs)
+    by_event = ratio_of_sums((a - b, weights), seed=seed)
+    by_scene = paired_difference(a / weights, b / weights, seed=seed)
+    return SceneContrast(ratio, by_event, by_scene, len(pairs), float(weights.sum()))
+
+
+def contrast_gap(
+    ratio: Ratio, ours: Tallies, theirs: Tallies, first: Collection[str], second: Collection[str], *, seed: int = 0
+) -> Interval | None:
+    """How much larger the contrast is in the `first` scenes (the dense third) than in the `second`, events alike.
+
+    None where either has fewer than two scenes with something to find. Raises InvalidInput for groups that share a
+    scene.
+    """
+    if shared := sorted(set(first) & set(second)):
+        raise InvalidInput(f"groups of scenes to be compared must share none, got {shared[0]} in both")
+    groups = [_columns(ratio, _pairs(ratio, _among(ours, some), _among(theirs, some))) for some in (first, second)]
+    if min(len(group.T) for group in groups) < 2:
+        return None
+    (a, b, weights), (c, d, others) = groups
+    return ratio_of_sums((a - b, weights), less=(c - d, others), seed=seed)
+
+
+def _among(tallies: Tallies, scenes: Collection[str]) -> Tallies:
+    return {scene: tally for scene, tally in tallies.items() if scene in set(scenes)}
+
+
+def _pairs(ratio: Ratio, ours: Tallies, theirs: Tallies) -> list[tuple[Tally, Tally]]:
+    """The tallies of shared scenes in which there is something to find."""
+    pairs = [(scene, ours[scene], theirs[scene]) for scene in sorted(set(ours) & set(theirs))]
+    for scene, a, b in pairs:
+        _check_same(scene, [a, b])
+    return [(a, b) for _, a, b in pairs if ratio.denominator(a)]
+
+
+def _columns(ratio: Ratio, pairs: Sequence[tuple[Tally, Tally]]) -> Floats:
+    """(3, n) numerators of ours and theirs, to scale, and denominators."""
+    rows = [(ratio.numerator(a), ratio.numerator(b), ratio.denominator(a)) for a, b in pairs]
+    return np.array(rows, float).reshape(-1, 3).T * [[ratio.scale], [ratio.scale], [1.0]]
+
+
+def _mean(scene: str, tallies: Sequence[Tally]) -> Tally:
+    _check_same(scene, tallies)
+    total = sum(tallies, Tally())
+    return Tally(*(getattr(total, column.name) / len(tallies) for column in fields(Tally)))
+
+
+def _check_same(scene: str, tallies: Sequence[Tally]) -> None:
+    counts = {(tally.events, tally.frames) for tally in tallies}
+    if len(counts) > 1:
+        listed = " and ".join(f"{events:g} events in {frames:g} object frames" for events, frames in sorted(counts))
+        raise InvalidInput(f"scene {scene}: the tallies to be compared must be of one film, got {listed}")

@@ -1,0 +1,108 @@
+"""Contrasts of two policies over scenes: values by hand, pairing, weights, thirds, and what cannot be compared."""
+
+import numpy as np
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.evaluation.recall import Tally
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, averaged, contrast, contrast_gap, level
+
+
+def tallies(*scenes):
+    """Scenes from (events, sighted), ten object frames an event, a frame found for each event sighted."""
+    return {
+        f"scene {n}": Tally(events, sighted, 6 * (events - sighted), 10 * events, sighted)
+        for n, (events, sighted) in enumerate(scenes)
+    }
+
+
+def test_levels_by_event_and_by_scene():
+    """4 of 10 and 1 of 2: 5 of 12 events, or 45% of an average scene; the scene without an event is in neither."""
+    found = level(FIRST_SIGHTING, tallies((10, 4), (2, 1), (0, 0)))
+    assert found.by_event == pytest.approx(100 * 5 / 12)
+    assert found.by_scene == pytest.approx(45.0)
+    assert level(TTFD, tallies((10, 4), (2, 1))).by_event == pytest.approx(6 * 7 / 12)
+    assert level(OVERALL, tallies((10, 4), (2, 1))).by_event == pytest.approx(100 * 5 / 120)
+
+
+def test_a_level_of_nothing():
+    assert level(FIRST_SIGHTING, {}) == level(FIRST_SIGHTING, tallies((0, 0))) == (level(TTFD, {}))
+    assert level(FIRST_SIGHTING, {}).by_event is None
+
+
+def test_a_contrast_weighs_events_alike_and_beside_it_scenes():
+    ours, theirs = tallies((10, 4), (2, 1), (0, 0)), tallies((10, 2), (2, 1), (0, 0))
+    found = contrast(FIRST_SIGHTING, ours, theirs)
+    assert found.by_event.mean == pytest.approx(100 * 2 / 12)
+    assert found.by_scene.mean == pytest.approx(10.0)
+    assert (found.scenes, found.weight) == (2, 12)
+    assert (found.by_event.low, found.by_event.high) == pytest.approx((0.0, 20.0))
+    assert contrast(TTFD, ours, theirs).by_event.mean == pytest.approx(-12 / 12)
+    assert contrast(OVERALL, ours, theirs).weight == 120
+
+
+def test_a_contrast_turned_round_changes_its_sign():
+    rng = np.random.default_rng(2)
+    ours, theirs = (tallies(*[(20, int(rng.integers(3, 9))) for _ in range(30)]) for _ in range(2))
+    there, back = contrast(FIRST_SIGHTING, ours, theirs), contrast(FIRST_SIGHTING, theirs, ours)
+    assert there.by_event == pytest.approx([-back.by_event.mean, -back.by_event.high, -back.by_event.low])
+
+
+def test_a_policy_against_itself_is_certainly_equal():
+    same = tallies((10, 4), (2, 1), (5, 0))
+    assert contrast(FIRST_SIGHTING, same, same).by_event == (0.0, 0.0, 0.0)
+
+
+def test_scenes_are_paired_by_name_and_only_shared_ones_count():
+    ours = {"b": Tally(4, 3, 0, 4, 3), "a": Tally(4, 1, 0, 4, 1), "only ours": Tally(9, 9, 0, 9, 9)}
+    theirs = {"a": Tally(4, 0, 0, 4, 0), "b": Tally(4, 2, 0, 4, 2)}
+    found = contrast(FIRST_SIGHTING, ours, theirs)
+    assert (found.by_event, found.scenes) == ((25.0, 25.0, 25.0), 2)
+
+
+def test_pairing_removes_what_scenes_share():
+    """Scenes from easy to hard, and ours one event ahead in each."""
+    ours, theirs = ([(20, sighted + more) for sighted in range(2, 18)] for more in (1, 0))
+    found = contrast(FIRST_SIGHTING, tallies(*ours), tallies(*theirs))
+    assert found.by_event == pytest.approx((5.0, 5.0, 5.0))
+    assert found.excludes_zero
+
+
+@pytest.mark.parametrize(("scenes", "excludes"), [(4, False), (5, True)])
+def test_four_scenes_carry_no_claim(scenes, excludes):
+    found = contrast(FIRST_SIGHTING, tallies(*[(10, 5)] * scenes), tallies(*[(10, 4)] * scenes))
+    assert found.excludes_zero == excludes
+
+
+def test_no_contrast_of_nothing():
+    assert contrast(FIRST_SIGHTING, {}, tallies((1, 1))) is None
+    assert contrast(FIRST_SIGHTING, tallies((0, 0)), tallies((0, 0))) is None
+
+
+def test_floor_seeds_are_averaged_scene_by_scene():
+    seeds = [{"a": Tally(4, sighted, 6, 10, found), "b": Tally()} for sighted, found in [(1, 4), (2, 5), (3, 9)]]
+    assert averaged(seeds) == {"a": Tally(4, 2, 6, 10, 6), "b": Tally()}
+    assert averaged([seeds[0], {"b": Tally()}]) == {"b": Tally()}
+    assert averaged([]) == {}
+
+
+def test_tallies_of_other_films_are_refused():
+    other = tallies((9, 4))
+    with pytest.raises(InvalidInput, match=r"scene 0: .* one film, got 9 events in 90 .* and 10 events in 100"):
+        contrast(FIRST_SIGHTING, tallies((10, 4)), other)
+    with pytest.raises(InvalidInput, match=r"scene 0: .* one film"):
+        averaged([tallies((10, 4)), other])
+
+
+def test_the_gap_between_thirds_is_the_difference_of_their_contrasts():
+    ours = tallies((10, 5), (10, 7), (30, 10), (10, 4), (10, 3))
+    theirs = tallies((10, 4), (10, 4), (30, 9), (10, 4), (10, 3))
+    dense, sparse = ["scene 0", "scene 1", "scene 2"], ["scene 3", "scene 4", "scene 9"]
+    gap = contrast_gap(FIRST_SIGHTING, ours, theirs, dense, sparse)
+    assert gap.mean == pytest.approx(100 * 5 / 50)
+    assert 0 < gap.low < gap.mean < gap.high
+    back = contrast_gap(FIRST_SIGHTING, ours, theirs, sparse, dense)
+    assert back.mean == pytest.approx(-gap.mean)
+    assert contrast_gap(FIRST_SIGHTING, ours, theirs, dense, ["scene 3"]) is None
+    with pytest.raises(InvalidInput, match="must share none, got scene 2 in both"):
+        contrast_gap(FIRST_SIGHTING, ours, theirs, dense, ["scene 2", "scene 3"])

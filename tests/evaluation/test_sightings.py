@@ -1,0 +1,114 @@
+"""Every rule of what is a first sighting, on scenes of one object, and on random streets."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_sim.errors import InvalidInput
+from care_sim.evaluation.sightings import Sightings
+from care_sim.film import Annotations
+from care_sim.frames import turned
+from care_sim.types import CLASSES
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def events(sightings):
+    """(keyframe, object) of every event."""
+    found = sightings.frames.take(sightings.events)
+    return list(zip(found.keyframes.tolist(), found.objects.tolist(), strict=True))
+
+
+@pytest.fixture(scope="session")
+def path(shown):
+    """The scene of one pedestrian at these distances straight ahead; None where it is not annotated."""
+
+    def make(*distances):
+        return Sightings.of("path", [shown() if x is None else shown((7, "pedestrian", x, 0.0)) for x in distances])
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("distances", "keyframe"),
+    [
+        pytest.param((10, 10, 10), None, id="present at start"),
+        pytest.param((60, 60, 49), 2, id="annotated at start, enters by range"),
+        pytest.param((None, 60, 40), 2, id="annotated later and beyond range, then enters by range"),
+        pytest.param((None, None, 20), 2, id="out of an occlusion"),
+        pytest.param((None, 20), 1, id="at the last keyframe"),
+        pytest.param((None, 20, None, 20, None, 20), 1, id="annotation gaps after the event"),
+        pytest.param((60, 40, 60, 40), 1, id="leaves by range and returns"),
+        pytest.param((10, 60, 10), None, id="present at start, leaves by range and returns"),
+        pytest.param((10, None, 10), None, id="present at start, occluded and back"),
+        pytest.param((60, 70, None, 55), None, id="never within range"),
+        pytest.param((60, 50.0), 1, id="at the range"),
+        pytest.param((60, 50.01), None, id="just beyond the range"),
+        pytest.param((50.0, 20), None, id="at the range at start"),
+        pytest.param((50.01, 20), 1, id="just beyond the range at start"),
+        pytest.param((20,), None, id="a scene of one keyframe"),
+    ],
+)
+def test_when_an_object_is_first_sighted(path, distances, keyframe):
+    assert events(path(*distances)) == ([] if keyframe is None else [(keyframe, 7)])
+
+
+def test_an_event_says_what_was_seen_and_where(shown):
+    scene = Sightings.of("left", [shown((1, "car", 10, 0)), shown((1, "car", 9, 0), (2, "bicycle", -3, 4))])
+    event = scene.frames.take(scene.events)
+    assert (scene.scene, len(event), CLASSES[event.classes[0]]) == ("left", 1, "bicycle")
+    assert (event.keyframes[0], event.objects[0], event.ranges[0]) == (1, 2, 5.0)
+    assert event.azimuths[0] == pytest.approx(np.arctan2(4, -3))
+
+
+def test_range_is_planar_and_the_height_of_a_box_plays_no_part(shown):
+    below = shown((1, "car", 30, 40))
+    below.boxes[0, 2] = -20.0
+    assert events(Sightings.of("ramp", [shown(), below])) == [(1, 1)]
+
+
+def test_object_frames_are_those_in_range(path):
+    scene = path(60, 40, None, 50, 50.01, 30)
+    assert scene.frames.keyframes.tolist() == [1, 3, 5]
+    assert scene.in_range.tolist() == [False, True, True, False, True]
+
+
+def test_the_range_can_be_set(shown):
+    scene = [shown((1, "car", 25, 0)), shown((1, "car", 15, 0))]
+    assert events(Sightings.of("near", scene, range_m=20.0)) == [(1, 1)]
+    assert events(Sightings.of("far", scene)) == []
+
+
+def test_a_scene_may_be_empty_of_objects_but_not_of_keyframes(shown):
+    assert len(Sightings.of("quiet", [shown(), shown()]).frames) == 0
+    with pytest.raises(InvalidInput, match="scene nothing: a scene must have at least one keyframe"):
+        Sightings.of("nothing", [])
+
+
+def test_an_object_annotated_twice_is_named(shown):
+    with pytest.raises(InvalidInput, match="scene twins, keyframe 1: object 5 is annotated more than once"):
+        Sightings.of("twins", [shown(), shown((3, "car", 1, 1), (5, "car", 2, 2), (5, "car", 3, 3))])
+
+
+@given(SEEDS)
+def test_a_first_sighting_is_the_earliest_of_an_object_that_was_not_there_at_start(street, seed):
+    keyframes = street(seed)
+    near = [
+        {n for n, box in zip(a.objects.tolist(), a.boxes, strict=True) if np.hypot(box[0], box[1]) <= 50}
+        for a in keyframes
+    ]
+    expected = [(k, n) for k in range(1, len(near)) for n in sorted(near[k] - set().union(*near[:k]))]
+    assert events(Sightings.of("any", keyframes)) == expected
+
+
+@given(SEEDS, st.floats(-np.pi, np.pi))
+def test_neither_the_order_of_objects_nor_a_turn_of_the_sensor_changes_the_events(street, seed, yaw):
+    keyframes = street(seed)
+    changed = [
+        Annotations(a.objects[::-1], a.classes[::-1], np.c_[turned(a.boxes[:, :3], yaw), a.boxes[:, 3:]][::-1])
+        for a in keyframes
+    ]
+    before, after = Sightings.of("a", keyframes), Sightings.of("b", changed)
+    assert sorted(events(before)) == sorted(events(after))
+    assert np.sort(before.frames.ranges) == pytest.approx(np.sort(after.frames.ranges))
