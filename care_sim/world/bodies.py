@@ -109,6 +109,10 @@ CATALOGUE = {
         _block("trailer", None, (12.01, 2.55, 3.82), (0.55, 0.57, 0.6)),
         # Site hoarding of 2.4 m panels.
         _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3)),
+        # A piece of garden hedge as high as a person: below the 2 m that German neighbour law allows near a boundary.
+        _block("hedge", None, (6.0, 0.8, 1.8), (0.2, 0.42, 0.2)),
+        # A detached house of two storeys.
+        _block("house", None, (11.0, 9.0, 6.5), (0.72, 0.6, 0.5)),
         _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
         # A closed row of eight such buildings.
         _block("terrace", None, (144.0, 8.0, 9.0), (0.66, 0.6, 0.54)),

@@ -12,6 +12,7 @@ from highway_env.road.lane import StraightLane
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
+from highway_env.vehicle.objects import Obstacle
 
 from care_sim.frames import Pose
 from care_sim.world.bodies import BodyKind
@@ -19,6 +20,8 @@ from care_sim.world.bodies import BodyKind
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)
 """Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out sideways."""
+STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
+"""From centre to centre, what an IDM driver leaves before what stands ahead."""
 
 
 class Traffic:
@@ -60,6 +63,15 @@ class Traffic:
         vehicle = self._make(IDMVehicle, x, lane, target_speed, kind)
         vehicle.stand()
         return vehicle
+
+    def add_stop_line(self, x: float, lane: int) -> None:
+        """Let drivers of `lane` come to rest with their centres at `x`, where they give way."""
+        key = self.lane_key(lane)
+        road_lane = self._road.network.get_lane(key)
+        ahead = STANDING_GAP_M * (1 if road_lane.end[0] > road_lane.start[0] else -1)
+        obstacle = Obstacle(self._road, (x + ahead, road_lane.start[1]))
+        obstacle.check_collisions = obstacle.collidable = False
+        self._road.objects.append(obstacle)
 
     def lane_key(self, lane: int) -> tuple[str, str, int]:
         """highway-env's index of a lane."""

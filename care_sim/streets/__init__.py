@@ -1,0 +1,1 @@
+"""Generated streets: seeded urban scenes for the open loop, and the films recorded in them."""

@@ -1,0 +1,84 @@
+"""The film of a street: at every keyframe the whole grid is cast once, and six cameras are rendered."""
+
+import numpy as np
+
+from care_sim.film import NOBODY, Annotations, Cloud, Film, Shot, Sights
+from care_sim.frames import Floats, Frame
+from care_sim.grid import AngularGrid, Cells
+from care_sim.pinhole import PinholeCamera
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.streets.draft import KEYFRAME_S
+from care_sim.streets.street import Street
+from care_sim.types import CLASSES
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.bullet import BulletWorld
+
+SIGHT_M = 60.0
+"""Bodies whose hull is further than this from the sensor are left out: the LiDAR reaches 50 m, and an adult shows the
+camera its least number of pixels at about 50 m."""
+
+
+def record(
+    street: Street, grid: AngularGrid | None = None, cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS
+) -> Film:
+    """The film of a street. `Cloud.objects` and `Annotations.objects` are the columns of `street.poses`.
+
+    An object is annotated at a keyframe where a return of the full sweep lies on it or a camera shows it: nuScenes
+    annotates what has at least one LiDAR or radar point, and nobody could have seen what is wholly hidden.
+    """
+    world = BulletWorld()
+    try:
+        stage = _Stage(street, world)
+        shots = tuple(stage.shot(k, grid or AngularGrid(), cameras) for k in range(len(street.ego)))
+    finally:
+        world.close()
+    return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots)
+
+
+class _Stage:
+    """The bodies of a street in a simulator: each enters when it first comes near, then follows its way."""
+
+    def __init__(self, street: Street, world: BulletWorld):
+        self._street, self._world = street, world
+        self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds])
+        labels = [CATALOGUE[kind].label for kind in street.kinds]
+        self._classes = np.array([NOBODY if label is None else CLASSES.index(label) for label in labels])
+        self._bodies: dict[int, int] = {}
+
+    def shot(self, keyframe: int, grid: AngularGrid, cameras: tuple[PinholeCamera, ...]) -> Shot:
+        """Everything that can be seen at a keyframe."""
+        street = self._street
+        x, y, yaw = street.ego[keyframe].tolist()
+        sensor = Frame.mounted((x, y, yaw), LIDAR_POSITION)
+        near = self._set_up(keyframe, sensor)
+        labelled = near[self._classes[near] != NOBODY]
+        boxes = sensor.boxes_to_local(self._boxes(keyframe, labelled))
+        numbers = {self._bodies[number]: number for number in labelled.tolist()}
+        labels = {body: int(self._classes[number]) for body, number in numbers.items()}
+        seen = look_around(self._world, cameras, sensor, labels, boxes)
+        swept = full_sweep(self._world, grid, sensor)
+        sights = Sights(seen.detections, numbers_of(seen.objects, numbers))
+        cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
+        shown = np.isin(labelled, np.concatenate([cloud.objects, sights.objects]))
+        annotations = Annotations(labelled[shown], self._classes[labelled[shown]], boxes[shown])
+        token = f"{street.name}/{keyframe:02d}"
+        return Shot(keyframe * KEYFRAME_S, token, sensor, street.motion[keyframe], annotations, sights, cloud)
+
+    def _set_up(self, keyframe: int, sensor: Frame) -> Cells:
+        """Put every body that is near where it is now; returns their numbers, ascending."""
+        poses = self._street.poses[keyframe]
+        apart = np.hypot(poses[:, 0] - sensor.x, poses[:, 1] - sensor.y) - np.hypot(*self._sizes[:, :2].T) / 2
+        (near,) = np.nonzero(apart < SIGHT_M)
+        for number in {*near.tolist(), *self._bodies}:
+            x, y, yaw = poses[number].tolist()
+            if number not in self._bodies:
+                self._bodies[number] = self._world.add(CATALOGUE[self._street.kinds[number]], (x, y, yaw))
+            elif not np.array_equal(poses[number], self._street.poses[keyframe - 1, number]):
+                self._world.move(self._bodies[number], (x, y, yaw))
+        return near
+
+    def _boxes(self, keyframe: int, numbers: Cells) -> Floats:
+        """(n, 7) world boxes of bodies by number."""
+        x, y, yaw = self._street.poses[keyframe, numbers].T
+        return np.column_stack([x, y, self._sizes[numbers, 2] / 2, self._sizes[numbers], yaw])
