@@ -103,6 +103,12 @@ def test_the_recording_car_and_boxes_without_a_point_are_left_out(tmp_path):
     assert not np.any(shot.cloud.points[:, 1] == pytest.approx(11.0, abs=1e-6))
 
 
+def test_a_keyframe_in_which_nobody_is_seen_shows_the_road_alone(tmp_path):
+    (shot,) = film(parked(tmp_path, CAR_AHEAD | {"num_interior_pts": 0})).shots
+    assert (len(shot.annotations), len(shot.sights.objects)) == (0, 0)
+    assert set(shot.cloud.objects.tolist()) == {NOBODY}
+
+
 def test_every_fifth_annotated_sweep_is_a_keyframe_and_tracks_keep_their_number(tmp_path):
     walker = [box("PEDESTRIAN", (10.0, n / 10, 0.6), (0.6, 0.7, 1.8), track="w") for n in range(12)]
     early = box("BICYCLE", (12.0, 5.0, 0.3), (1.7, 0.6, 1.2), track="e")
@@ -227,12 +233,44 @@ def spread(movie):
         yield np.ptp(rows, axis=0).max()
 
 
-def test_cast_returns_lie_where_the_recorded_sweep_has_them(recorded):
-    """Mount and frames: on annotated objects, half the cast ranges agree with the recorded sweep to 0.4 m."""
-    log = recorded / "argoverse2" / "adcf7d18-0510-35b0-a2fa-b4cea13a6d76"
-    shot = loaded(log).shots[0]
-    sweep = feather.read_table(log / "sensors" / "lidar" / f"{shot.token}.feather")
-    points = np.stack([sweep[axis].to_numpy().astype(float) for axis in "xyz"], axis=1) - UP_LIDAR
+SWEPT = "adcf7d18-0510-35b0-a2fa-b4cea13a6d76"
+"""The log with a recorded sweep, taken at its first annotated timestamp while the car stood still."""
+
+
+@pytest.fixture
+def sweep(recorded):
+    """Points (n, 3) in the sensor frame, and the laser of each; 0 to 31 are those of `up_lidar`."""
+    (path,) = (recorded / "argoverse2" / SWEPT / "sensors" / "lidar").glob("*.feather")
+    table = feather.read_table(path)
+    points = np.stack([table[axis].to_numpy().astype(float) for axis in "xyz"], axis=1)
+    return points - UP_LIDAR, table["laser_number"].to_numpy()
+
+
+def test_the_mount_is_where_the_recorded_lasers_meet(sweep):
+    """Seen from the right place, and from no other, every laser keeps its elevation at all ranges and azimuths."""
+
+    def spread(shift):
+        points = sweep[0] - shift
+        ranges = np.linalg.norm(points, axis=1)
+        near = (ranges > 3) & (ranges < 15)
+        lasers = [np.arcsin(points[:, 2] / ranges)[near & (sweep[1] == laser)] for laser in range(32)]
+        return np.rad2deg(np.median([np.std(elevations) for elevations in lasers if len(elevations) > 50]))
+
+    assert spread(np.zeros(3)) < 0.005
+    assert min(spread(shift) for shift in 0.1 * np.vstack([np.eye(3), -np.eye(3)])) > 0.015
+
+
+def test_the_road_lies_where_the_recorded_sweep_has_it(sweep):
+    points, _ = sweep
+    distance = np.hypot(points[:, 0], points[:, 1])
+    counts, edges = np.histogram(points[(distance > 4) & (distance < 10), 2], np.arange(-3.0, 1.0, 0.05))
+    assert edges[counts.argmax()] + 0.025 == pytest.approx(-SENSOR_HEIGHT_M, abs=0.05)
+
+
+def test_cast_returns_lie_where_the_recorded_sweep_has_them(recorded, sweep):
+    """On annotated objects half the cast ranges agree with the recorded sweep to 0.4 m: boxes are coarse bodies."""
+    shot = loaded(recorded / "argoverse2" / SWEPT).shots[0]
+    points, _ = sweep
     cells = AngularGrid().cells_of(points)
     real = np.full(AngularGrid().size, np.inf)
     np.minimum.at(real, cells[cells >= 0], np.linalg.norm(points, axis=1)[cells >= 0])

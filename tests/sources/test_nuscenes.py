@@ -6,12 +6,12 @@ from nuscenes_database import LIDAR, SENSORS, annotated, change, pose, write
 from scipy.spatial.transform import Rotation
 
 from care_sim.errors import InvalidInput
-from care_sim.film import NOBODY
+from care_sim.film import NOBODY, Annotations
 from care_sim.grid import AngularGrid
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.films import film
 from care_sim.sources.nuscenes.splits import VAL, scenes
-from care_sim.sources.nuscenes.sweeps import read_points
+from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
 from care_sim.types import CLASSES
 
@@ -62,6 +62,32 @@ def test_the_cloud_holds_the_recorded_points_in_their_cells_on_their_objects(tmp
     world = shot.sensor.origin + shot.sensor.vectors_to_world(cloud.points)
     assert sorted(map(tuple, world.round(3).tolist())) == sorted(map(tuple, WORLD[:4].tolist()))
     assert len(cloud.within(cloud.cells[:1])) == np.sum(cloud.cells == cloud.cells[0])
+
+
+def test_a_point_belongs_to_the_box_it_lies_in_as_the_box_is_turned():
+    boxes = np.array([[10.0, 0.0, 0.0, 8.0, 1.0, 2.0, np.pi / 4]])
+    on_the_diagonal, across_it = [12.0, 2.0, 0.0], [12.0, -2.0, 0.0]
+    annotations = Annotations(np.array([5]), np.array([0]), boxes)
+    assert owners(np.array([on_the_diagonal, across_it]), annotations).tolist() == [5, NOBODY]
+
+
+def test_a_point_in_two_boxes_belongs_to_the_smaller():
+    boxes = np.array([[10.0, 0, 0, 2, 2, 2, 0], [10.0, 0, 0, 9, 9, 9, 0], [10.0, 0, 0, 4, 4, 4, 0]])
+    annotations = Annotations(np.array([3, 4, 5]), np.zeros(3, np.int64), boxes)
+    points = np.array([[10.5, 0.0, 0.0], [11.5, 0.0, 0.0], [13.0, 0.0, 0.0]])
+    assert owners(points, annotations).tolist() == [3, 5, 4]
+
+
+def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
+    root = database(tmp_path)
+    between = {"token": "between", "is_key_frame": False, "filename": "sweeps/gone.pcd.bin"}
+    change(root, "sample_data", lambda rows: rows.append(rows[0] | between))
+    assert len(first(root).shots[0].cloud) == 4
+
+
+def test_a_keyframe_without_annotations_plays(tmp_path):
+    (shot,) = first(database(tmp_path, [([], pose(), as_recorded(WORLD))])).shots
+    assert (len(shot.annotations), len(shot.sights.objects), len(shot.cloud)) == (0, 0, 4)
 
 
 def test_the_car_turns_and_drives_and_the_object_stays(tmp_path):
@@ -258,7 +284,8 @@ BREAKS = {
     "no rotation": (
         dangling("rotation", "ego_pose", [0, 0, 0, 0]), f"ego_pose.json: 'pose-{SCENE}-0-LIDAR_TOP' has no"
     ),
-    "a circle": (dangling("next", "sample", f"{SCENE}-0"), "run in a circle"),
+    "no size": (dangling("size", "sample_annotation", [1, 2]), "sample_annotation.json: 'scene-0103-0-0' has no size"),
+    "a circle": (dangling("next", "sample", f"{SCENE}-0"), "is no later than the sample before it"),
     "no intrinsics": (
         lambda root: change(root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=[])),
         "calibrated_sensor.json: 'calibrated-CAM_FRONT' has no 3 x 3 camera_intrinsic",
@@ -277,6 +304,13 @@ def test_what_is_wrong_with_a_database_is_said_in_one_line(tmp_path, name):
         first(root)
     assert "\n" not in str(caught.value)
     assert str(root) in str(caught.value)
+
+
+def test_samples_run_forward_in_time(tmp_path):
+    root = database(tmp_path, [([CAR], pose(), as_recorded(WORLD))] * 2)
+    change(root, "sample", lambda rows: rows[1].update(timestamp=rows[0]["timestamp"]))
+    with pytest.raises(InvalidInput, match=rf"sample.json: '{SCENE}-1' is no later than the sample before it"):
+        first(root)
 
 
 def test_the_version_must_be_clear(tmp_path):

@@ -148,7 +148,11 @@ def _annotations(database: Database, boxes: list[Row], numbers: dict[str, int], 
 def _world_box(database: Database, box: Row) -> tuple[float, ...]:
     """Sizes are width, length, height in the table."""
     frame = _frame(database, "sample_annotation", box["token"])
-    width, length, height = map(float, box["size"])
+    try:
+        width, length, height = map(float, box["size"])
+    except (TypeError, ValueError) as error:
+        path = database.path("sample_annotation")
+        raise InvalidInput(f"{path}: {box['token']!r} has no size of width, length and height") from error
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 
 

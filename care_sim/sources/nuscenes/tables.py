@@ -71,14 +71,14 @@ class Database:
 
     def samples(self, scene: Row) -> list[Row]:
         """The samples of a scene in order of time."""
-        found, token = [], scene["first_sample_token"]
+        found: list[Row] = []
+        token = scene["first_sample_token"]
         while token:
-            found.append(self.row("sample", token))
-            token = found[-1]["next"]
-            if len(found) > len(self.rows("sample")):
-                raise InvalidInput(
-                    f"{self.path('sample')}: the samples of {scene['name']} run in a circle at {token!r}"
-                )
+            row = self.row("sample", token)
+            if found and row["timestamp"] <= found[-1]["timestamp"]:
+                raise InvalidInput(f"{self.path('sample')}: {token!r} is no later than the sample before it")
+            found.append(row)
+            token = row["next"]
         return found
 
     @cached_property
