@@ -23,7 +23,7 @@ EGO_HALT_CHANCE, EGO_HALT_AT_S, EGO_HALT_S = 0.5, (3.0, 14.0), (3.0, 8.0)
 """The ego cruises; in every other scene it comes to rest once, as before a light. Together with the cruising
 speeds that makes about 16 km/h on average, that of the drives of nuScenes (Caesar et al. 2020, Sec. 2)."""
 EGO_BRAKING_MPS2, EGO_STARTING_MPS2 = 2.0, 1.5
-"""Comfortable: less than half of the 5 m/s^2 that the closed loop's controller brakes with, and a usual start in town."""
+"""Comfortable: less than half of what the closed loop's controller brakes with, and a usual start in town."""
 
 FLOW_PER_H: Range = (200.0, 400.0)
 """Vehicles an hour in a direction of the main road: half the 400 to 800 of both that RASt 06 gives for a collector
