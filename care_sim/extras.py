@@ -22,6 +22,15 @@ def import_open3d() -> ModuleType:
     return module
 
 
+def import_torch() -> ModuleType:
+    """PyTorch. Raises MissingExtra with the extra to install."""
+    try:
+        import torch
+    except ImportError as error:
+        raise MissingExtra(f"PyTorch needs the extra 'rl': pip install 'care-sim[rl]' ({error})") from error
+    return torch
+
+
 def _load_libusb() -> None:
     """Give Open3D the libusb of the wheel `libusb-package`, for systems without their own."""
     try:

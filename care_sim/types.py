@@ -37,11 +37,15 @@ class Ego:
 
 @dataclass(frozen=True)
 class Detections:
-    """3D detections of one keyframe: `classes` (n,), `boxes` (n, 7), `returns` (n,) fired rays that hit."""
+    """3D detections of one keyframe: `classes` (n,), `boxes` (n, 7), `returns` (n,) fired rays that hit.
+
+    `scores` (n,) are confidences from 0 to 1; None of a detector that has none.
+    """
 
     classes: Cells
     boxes: Floats
     returns: Cells
+    scores: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.classes)

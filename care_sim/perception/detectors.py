@@ -1,13 +1,31 @@
-"""The paper's proxy detector: an object is detected when enough fired rays hit it."""
+"""Detectors as the open loop calls them, and the paper's proxy: an object is detected when enough fired rays hit it.
+
+The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is made a `Detector`
+by `care_sim.perception.points_only.PointsOnly`; `care_sim.perception.registry.make_detector` gives either by name.
+"""
 
 from collections.abc import Callable, Mapping
+from typing import Protocol
 
 import numpy as np
 
 from care_sim.conditions import MIN_RETURNS
+from care_sim.errors import check_whole
+from care_sim.film import Annotations, Cloud
 from care_sim.frames import Floats
+from care_sim.grid import Cells
 from care_sim.types import Detections
 from care_sim.world.bullet import Integers
+
+
+class Detector(Protocol):
+    """What the open loop calls at every keyframe."""
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+        """Detections in the sensor frame from the returns of the fired cells, and (n,) the annotated object behind
+        each, or NOBODY, for privileged policies and the scoring.
+        """
+        ...
 
 
 class ReturnsDetector:
@@ -30,3 +48,24 @@ class ReturnsDetector:
         labels = np.array([self._labels.get(body, -1) for body in bodies.tolist()], dtype=np.int64)
         kept = (labels >= 0) & (counts >= self._min_returns)
         return Detections(labels[kept], boxes_of(bodies[kept]), counts[kept]), bodies[kept]
+
+
+class ReturnsProxy:
+    """`ReturnsDetector` over a film: every annotated object with `min_returns` of the cloud's returns on it is
+    detected with its true box. Raises InvalidInput unless `min_returns` is a whole number of 1 or more.
+    """
+
+    def __init__(self, min_returns: int = MIN_RETURNS):
+        check_whole("min_returns", min_returns, 1)
+        self._min_returns = min_returns
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+        """See `Detector`."""
+        order = np.argsort(annotations.objects)
+        ascending = annotations.objects[order]
+
+        def boxes_of(objects: Cells) -> Floats:
+            return annotations.boxes[order[np.searchsorted(ascending, objects)]]
+
+        labels = dict(zip(annotations.objects.tolist(), annotations.classes.tolist(), strict=True))
+        return ReturnsDetector(labels, self._min_returns).detect(cloud.objects, boxes_of)

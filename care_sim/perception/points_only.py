@@ -1,0 +1,107 @@
+"""Real detectors: they are handed points, and no truth.
+
+`PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded goes through it.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.film import NOBODY, Annotations, Cloud
+from care_sim.frames import Floats, turned
+from care_sim.grid import Cells
+from care_sim.types import CLASSES, Detections
+
+
+class BrokenDetector(InvalidInput):
+    """A detector that cannot be loaded or made, fails, or returns what is no `Detections`."""
+
+
+class PointDetector(Protocol):
+    """What a real detector is: sees the points of one keyframe, remembers nothing of the one before."""
+
+    def detect(self, points: Floats, sensor_height_m: float) -> Detections:
+        """Detections in the sensor frame from points (P, 3) in the sensor frame, metres; P may be 0.
+
+        The sensor is `sensor_height_m` above the road. The points are the detector's own to change. `returns` are
+        the points on each object, `scores` confidences from 0 to 1, or None.
+        """
+        ...
+
+
+class PointsOnly:
+    """Makes a `PointDetector` a `care_sim.perception.detectors.Detector`.
+
+    The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be reached from it. What
+    it returns is checked; only then the objects are named.
+    """
+
+    def __init__(self, name: str, detector: PointDetector, sensor_height_m: float):
+        self._name = name
+        self._detector = detector
+        self._sensor_height_m = sensor_height_m
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+        """See `Detector`. Raises BrokenDetector where it fails or returns what is no detections."""
+        points = np.array(cloud.points, dtype=np.float64)
+        try:
+            found = self._detector.detect(points, self._sensor_height_m)
+        except (InvalidInput, MissingExtra):
+            raise
+        except Exception as error:
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            raise BrokenDetector(f"detector {self._name} fails on {len(cloud)} points: {reason}") from error
+        detections = checked(self._name, found)
+        return detections, _objects_behind(detections.boxes, cloud)
+
+
+def inside(points: Floats, boxes: Floats) -> NDArray[np.bool_]:
+    """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7)."""
+    rows = [np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1) for box in boxes]
+    return np.array(rows, np.bool_).reshape(len(boxes), len(points))
+
+
+def checked(name: str, found: Any) -> Detections:
+    """`found` with arrays of the contract's types. Raises BrokenDetector with the detector's `name` and the fault."""
+    if not isinstance(found, Detections):
+        raise BrokenDetector(f"detector {name} must return Detections, got {type(found).__name__}")
+    columns = ("classes", "boxes", "returns") if found.scores is None else ("classes", "boxes", "returns", "scores")
+    table = {column: _numbers(name, column, getattr(found, column)) for column in columns}
+    for column, values in table.items():
+        shape = (len(table["classes"]), 7) if column == "boxes" else (len(table["classes"]),)
+        if values.shape != shape:
+            raise BrokenDetector(f"detector {name}: {column} must have the shape {shape}, got {values.shape}")
+    for fault in _faults(**table):
+        raise BrokenDetector(f"detector {name}: {fault}")
+    classes, returns = table["classes"].astype(np.int64), table["returns"].astype(np.int64)
+    return Detections(classes, table["boxes"], returns, table.get("scores"))
+
+
+def _objects_behind(boxes: Floats, cloud: Cloud) -> Cells:
+    """(n,) the object that most of the returns within each box lie on, or NOBODY."""
+    named = cloud.objects != NOBODY
+    objects = cloud.objects[named]
+    counts = [np.unique(objects[row], return_counts=True) for row in inside(cloud.points[named], boxes)]
+    return np.array([numbers[many.argmax()] if len(numbers) else NOBODY for numbers, many in counts], np.int64)
+
+
+def _numbers(name: str, column: str, values: Any) -> Floats:
+    try:
+        numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise BrokenDetector(f"detector {name}: {column} must be an array of numbers, got {values!r:.80}") from error
+    if not np.isfinite(numbers).all():
+        raise BrokenDetector(f"detector {name}: {column} must be finite")
+    return numbers
+
+
+def _faults(classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None) -> list[str]:
+    rules = {
+        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": np.isin(classes, range(len(CLASSES))),
+        "lengths, widths and heights of boxes must be above 0": boxes[:, 3:6] > 0,
+        "returns must be whole numbers of 0 or more": (returns >= 0) & (returns % 1 == 0),
+        "scores must lie in [0, 1]": True if scores is None else (scores >= 0) & (scores <= 1),
+    }
+    return [rule for rule, kept in rules.items() if not np.all(kept)]

@@ -1,0 +1,151 @@
+"""The interface: what reaches a real detector, and what it may return. The proxy over films."""
+
+import numpy as np
+import pytest
+from made_points import HEIGHT, shell
+
+from care_sim.errors import InvalidInput
+from care_sim.film import NOBODY, Annotations, Cloud
+from care_sim.perception.detectors import ReturnsProxy
+from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
+from care_sim.types import Detections
+
+CAR = np.array([8.0, 6.0, 0.86 - HEIGHT, 4.61, 1.95, 1.72, 0.4])
+PERSON = np.array([12.0, -3.0, 0.88 - HEIGHT, 0.73, 0.66, 1.76, 0.0])
+OBJECTS = Annotations(np.array([30, 7]), np.array([0, 4]), np.stack([CAR, PERSON]))
+
+
+def cloud(*bodies):
+    """A cloud of (object number, points)."""
+    points = np.concatenate([points for _, points in bodies])
+    numbers = np.concatenate([np.full(len(points), number) for number, points in bodies])
+    return Cloud(np.arange(len(points)), points, numbers)
+
+
+SCENE = cloud((30, shell(8, 6, 0.4, 4.61, 1.95, 1.72)), (NOBODY, np.full((5, 3), 20.0)), (7, PERSON[None, :3]))
+
+
+class Says:
+    """Keeps what it was given, and returns what it was told to."""
+
+    def __init__(self, found):
+        self.found = found
+
+    def detect(self, *given):
+        self.given = given
+        return self.found
+
+
+def detections(**columns):
+    right = {"classes": np.array([0]), "boxes": CAR[None], "returns": np.array([9]), "scores": np.array([0.5])}
+    return Detections(**{**right, **columns})
+
+
+def test_a_real_detector_is_handed_points_and_a_height_and_no_more():
+    real = Says(detections())
+    PointsOnly("mine", real, HEIGHT).detect(SCENE, OBJECTS)
+    points, height = real.given
+    assert np.array_equal(points, SCENE.points)
+    assert height == HEIGHT
+
+
+def test_its_points_are_its_own_to_change_and_lead_nowhere():
+    """Not even to the unfired cells of which the fired ones are a view."""
+
+    class Scribbles(Says):
+        def detect(self, points, height):
+            assert points.base is None
+            points[:] = 0
+            return self.found
+
+    fired = Cloud(SCENE.cells[:50], SCENE.points[:50], SCENE.objects[:50])
+    before = SCENE.points.copy()
+    PointsOnly("mine", Scribbles(detections()), HEIGHT).detect(fired, OBJECTS)
+    assert np.array_equal(SCENE.points, before)
+
+
+def test_truth_does_not_change_what_it_finds():
+    strangers = Cloud(SCENE.cells, SCENE.points, np.full(len(SCENE), NOBODY))
+    nobody = Annotations(np.array([], np.int64), np.array([], np.int64), np.empty((0, 7)))
+    found = [
+        PointsOnly("mine", Says(detections()), HEIGHT).detect(*given)[0]
+        for given in ((SCENE, OBJECTS), (strangers, nobody))
+    ]
+    assert np.array_equal(found[0].boxes, found[1].boxes)
+
+
+def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
+    nowhere = CAR + np.array([0, 30, 0, 0, 0, 0, 0])
+    found = Detections(np.array([4, 0, 0]), np.stack([PERSON, CAR, nowhere]), np.array([3, 3, 3]))
+    assert PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)[1].tolist() == [7, 30, NOBODY]
+
+
+@pytest.mark.parametrize(
+    ("found", "fault"),
+    [
+        ([], "must return Detections, got list"),
+        (detections(classes=np.array([5])), "classes must be whole numbers from 0 to 4"),
+        (detections(classes=np.array([0.5])), "classes must be whole numbers from 0 to 4"),
+        (detections(classes=np.array([0, 1])), r"boxes must have the shape \(2, 7\), got \(1, 7\)"),
+        (detections(boxes=CAR), r"boxes must have the shape \(1, 7\), got \(7,\)"),
+        (detections(boxes=np.full((1, 7), np.nan)), "boxes must be finite"),
+        (detections(boxes=np.zeros((1, 7))), "lengths, widths and heights of boxes must be above 0"),
+        (detections(returns=np.array([-1])), "returns must be whole numbers of 0 or more"),
+        (detections(returns="many"), "returns must be an array of numbers, got 'many'"),
+        (detections(scores=np.array([1.5])), r"scores must lie in \[0, 1\]"),
+        (detections(scores=np.array([])), r"scores must have the shape \(1,\), got \(0,\)"),
+    ],
+)
+def test_what_is_no_detections_is_refused_with_the_detectors_name(found, fault):
+    with pytest.raises(BrokenDetector, match=f"^detector mine:? {fault}$"):
+        PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)
+
+
+def test_a_detector_that_fails_is_named():
+    class Fails:
+        def detect(self, points, height):
+            return {}["weights"]
+
+    with pytest.raises(BrokenDetector, match=r"^detector mine fails on \d+ points: KeyError: 'weights'$"):
+        PointsOnly("mine", Fails(), HEIGHT).detect(SCENE, OBJECTS)
+
+
+def test_lists_and_no_detections_are_welcome():
+    listed, _ = PointsOnly("mine", Says(Detections([4], [PERSON.tolist()], [2])), HEIGHT).detect(SCENE, OBJECTS)
+    assert (listed.classes.dtype, listed.boxes.dtype, listed.scores) == (np.int64, np.float64, None)
+    nothing = Detections(np.array([]), np.empty((0, 7)), np.array([]))
+    found, objects = PointsOnly("mine", Says(nothing), HEIGHT).detect(SCENE, OBJECTS)
+    assert (len(found), len(objects)) == (0, 0)
+
+
+def test_points_within_boxes():
+    box = np.array([1.0, 2.0, 0.0, 4.0, 2.0, 1.0, np.pi / 2])
+    points = np.array([[1.0, 3.9, 0.4], [2.1, 2.0, 0.0], [1.0, 2.0, 0.6]])
+    assert inside(points, box[None]).tolist() == [[True, False, False]]
+    assert inside(points, np.empty((0, 7))).shape == (0, 3)
+
+
+def test_the_proxy_reports_objects_with_three_returns_and_their_true_boxes():
+    found, objects = ReturnsProxy().detect(SCENE, OBJECTS)
+    assert (objects.tolist(), found.classes.tolist()) == ([30], [0])
+    assert found.boxes.tolist() == [CAR.tolist()]
+    assert found.returns.tolist() == [np.count_nonzero(SCENE.objects == 30)]
+    assert found.scores is None
+
+
+def test_the_proxy_with_one_return_and_in_whatever_order_the_objects_come():
+    found, objects = ReturnsProxy(min_returns=1).detect(SCENE, OBJECTS)
+    assert (objects.tolist(), found.classes.tolist()) == ([7, 30], [4, 0])
+    assert found.boxes.tolist() == [PERSON.tolist(), CAR.tolist()]
+
+
+def test_the_proxy_of_an_empty_cloud():
+    empty = Cloud(np.array([], np.int64), np.empty((0, 3)), np.array([], np.int64))
+    found, objects = ReturnsProxy().detect(empty, OBJECTS)
+    assert (len(found), found.boxes.shape, len(objects)) == (0, (0, 7), 0)
+
+
+@pytest.mark.parametrize("min_returns", [0, -1, 2.5])
+def test_an_impossible_threshold_is_refused_by_name(min_returns):
+    with pytest.raises(InvalidInput, match="min_returns"):
+        ReturnsProxy(min_returns)
