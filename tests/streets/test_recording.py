@@ -170,3 +170,5 @@ def test_a_body_that_left_and_returned_is_where_it_then_is():
     assert nearest[0] == pytest.approx(20.0 - LIDAR_POSITION[0] - CATALOGUE["car"].size[0] / 2, abs=0.3)
     assert nearest[1:3] == [np.inf, np.inf]
     assert nearest[3] == pytest.approx(nearest[0] + 5.0, abs=0.3)
+    for shot in shots[1:3]:
+        assert shot.cloud.points[:, 2] == pytest.approx(-LIDAR_POSITION[2], abs=1e-3)
