@@ -79,10 +79,11 @@ def test_a_slope_is_no_object_and_hides_none(detector):
     assert found.boxes[0, 2] - found.boxes[0, 5] / 2 == pytest.approx(0.6 - HEIGHT, abs=0.1)
 
 
-def test_two_points_are_too_few(detector):
-    person = shell(8, 0, 0.0, *PERSON)
-    assert len(detector.detect(person[[5, 20]], HEIGHT)) == 0
-    assert len(detector.detect(person, HEIGHT)) == 1
+def test_two_points_are_too_few_and_three_enough(detector):
+    """At the range where a person is two columns wide, at its two edges, up to its head."""
+    person = np.array([[20, 0.3, 1.7], [20, -0.3, 1.6], [20, 0.0, 1.2]]) - [0, 0, HEIGHT]
+    assert len(detector.detect(person[:2], HEIGHT)) == 0
+    assert names(detector.detect(person, HEIGHT)) == ["pedestrian"]
 
 
 def test_more_points_are_surer(detector):
@@ -90,6 +91,14 @@ def test_more_points_are_surer(detector):
     found = detector.detect(np.concatenate([road(), people]), HEIGHT)
     assert found.returns[0] > found.returns[1]
     assert found.scores == pytest.approx(1 - 1 / np.sqrt(found.returns))
+
+
+def test_a_part_that_hangs_apart_is_not_a_body_of_its_own(detector):
+    """The back of a car ahead, and 2 m on, where its mirror would be, points of its side."""
+    mirror = shell(12.0, -0.8, 0.0, 0.3, 0.3, 1.5)
+    car = face((10, 0.97), (10, -0.97), 0.3, 1.7)
+    assert names(detector.detect(np.concatenate([road(), mirror]), HEIGHT)) == ["pedestrian"]
+    assert names(detector.detect(np.concatenate([road(), mirror, car]), HEIGHT)) == ["car"]
 
 
 def test_the_roof_beneath_the_sensor_is_no_object(detector):

@@ -119,8 +119,9 @@ def test_lists_and_no_detections_are_welcome():
 
 
 def test_points_within_boxes():
-    box = np.array([1.0, 2.0, 0.0, 4.0, 2.0, 1.0, np.pi / 2])
-    points = np.array([[1.0, 3.9, 0.4], [2.1, 2.0, 0.0], [1.0, 2.0, 0.6]])
+    """A box that heads 45 degrees to the left: its ends lie there, and not to the right."""
+    box = np.array([1.0, 2.0, 0.0, 4.0, 2.0, 1.0, np.pi / 4])
+    points = np.array([[2.3, 3.3, 0.4], [2.3, 0.7, 0.4], [1.0, 2.0, 0.6]])
     assert inside(points, box[None]).tolist() == [[True, False, False]]
     assert inside(points, np.empty((0, 7))).shape == (0, 3)
 
