@@ -38,8 +38,6 @@ START_M: Range = (0.0, 3.0)
 """Where a row begins, so that rows do not begin alike."""
 RETRY_M = 0.5
 """Steps in which a place is sought for what has no room."""
-PIECE_M = 5.0
-"""A carriageway is kept clear in pieces of this length, which follow a bend."""
 JOINING_M = 60.0
 """Side streets are furnished this far: sight from the main road ends at 50 m."""
 
@@ -48,7 +46,6 @@ Span = tuple[float, float]
 
 def furnish(draft: Draft, plan: Plan, span: Span) -> None:
     """Fill the main road over `span` (metres along it), and its side streets."""
-    _keep_carriageway_clear(draft, plan.main, span)
     for joining in plan.joinings:
         _keep_mouth_clear(draft, joining, plan.main)
     if draft.rng.random() < BUS_STOP_CHANCE:
@@ -61,13 +58,6 @@ def furnish(draft: Draft, plan: Plan, span: Span) -> None:
         for side in joining.road.sides:
             _line_with_houses(draft, joining.road, side, (beside.front_m, beside.front_m + JOINING_M))
             _park(draft, joining.road, side, (beside.kerb_m + CORNER_M, beside.front_m + JOINING_M))
-
-
-def _keep_carriageway_clear(draft: Draft, road: Road, span: Span) -> None:
-    """Parked vehicles may stand over their line by half a metre."""
-    right, left = (side.lane_edge_m + side.cycle_m - 0.5 for side in road.sides)
-    for s in np.arange(span[0], span[1], PIECE_M):
-        draft.reserve(road.curve.to_world(np.array([s, (left - right) / 2, 0.0])), (PIECE_M, left + right))
 
 
 def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road) -> None:

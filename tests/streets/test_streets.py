@@ -179,3 +179,19 @@ def test_a_scene_has_about_as_many_entries_as_one_of_nuscenes(seed):
     assert len(film.shots) == 40
     assert 28 / 3 < len(sightings.events) < 28 * 3
     assert 24 / 3 < len(sightings.frames) / 40 < 24 * 2
+
+
+@pytest.mark.parametrize("seed", [2, 6])
+def test_nothing_stands_in_the_mouth_of_a_side_street(seed):
+    plan = LAYOUTS["junction"](np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0]))
+    street = make_street(seed)
+    still = speeds_of(street.poses).max(axis=0) == 0
+    kerbside = still & (np.array(street.kinds) != "pedestrian") & (np.array(street.kinds) != "bicycle")
+    assert plan.joinings
+    for joining in plan.joinings:
+        places = np.array([[s, d, 0.0] for s in range(4, 40, 2) for d in (0.0, 3.5)])
+        lane = joining.road.curve.to_world(places)
+        sizes = np.vstack([sizes_of(street)[kerbside], np.full((len(lane), 2), 2.0)])
+        meeting = pairs_meeting(np.vstack([street.poses[0, kerbside], lane]), sizes)
+        count = kerbside.sum()
+        assert not [street.kinds[np.flatnonzero(kerbside)[a]] for a, b in meeting if a < count <= b]
