@@ -71,7 +71,7 @@ class Picture:
 
 
 class CameraDetector:
-    """Turns pictures into detections: knows the classes of the reported bodies, and errs as `faults` say.
+    """Turns pictures into detections: knows the classes of the reported bodies, and errs as `sensing` says.
 
     `labels` maps body ids to classes; bodies that it does not hold are not detected. `camera` is the camera
     that the rig knows, `height_m` that of the sensor frame above the road.
