@@ -54,8 +54,8 @@ class CameraFaults:
         check_number("false_positive_rate", self.false_positive_rate, 0, MOST_GHOSTS)
         for name in ("false_negative_per_m", "blackout_start_s", "blackout_s"):
             check_number(name, getattr(self, name), 0)
-        for name in ("camera_rotation_sigma_deg", "camera_position_sigma_m"):
-            check_number(name, getattr(self, name), 0)
+        check_number("camera_rotation_sigma_deg", self.camera_rotation_sigma_deg, 0)
+        check_number("camera_position_sigma_m", self.camera_position_sigma_m, 0)
 
     def black_at(self, time_s: float) -> bool:
         """Whether a picture taken at `time_s` is black."""

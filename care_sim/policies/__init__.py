@@ -83,7 +83,9 @@ def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
     except (InvalidInput, MissingExtra):
         raise
     except Exception as error:
-        raise BrokenPolicy(f"policy {name} refuses {parameters}: {type(error).__name__}: {error}") from error
+        raise BrokenPolicy(
+            f"policy {name} refuses {parameters or 'to start'}: {type(error).__name__}: {error}"
+        ) from error
     if not isinstance(policy, Policy):
         raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")
     return policy

@@ -124,18 +124,14 @@ def _block(ablation: Ablation, place: Place, beside: Sequence[str], played: Play
 def _beside(ablation: Ablation, played: Played) -> list[str]:
     """The references, and the further policies that were played where the conditions depart from the usual."""
     known = (ablation.policy, *ablation.references, "full")
-    levels = [level.for_others() for level in ablation.levels if level.changes]
+    usual = USUAL.key(PLACES[0], "care")
+    levels = [other for other in map(Level.for_others, ablation.levels) if other.key(PLACES[0], "care") != usual]
     joined = [
         policy
         for policy in played.policies
-        if policy not in known
-        and any(played.has(level.key(place, policy)) for level in levels for place in PLACES if _departs(level))
+        if policy not in known and any(played.has(o.key(p, policy)) for o, p in product(levels, PLACES))
     ]
     return [*ablation.references, *joined]
-
-
-def _departs(level: Level) -> bool:
-    return level.key(PLACES[0], "care") != USUAL.key(PLACES[0], "care")
 
 
 def _levels(cell: Cell | None) -> tuple[str, str, str]:

@@ -59,7 +59,9 @@ class Crowd:
     def collapsed(self, budget: float) -> list[int]:
         """Numbers of vehicles at which all-camera has collapsed."""
         gaps = {vehicles: self.gap(vehicles, budget) for vehicles in self.counts}
-        return [n for n, gap in gaps.items() if gap and gap.excludes_zero and gap.mean <= -COLLAPSE_M]
+        return [
+            n for n, gap in gaps.items() if gap and gap.excludes_zero and gap.difference.cautious.mean <= -COLLAPSE_M
+        ]
 
 
 def crowding_tables(rows: Sequence[Row]) -> list[Table]:

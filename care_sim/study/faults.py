@@ -22,8 +22,6 @@ BLACKOUT_START_S = 2.0
 """The person comes into the camera's view 2.4 to 2.9 s after the start."""
 DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
 """Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees below the horizon."""
-
-
 ORDER = (
     "How the first named stands to the second at the first strength, and from which strength on otherwise. > : it "
     "detects earlier, interval without zero and gate met; < : it detects later, likewise; = : neither."

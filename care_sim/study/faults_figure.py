@@ -67,6 +67,7 @@ class Curves:
         panels = list(figure.subplots(lines, COLUMNS, sharey=True).flat)
         for fault, axes in zip(FAULTS, panels, strict=False):
             self._panel(axes, fault, place, measure)
+        panels[0].set_ylim(bottom=min(0.0, panels[0].get_ylim()[0]))
         for axes in panels[len(FAULTS) :]:
             axes.set_axis_off()
         handles, names = panels[0].get_legend_handles_labels()
@@ -85,7 +86,6 @@ class Curves:
         axes.set_xlabel(fault.unit, fontsize=8)
         axes.set_xticks(range(len(fault.levels)), [level.label for level in fault.levels])
         axes.tick_params(labelsize=8)
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(axis="y", color="0.92")
         axes.set_axisbelow(True)

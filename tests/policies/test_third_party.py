@@ -188,8 +188,8 @@ def test_a_policy_that_cannot_be_loaded_is_named_with_the_reason(broken, env, na
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("exploding", r"policy exploding refuses {}: KeyError: 'weights'"),
-        ("deaf", r"policy deaf refuses {}: TypeError: .*positional argument"),
+        ("exploding", r"policy exploding refuses to start: KeyError: 'weights'"),
+        ("deaf", r"policy deaf refuses to start: TypeError: .*positional argument"),
         ("nothing", r"policy nothing is no Policy but of type NoneType"),
     ],
 )
@@ -204,7 +204,7 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
     assert made == ["care", "horizon"]
     assert reasons["torn"] == "policy torn cannot be loaded: AttributeError: module 'broken' has no attribute 'Nowhere'"
     assert reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3"
-    assert reasons["exploding"] == "policy exploding refuses {}: KeyError: 'weights'"
+    assert reasons["exploding"] == "policy exploding refuses to start: KeyError: 'weights'"
     assert list(reasons) == ["torn", "exploding", "leaving", "deaf"]
     assert care_sim.make_policy("horizon", env).name == "horizon"
 
