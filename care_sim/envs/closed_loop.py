@@ -19,6 +19,7 @@ from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.types import Action, Keyframe
 from care_sim.world.world import whole_steps
 
+
 class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     """A scenario in which the agent chooses the LiDAR's cells and a fixed controller brakes.
 

@@ -113,7 +113,6 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
         return loop.belief.to_observation(), reward, False, self._over, info
 
-
     def _made_detector(self) -> Detector:
         name, parameters = self._detector
         return make_detector(name, self.rig.sensor_height_m, **parameters)
