@@ -14,7 +14,7 @@ import numpy as np
 
 import care_sim
 from care_sim.conditions import UNFELT_BY_FULL, Conditions
-from care_sim.envs import IDS
+from care_sim.envs import CLOSED_LOOP
 from care_sim.errors import check_whole
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
@@ -24,7 +24,7 @@ from care_sim.study.provenance import SESSION, code_digest, policy_digest
 Parameters = tuple[tuple[str, Any], ...]
 """Names and values, of a scenario's physics or of a policy."""
 
-ENVIRONMENTS = {name.split("-")[1].lower(): name for name in IDS}
+ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 """Environment id of every scenario."""
 
 LARGEST_SEED = 2**63 - 1
