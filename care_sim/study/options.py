@@ -23,11 +23,11 @@ class Options(Conditions):
 
     def arguments(self) -> dict[str, Any]:
         """As arguments of `EpisodeConfig`."""
-        pairs = {
-            "scenario_parameters": _pairs(self.scenario_parameters),
-            "policy_parameters": _pairs(self.policy_parameters),
+        own = {
+            "scenario_parameters": pairs(self.scenario_parameters),
+            "policy_parameters": pairs(self.policy_parameters),
         }
-        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
+        return {field.name: getattr(self, field.name) for field in fields(self)} | own
 
 
 USUAL = Options()
@@ -43,7 +43,8 @@ def seeds_of(numbers: Sequence[int]) -> list[int]:
     return list(range(numbers[0]))
 
 
-def _pairs(texts: Sequence[str]) -> "Parameters":
+def pairs(texts: Sequence[str]) -> "Parameters":
+    """Parameters from NAME=VALUE, values as Python writes them, else as text. Raises InvalidInput for another text."""
     return tuple(_pair(text) for text in texts)
 
 

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 LIDAR = ((0.943713, 0.0, 1.84023), (0.7077955, -0.0064922, 0.0106462, -0.7063073), None)
 SENSORS = {
@@ -41,11 +42,19 @@ LEVELS = {"1": "v0-40", "2": "v40-60", "3": "v60-80", "4": "v80-100"}
 
 def annotated(category, place, size=(1.9, 4.6, 1.7), yaw=0.0, instance=None, visible="4", points=10, attribute=None):
     """An annotation in the world; `size` is width, length, height as in the table."""
+    attributes = [f"attribute-{attribute}"] if attribute else []
     return {
         "instance": instance or category, "category": category, "translation": list(place), "size": list(size),
         "rotation": [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)], "visibility_token": visible,
-        "num_lidar_pts": points, "num_radar_pts": 0, "attribute_tokens": [f"attribute-{attribute}"] if attribute else [],
+        "num_lidar_pts": points, "num_radar_pts": 0, "attribute_tokens": attributes,
     }  # fmt: skip
+
+
+def as_recorded(points):
+    """Rows of a sweep file for points (n, 3) in the car's frame."""
+    w, x, y, z = LIDAR[1]
+    own = Rotation.from_quat([x, y, z, w]).inv().apply(np.asarray(points) - LIDAR[0])
+    return np.column_stack([own, np.full(len(own), 7.0), np.zeros(len(own))])
 
 
 def pose(x=0.0, y=0.0, yaw=0.0):
