@@ -56,7 +56,7 @@ official: $(OFFICIAL)/.installed
 	  --eval_set "$(SPLIT)" --version "$(VERSION)" --output_dir "$(OUT)" --plot_examples 0 --render_curves 0
 
 test-official: $(VENV)/.developing $(OFFICIAL)/.installed
-	$(BIN)/python -m pytest -m official
+	$(BIN)/python -m pytest tests/official
 
 clean:
 	rm -rf $(VENV) $(OFFICIAL) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
