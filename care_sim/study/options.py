@@ -9,7 +9,7 @@ from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from care_sim.study.config import Parameters
+    from care_sim.study.task import Parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,11 +23,11 @@ class Options(Conditions):
 
     def arguments(self) -> dict[str, Any]:
         """As arguments of `EpisodeConfig`."""
-        own = {
-            "scenario_parameters": pairs(self.scenario_parameters),
-            "policy_parameters": pairs(self.policy_parameters),
+        pairs = {
+            "scenario_parameters": parameters(self.scenario_parameters),
+            "policy_parameters": parameters(self.policy_parameters),
         }
-        return {field.name: getattr(self, field.name) for field in fields(self)} | own
+        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
 
 
 USUAL = Options()
@@ -43,8 +43,8 @@ def seeds_of(numbers: Sequence[int]) -> list[int]:
     return list(range(numbers[0]))
 
 
-def pairs(texts: Sequence[str]) -> "Parameters":
-    """Parameters from NAME=VALUE, values as Python writes them, else as text. Raises InvalidInput for another text."""
+def parameters(texts: Sequence[str]) -> "Parameters":
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
     return tuple(_pair(text) for text in texts)
 
 
