@@ -2,50 +2,32 @@
 
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
-from care_sim.study.options import parameters
+from care_sim.study.play_options import PlayOptions
 
 if TYPE_CHECKING:
     from care_sim.sources.nuscenes.tables import Row
     from care_sim.study.play_config import PlayConfig
 
-USUAL = Conditions()
-"""The defaults."""
-
 
 @dataclass(frozen=True, kw_only=True)
-class Export:
+class Export(PlayOptions):
     """Play a policy over nuScenes scenes and write its detections in the results form of the official devkit."""
 
-    source: str
+    source: str = tyro.MISSING
     """nuscenes:FOLDER, the folder of a nuScenes v1.0 database."""
-    split: str = "val"
-    """Which scenes: val, one of splits.json in the folder of the version, or all."""
-    version: str | None = None
-    """The version, where the folder holds several."""
-    camera_detections: Path | None = None
-    """A file with a camera detector's boxes, in nuScenes or COCO results form; else annotations are projected."""
     policy: str = "care"
     """`care-sim policies` lists them. `full` always runs with budget 1.0."""
-    policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policy as NAME=VALUE, for example k_safe=0 for care-sbf."""
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
-    detector: str = "returns"
-    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed package."""
-    detector_parameters: tuple[str, ...] = ()
-    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
     out: Path
     """The results file, JSON."""
-    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = USUAL
-    """Further conditions."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -67,20 +49,12 @@ class Export:
         """A play for every scene of the split: the devkit asks for each of its samples."""
         from care_sim.sources.recordings import NuScenes
         from care_sim.study.play_config import play_grid
-        from care_sim.study.scenes import source_of
 
         if self.source.partition(":")[0] != NuScenes.kind:
             raise InvalidInput(
                 f"source must be nuscenes:FOLDER, whose samples the official form names, got {self.source!r}"
             )
-        source = source_of(
-            self.source, split=self.split, version=self.version, camera_detections=self.camera_detections
-        )
-        common = asdict(self.conditions) | {
-            "detector": self.detector,
-            "detector_parameters": parameters(self.detector_parameters),
-            "policy_parameters": parameters(self.policy_parameters),
-        }
+        source, common = self.scene_source(), self.common()
         floors, latencies = [common.pop("floor_seed")], [common.pop("camera_latency")]
         return play_grid(source, source.scenes(), [self.policy], [self.budget], floors, latencies, **common)
 
@@ -89,7 +63,7 @@ class Export:
         import care_sim
         from care_sim.sources.nuscenes.results_form import MODALITIES
 
-        own = {"version": care_sim.__version__, "split": self.split, **config.row()}
+        own = {"version": care_sim.__version__, "split": self.split or "val", **config.row()}
         del own["scene"]
         return MODALITIES | {"care_sim": own}
 
