@@ -39,6 +39,14 @@ class Stubborn(Middle):
         raise RuntimeError("no weights")
 
 
+def listed(*places):
+    return Middle(len(places))
+
+
+def quits():
+    raise SystemExit(2)
+
+
 class Blind:
     """Detects nothing, by nothing."""
 '''
@@ -47,6 +55,7 @@ class Blind:
 @pytest.fixture
 def installed(install):
     things = {"middle": "Middle", "stubborn": "Stubborn", "blind": "Blind", "number": "module", "lost": "Nowhere"}
+    things |= {"listed": "listed", "quits": "quits"}
     install("own_detectors", MODULE, returns="Middle", **things)
 
 
@@ -61,12 +70,16 @@ def test_the_cluster_detector_finds_a_car_and_names_the_object(open3d):
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[3:] == ["blind", "lost", "middle", "number", "stubborn"]
+    assert detector_names()[3:] == ["blind", "listed", "lost", "middle", "number", "quits", "stubborn"]
     detector = make_detector("middle", HEIGHT, label=0)
     assert isinstance(detector, PointsOnly)
     found, _ = detector.detect(CLOUD, CAR)
     assert found.boxes[0, :2] == pytest.approx(POINTS.mean(axis=0)[:2])
     assert found.classes.tolist() == [0]
+
+
+def test_a_maker_that_takes_any_number_of_things_needs_none(installed):
+    assert make_detector("listed", HEIGHT).detect(CLOUD, CAR)[0].classes.tolist() == [0]
 
 
 def test_a_built_in_name_is_taken(installed):
@@ -77,6 +90,7 @@ def test_a_built_in_name_is_taken(installed):
     ("name", "line"),
     [
         ("stubborn", r"detector stubborn refuses \{\}: RuntimeError: no weights"),
+        ("quits", r"detector quits refuses \{\}: SystemExit: 2"),
         ("blind", "detector blind is no PointDetector: Blind has no method detect"),
         ("number", "detector number cannot be loaded: own_detectors:module makes nothing"),
         ("lost", "detector lost cannot be loaded: AttributeError: .*Nowhere"),
@@ -117,6 +131,20 @@ def scripted(torch, path):
 
     torch.jit.script(Middle()).save(str(path))
     return path
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_torchscript_file_that_gives_no_boxes_is_named(tmp_path):
+    torch = pytest.importorskip("torch")
+
+    class Flat(torch.nn.Module):
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            return torch.zeros(2, dtype=torch.int64), points[:2], torch.zeros(2)
+
+    torch.jit.script(Flat()).save(str(tmp_path / "flat.pt"))
+    detector = make_detector("torchscript", HEIGHT, file=tmp_path / "flat.pt")
+    with pytest.raises(BrokenDetector, match=r"torchscript fails .* boxes must have the shape \(n, 7\), got \(2, 3\)"):
+        detector.detect(CLOUD, CAR)
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
