@@ -9,7 +9,7 @@ from care_sim.film import NOBODY, Cloud
 from care_sim.sensors.recorded import RecordedLidar
 
 CELLS = np.array([100, 100, 700, 9000, 16000])
-RANGES = np.array([12.0, 7.0, 30.0, 5.0, 49.999])
+RANGES = np.array([7.0, 12.0, 30.0, 5.0, 49.999])
 OBJECTS = np.array([4, 9, 4, NOBODY, 4])
 
 
@@ -87,7 +87,13 @@ def test_every_choice_of_cells_meets_the_same_noise_and_dropout(grid):
     whole, part = first.fire(everything(grid), full(grid)), second.fire(some, full(grid))
     assert part.cells.tolist() == np.intersect1d(whole.cells, some).tolist()
     assert np.array_equal(part.points, whole.within(some).points)
-    assert lidar(grid, seed=1, **faults).fire(some, full(grid)).cells.tolist() != part.cells.tolist()
+
+
+@pytest.mark.parametrize("fault", ["lidar_dropout", "lidar_range_sigma"])
+def test_noise_and_dropout_are_seeded(grid, fault):
+    one, same, other = (lidar(grid, seed, **{fault: 0.3}).fire(everything(grid), full(grid)) for seed in (1, 1, 2))
+    assert np.array_equal(one.points, same.points)
+    assert not np.array_equal(one.points, other.points)
 
 
 def test_the_recording_stays_as_it_is(grid, cloud):
