@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_points import HEIGHT, shell
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.film import NOBODY, Annotations, Cloud
 from care_sim.perception.detectors import ReturnsProxy
 from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
@@ -133,6 +133,15 @@ def test_whatever_a_detector_raises_is_one_line_with_its_name(error, says):
 
     with pytest.raises(BrokenDetector, match=rf"^detector mine fails on \d+ points: {says}$"):
         PointsOnly("mine", Raises(), HEIGHT).detect(SCENE, OBJECTS)
+
+
+def test_a_library_that_is_missing_says_so_itself():
+    class Lacks:
+        def detect(self, points, height):
+            raise MissingExtra("pip install 'mine[gpu]'")
+
+    with pytest.raises(MissingExtra, match=r"^pip install 'mine\[gpu\]'$"):
+        PointsOnly("mine", Lacks(), HEIGHT).detect(SCENE, OBJECTS)
 
 
 def test_a_detector_that_fails_is_named():
