@@ -13,6 +13,7 @@ import tyro
 
 from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
+from care_sim.study.protocol import Protocol
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -63,13 +64,14 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "ablate": Ablate,
     "faults": Faults,
     "crowding": Crowding,
+    "protocol": Protocol,
     "report": Report,
     "policies": Policies,
     "scenarios": Scenarios,
     "bench": Bench,
 }
 
-STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding")
+STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 """Commands that keep what they have finished."""
 
 

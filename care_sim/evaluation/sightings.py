@@ -81,6 +81,11 @@ class Sightings:
         frames = rows.take(in_range)
         return cls(scene, tuple(keyframes), in_range, frames, _first_sightings(frames))
 
+    def scored(self, keyframe: int) -> NDArray[np.bool_]:
+        """(n,) which annotations of a keyframe are in range."""
+        start = sum(map(len, self.keyframes[:keyframe]))
+        return self.in_range[start : start + len(self.keyframes[keyframe])]
+
 
 def _first_sightings(frames: ObjectFrames) -> Cells:
     _, first = np.unique(frames.objects, return_index=True)

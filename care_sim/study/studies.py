@@ -11,13 +11,14 @@ from care_sim.study import budget_figure, crowding_figure, faults_figure
 from care_sim.study.ablations import ablation_tables
 from care_sim.study.captions import CAPTION, COMPARED
 from care_sim.study.crowding import crowding_tables
-from care_sim.study.episode import Row
 from care_sim.study.faults import fault_tables
+from care_sim.study.kinds import EPISODES, PLAYS, Kind
 from care_sim.study.paper import NO_COLLISION
-from care_sim.study.rows import read_study
+from care_sim.study.rows import read_notes
 from care_sim.study.statements import statements
 from care_sim.study.table import Table
 from care_sim.study.tables import sweep_tables
+from care_sim.study.task import Row
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Study:
     """How the rows of a study are shown: all pure functions of them.
 
     `closing` are sentences after the tables; `figure_names` every figure that the study can draw; `caption` says
-    how to read its tables.
+    how to read its tables; `kind` is what it plays.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Study:
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
     caption: str = CAPTION
+    kind: Kind = EPISODES
 
 
 def collisions(rows: Sequence[Row]) -> str:
@@ -65,6 +67,7 @@ _ALL = (
         COMPARED,
     ),
     Study("ablate", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
+    Study("protocol", lambda _rows: [], _no_figures, lambda _rows: [], (), "", PLAYS),
     Study("faults", fault_tables, faults_figure.fault_figures, _sweep_closing, faults_figure.NAMES, COMPARED),
 )
 STUDIES = {study.name: study for study in _ALL}
@@ -76,7 +79,7 @@ def study_of(path: Path) -> Study:
 
     Raises InvalidInput for the name of a study that this version does not know.
     """
-    name = read_study(path) or SWEEP.name
+    name = read_notes(path)[0] or SWEEP.name
     if name not in STUDIES:
         raise unknown(f"study in {path}", name, STUDIES)
     return STUDIES[name]

@@ -13,7 +13,7 @@ from care_sim.errors import is_number
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.study.config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
-from care_sim.study.episode import Row
+from care_sim.study.task import Row
 
 Conditions = tuple[tuple[str, Any], ...]
 
