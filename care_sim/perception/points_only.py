@@ -107,13 +107,15 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
 
 
 def _faults(points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None) -> list[str]:
-    rules = {
+    rules: dict[str, NDArray[np.bool_] | bool] = {
         f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes) <= MOST_DETECTIONS,
-        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": np.isin(classes, range(len(CLASSES))),
+        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": _is_count(classes) & (classes < len(CLASSES)),
         "lengths, widths and heights of boxes must be above 0": boxes[:, 3:6] > 0,
-        f"returns must be whole numbers from 0 to the {points} points": (returns >= 0)
-        & (returns <= points)
-        & (returns % 1 == 0),
+        f"returns must be whole numbers from 0 to the {points} points": _is_count(returns) & (returns <= points),
         "scores must lie in [0, 1]": True if scores is None else (scores >= 0) & (scores <= 1),
     }
     return [rule for rule, kept in rules.items() if not np.all(kept)]
+
+
+def _is_count(numbers: Floats) -> NDArray[np.bool_]:
+    return np.asarray((numbers >= 0) & (numbers % 1 == 0))

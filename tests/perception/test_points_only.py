@@ -82,6 +82,12 @@ def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
     assert PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)[1].tolist() == [7, 30, NOBODY]
 
 
+def test_most_returns_on_an_object_decide_and_those_on_the_road_do_not():
+    """In the car's box: two returns of the person, three of the car, and four of the road."""
+    amid = Cloud(np.arange(9), np.tile(CAR[:3], (9, 1)), np.array([7, 7, 30, 30, 30, *[NOBODY] * 4]))
+    assert PointsOnly("mine", Says(detections()), HEIGHT).detect(amid, OBJECTS)[1].tolist() == [30]
+
+
 @pytest.mark.parametrize(
     ("found", "fault"),
     [
@@ -92,7 +98,7 @@ def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
         (detections(boxes=CAR), r"boxes must have the shape \(1, 7\), got \(7,\)"),
         (detections(boxes=np.full((1, 7), np.nan)), "boxes must be finite, in single precision"),
         (detections(boxes=CAR[None] * 1e39), "boxes must be finite, in single precision"),
-        (detections(boxes=-CAR[None]), "lengths, widths and heights of boxes must be above 0"),
+        (detections(boxes=CAR[None] * [1, 1, 1, 1, 1, 0, 1]), "lengths, widths and heights of boxes must be above 0"),
         (detections(boxes=np.zeros((1, 7))), "lengths, widths and heights of boxes must be above 0"),
         (detections(returns=np.array([-1])), FEW),
         (detections(returns=np.array([len(SCENE) + 1])), FEW),

@@ -43,6 +43,10 @@ def listed(*places):
     return Middle(len(places))
 
 
+def loose(**things):
+    return Middle(things["label"])
+
+
 def quits():
     raise SystemExit(2)
 
@@ -55,8 +59,8 @@ class Blind:
 @pytest.fixture
 def installed(install):
     things = {"middle": "Middle", "stubborn": "Stubborn", "blind": "Blind", "number": "module", "lost": "Nowhere"}
-    things |= {"listed": "listed", "quits": "quits"}
-    install("own_detectors", MODULE, returns="Middle", **things)
+    things |= {"listed": "listed", "loose": "loose", "quits": "quits"}
+    install("own_detectors", MODULE, returns="Middle", torchscript="Middle", **things)
 
 
 def test_ours_are_known():
@@ -70,7 +74,7 @@ def test_the_cluster_detector_finds_a_car_and_names_the_object(open3d):
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[3:] == ["blind", "listed", "lost", "middle", "number", "quits", "stubborn"]
+    assert detector_names()[3:] == ["blind", "listed", "loose", "lost", "middle", "number", "quits", "stubborn"]
     detector = make_detector("middle", HEIGHT, label=0)
     assert isinstance(detector, PointsOnly)
     found, _ = detector.detect(CLOUD, CAR)
@@ -82,8 +86,26 @@ def test_a_maker_that_takes_any_number_of_things_needs_none(installed):
     assert make_detector("listed", HEIGHT).detect(CLOUD, CAR)[0].classes.tolist() == [0]
 
 
+def test_a_maker_that_takes_parameters_by_any_name_is_handed_them(installed):
+    assert make_detector("loose", HEIGHT, label=2).detect(CLOUD, CAR)[0].classes.tolist() == [2]
+
+
 def test_a_built_in_name_is_taken(installed):
     assert isinstance(make_detector("returns", HEIGHT), ReturnsProxy)
+    with pytest.raises(InvalidInput, match="detector torchscript needs the parameter file"):
+        make_detector("torchscript", HEIGHT)
+
+
+def test_of_two_with_one_name_the_first_on_the_path_counts(install):
+    install("behind", MODULE, twin="Stubborn")
+    install("ahead", MODULE, twin="Middle")
+    assert len(make_detector("twin", HEIGHT).detect(CLOUD, CAR)[0]) == 1
+
+
+def test_a_package_that_ends_the_program_gets_one_line(install):
+    install("rude_detectors", "raise SystemExit('no device')", rude="Any")
+    with pytest.raises(BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"):
+        make_detector("rude", HEIGHT)
 
 
 @pytest.mark.parametrize(
