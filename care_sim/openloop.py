@@ -100,8 +100,10 @@ class OpenLoop:
         )
 
     def _distances(self, shot: Shot) -> Floats:
-        """(n,) metres to every object of the film, far beyond sight for those that are not annotated now."""
-        distances = np.full(len(self._rows), 1e6)
+        """(n,) metres to every object of the film, 0 for those that are not annotated now: else distance would begin a
+        burst of misses while they are away, and their appearance would fall into it.
+        """
+        distances = np.zeros(len(self._rows))
         rows = [self._rows[number] for number in shot.annotations.objects.tolist()]
         distances[rows] = np.hypot(shot.annotations.boxes[:, 0], shot.annotations.boxes[:, 1])
         return distances

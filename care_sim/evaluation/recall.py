@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.evaluation import matching
 from care_sim.evaluation.sightings import Sightings
 from care_sim.grid import Cells
@@ -65,8 +65,10 @@ class Score:
         """The score of a scene whose keyframes were matched one by one.
 
         `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found (`matching.found`).
-        Raises InvalidInput where they are not one a keyframe and one value an annotation.
+        Raises InvalidInput where they are not one a keyframe and one value an annotation, and for a `censored_at` that
+        is no whole number of 1 or more.
         """
+        check_whole("censored_at", censored_at, 1)
         _check_one_a_keyframe(sightings, len(masks), "masks")
         for index, (shown, mask) in enumerate(zip(sightings.keyframes, masks, strict=True)):
             _check_one_an_annotation(sightings.scene, index, len(shown), mask)

@@ -116,6 +116,12 @@ def test_censoring_can_be_set(shown, reported):
     assert score(scene, [reported()] * 3, censored_at=2).delays.tolist() == [2]
 
 
+@pytest.mark.parametrize("censored_at", [0, 2.5])
+def test_censoring_takes_a_whole_keyframe_at_least(shown, reported, censored_at):
+    with pytest.raises(InvalidInput, match="censored_at must be a whole number >= 1"):
+        score(Sightings.of("any", [shown()]), [reported()], censored_at)
+
+
 def test_an_empty_scene_has_nothing_to_find(shown, reported):
     assert score(Sightings.of("quiet", [shown(), shown()]), [reported(("car", 1, 1)), reported()]).tally() == Tally()
 
