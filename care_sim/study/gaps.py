@@ -171,4 +171,5 @@ def _by_events(pair: Pair, plays: Plays, budget: float) -> Interval | None:
 
 def _of_events(ratio: Ratio, delays: Floats) -> Floats:
     """(e,) the measure of every event, from (floor seeds, e) TTFD."""
-    return np.mean(delays if ratio is TTFD else ratio.scale * (delays == 0), axis=0)
+    means: Floats = np.mean(delays if ratio is TTFD else ratio.scale * (delays == 0), axis=0)
+    return means

@@ -8,7 +8,7 @@ from care_sim.study.entries import percent
 from care_sim.study.episode import Row
 from care_sim.study.protocol_rows import FULL, Plays
 
-UNITS = "Recall in points, TTFD in keyframes."
+UNITS = "Recall in points; TTFD in keyframes, where less is better."
 FEW_SCENES = (
     f"Fewer than {FEWEST_PAIRS} scenes allow no interval over scenes. Those shown come from resampling events, paired "
     "and averaged over floor seeds; events of one scene are not independent, so these intervals are too narrow. "

@@ -9,7 +9,7 @@ import numpy as np
 from care_sim.conditions import UNFELT_BY_FULL, Conditions
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import Tallies, averaged
+from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged, level
 from care_sim.evaluation.strata import thirds
 from care_sim.frames import Floats
 from care_sim.perception.registry import PROXY
@@ -60,15 +60,18 @@ class Setting:
 
 
 class Plays:
-    """The plays of one setting, floor seeds averaged per scene. Policies stand with their parameters."""
+    """The plays of one setting, floor seeds averaged per scene. Policies are named with their parameters.
+
+    `scenes` holds one row of every scene; `full` are the full scans of them, which may come from another setting.
+    """
 
     def __init__(self, setting: Setting, rows: Sequence[Row], full: Sequence[Row] = ()):
         self.setting = setting
-        self.full = tuple(full)
+        self.scenes = {row["scene"]: row for row in rows}
+        self.full = tuple(row for row in full if row["scene"] in self.scenes)
         budgeted = [row for row in rows if row["policy"] != FULL]
         self.tags = {policy_of(row): tags_of_row(row) for row in budgeted}
         self.budgets = sorted({row["budget"] for row in budgeted})
-        self.scenes = {row["scene"]: row for row in [*full, *rows]}
         self._groups: dict[tuple[str, float], list[Row]] = {}
         for row in budgeted:
             self._groups.setdefault((policy_of(row), row["budget"]), []).append(row)
@@ -104,10 +107,13 @@ class Plays:
             self._tallies[key] = averaged(self.seeds(*key))
         return self._tallies[key]
 
+    def level(self, ratio: Ratio, policy: str, budget: float, within: str = "") -> Level:
+        """A measure over all scenes of the policy."""
+        return level(ratio, self.tallies(policy, budget, within))
+
     def delays(self, policy: str, budget: float, scene: str) -> Floats:
         """(floor seeds, events) censored TTFD in keyframes of a scene's events."""
-        rows = [row["ttfds"] for row in self.rows(policy, budget) if row["scene"] == scene]
-        return np.array(rows, float).reshape(len(rows), -1)
+        return np.array([row["ttfds"] for row in self.rows(policy, budget) if row["scene"] == scene], float)
 
     def thirds(self, column: str, budget: float) -> dict[str, list[str]]:
         """Scenes ranked by what the reference held there (`tracks`, `explained`), cut in three."""
@@ -115,9 +121,11 @@ class Plays:
 
     def means(self, column: str, budget: float) -> dict[str, float]:
         """A column of the reference by scene, averaged over floor seeds."""
-        rows = self.rows(REFERENCE, budget)
-        scenes = self.tallies(REFERENCE, budget)
-        return {name: float(np.mean([row[column] for row in rows if row["scene"] == name])) for name in scenes}
+        values: dict[str, list[float]] = {scene: [] for scene in self.tallies(REFERENCE, budget)}
+        for row in self.rows(REFERENCE, budget):
+            if row["scene"] in values:
+                values[row["scene"]].append(row[column])
+        return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
 
     def difference(self, policy: str, budget: float) -> AllocationDifference:
         """How its allocations differ from those of the reference, over all plays for which that is known."""

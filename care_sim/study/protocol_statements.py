@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from care_sim.study.entries import percent
-from care_sim.study.gaps import Compared, Gap
+from care_sim.study.gaps import Compared, Gap, Third
 from care_sim.study.protocol_entries import MET, NOT_MET, UNDECIDED, interval, judged, verdict
 from care_sim.study.protocol_notes import UNITS, few_scenes, papers
 from care_sim.study.protocol_paper import BUDGETS, Said, statements_about
@@ -14,12 +14,13 @@ from care_sim.study.table import Table
 Measured = Mapping[Compared, Mapping[float, Gap | None]]
 """What was measured of every statement, by budget."""
 RULE = (
-    "In brackets: the paper's. Thirds of the scenes: care minus all-camera. Met: the interval excludes zero on the "
-    "side that the paper says, or contains zero where it says tied. Not met: it excludes zero on the other side, or "
-    "at all where the paper says tied. Undecided: it contains zero where the paper claims a sign, or there is none. A "
-    "tie that is met shows no difference; it does not show that there is none. The paper does not say in which measure "
-    "history-uniform falls below history: both are tested."
+    "In brackets: the paper's. Met: the interval excludes zero on the side that the paper says, or contains zero where "
+    "it says tied. Not met: it excludes zero on the other side, or at all where the paper says tied. Undecided: it "
+    "contains zero where the paper claims a sign, or there is none. A tie that is met shows no difference; it does not "
+    "show that there is none."
 )
+THIRDS = "Thirds of the scenes: care minus all-camera."
+UNIFORM = "The paper does not say in which measure history-uniform falls below history: both are tested."
 
 
 def statements_tables(plays: Plays) -> list[Table]:
@@ -36,7 +37,13 @@ def statements_tables(plays: Plays) -> list[Table]:
             f"{plays.setting.label}: the paper's statements",
             ("statement", *columns),
             tuple(_lines(measured, said)),
-            (_count(measured, said), f"{UNITS} {RULE}", *few_scenes(plays), *_not_played(plays, said)),
+            (
+                _count(measured, said),
+                f"{UNITS} {RULE}",
+                *_asides(measured),
+                *few_scenes(plays),
+                *_not_played(plays, said),
+            ),
             papers(said[each].source for each in measured),
             files_only=("interval",),
             whole=("statement",),
@@ -67,6 +74,12 @@ def _count(measured: Measured, said: Mapping[Compared, Said]) -> str:
     verdicts = Counter(verdict(gap, claimed) for gap, claimed in claims if gap and claimed is not None)
     listed = ", ".join(f"{verdicts[each]} {each}" for each in (MET, NOT_MET, UNDECIDED))
     return f"Of {verdicts.total()}, each budget counted: {listed}."
+
+
+def _asides(measured: Measured) -> tuple[str, ...]:
+    thirds = any(isinstance(each, Third) for each in measured)
+    uniform = any("history-uniform" in each.policies for each in measured)
+    return (*((THIRDS,) if thirds else ()), *((UNIFORM,) if uniform else ()))
 
 
 def _not_played(plays: Plays, said: Mapping[Compared, Said]) -> tuple[str, ...]:

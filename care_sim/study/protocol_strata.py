@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio, level
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import THIRDS
 from care_sim.study.entries import marked, percent, tag_notes
 from care_sim.study.gaps import GAP, RANKINGS, Pair, Third
@@ -46,7 +46,7 @@ def _strata_lines(plays: Plays, ratio: Ratio, bases: list[str]) -> Iterator[tupl
 def _stratum_line(plays: Plays, ratio: Ratio, bases: list[str], place: tuple[str, float]) -> tuple[str, ...]:
     within, budget = place
     found = plays.tallies(REFERENCE, budget, within)
-    levels = (level(ratio, plays.tallies(policy, budget, within)).by_event for policy in (REFERENCE, *bases))
+    levels = (plays.level(ratio, policy, budget, within).by_event for policy in (REFERENCE, *bases))
     return (
         within.partition("/")[2],
         percent(budget),

@@ -1,8 +1,8 @@
 """Tables of the first-sighting protocol: contrasts and levels, and what the paper says of both."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, level
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, level
 from care_sim.study.entries import marked, percent, tag_notes
 from care_sim.study.episode import Row
 from care_sim.study.gaps import RATIOS, Pair
@@ -100,14 +100,14 @@ def levels_tables(plays: Plays) -> list[Table]:
 
 
 def _level_lines(plays: Plays, policy: str, budget: float) -> list[tuple[str, ...]]:
-    first, overall, ttfd = (level(ratio, plays.tallies(policy, budget)) for ratio in RATIOS)
+    first, overall, ttfd = (plays.level(ratio, policy, budget) for ratio in RATIOS)
     line = (
         percent(budget),
         marked(policy, plays.tags.get(policy, ())),
         written(FIRST_SIGHTING, first.by_event),
-        _of_full(plays, FIRST_SIGHTING, first.by_event),
+        _of_full(plays, FIRST_SIGHTING, policy, budget),
         written(OVERALL, overall.by_event),
-        _of_full(plays, OVERALL, overall.by_event),
+        _of_full(plays, OVERALL, policy, budget),
         written(TTFD, ttfd.by_event),
         written(FIRST_SIGHTING, first.by_scene),
         written(OVERALL, overall.by_scene),
@@ -124,15 +124,21 @@ def _said_line(said: Level) -> tuple[str, ...]:
     return ("", PAPER, *said, *("" for _ in LEVEL_FILES_ONLY))
 
 
-def _of_full(plays: Plays, ratio: Ratio, value: float | None) -> str:
-    """Share of the ceiling in %, on whatever scenes the policy and the full scan each have."""
-    ceiling = level(ratio, plays.tallies(FULL, 1.0)).by_event if plays.full else None
+def _of_full(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
+    """Share of the ceiling in %, of the scenes that the policy and the full scan have."""
+    ours, full = plays.tallies(policy, budget), plays.tallies(FULL, 1.0)
+    value, ceiling = (_over(ratio, tallies, set(ours) & set(full)) for tallies in (ours, full))
     return f"{100 * value / ceiling:.0f}" if value is not None and ceiling else ""
+
+
+def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | None:
+    return level(ratio, {scene: tallies[scene] for scene in scenes}).by_event
 
 
 def _deviation(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
     """The most by which one floor seed differs from the mean, of the scenes that all seeds have."""
     mean = plays.tallies(policy, budget)
-    seeds = [{scene: seed[scene] for scene in mean} for seed in plays.seeds(policy, budget)]
-    values = [value for seed in [mean, *seeds] if (value := level(ratio, seed).by_event) is not None]
-    return written(ratio, max(abs(value - values[0]) for value in values)) if len(values) > 2 else ""
+    seeds = [_over(ratio, seed, mean) for seed in plays.seeds(policy, budget)]
+    middle = _over(ratio, mean, mean)
+    off = [abs(value - middle) for value in seeds if value is not None and middle is not None]
+    return written(ratio, max(off)) if len(off) > 1 else ""
