@@ -124,7 +124,7 @@ class Third:
     @property
     def heading(self) -> str:
         """The measure, and what scenes are ranked by."""
-        return f"{HEADINGS[self.ratio]}, thirds by {self.ranked_by}"
+        return f"{HEADINGS[self.ratio]}, by {self.ranked_by}"
 
     @property
     def label(self) -> str:

@@ -17,7 +17,8 @@ Point = tuple[float, float]
 def pareto_figure(plays: Plays) -> Figure:
     """Markers of all policies, and in grey the Pareto frontier of those that a car can have.
 
-    What lies below and left of the staircase is beaten in one recall and not better in the other.
+    What lies below and left of the staircase is beaten in one recall and not better in the other. Open markers show
+    what lies under them; that of CARE is filled.
     """
     figure = Figure(figsize=(8.4, 3.6), layout="constrained")
     panels = figure.subplots(1, len(plays.budgets), squeeze=False)[0]
@@ -49,9 +50,11 @@ def _point(plays: Plays, policy: str, budget: float) -> Point | None:
 def _draw(axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: Plays) -> None:
     for policy, (overall, first) in points.items():
         look = drawn[policy]
-        size, order = (10, 3) if policy == REFERENCE else (7, 4)
-        (marker,) = axes.plot(overall, first, look.marker, color=look.colour, markersize=size, zorder=order)
-        marker.set(markeredgecolor="white", markeredgewidth=0.7, label=marked(policy, plays.tags[policy]))
+        (marker,) = axes.plot(overall, first, look.marker, color=look.colour, label=marked(policy, plays.tags[policy]))
+        if policy == REFERENCE:
+            marker.set(markersize=5, zorder=5)
+        else:
+            marker.set(markersize=9, markerfacecolor="none", markeredgewidth=1.5, zorder=4)
     axes.margins(0.1)
     _staircase(axes, {policy: point for policy, point in points.items() if not _marks(plays.tags[policy])})
     axes.spines[["top", "right"]].set_visible(False)

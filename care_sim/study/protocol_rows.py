@@ -152,8 +152,8 @@ def plays_of(rows: Sequence[Row]) -> list[Plays]:
 
 
 def setting_of(row: Row) -> Setting:
-    """The setting that a row belongs to."""
-    changed = tuple((name, row[name]) for name, usual in _USUAL.items() if row[name] != usual)
+    """The setting that a row belongs to; a condition that it has no column for is the usual one."""
+    changed = tuple((name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None))
     return Setting(row["source"], with_parameters(row, "detector"), changed)
 
 

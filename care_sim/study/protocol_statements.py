@@ -19,7 +19,7 @@ RULE = (
     "contains zero where the paper claims a sign, or there is none. A tie that is met shows no difference; it does not "
     "show that there is none."
 )
-THIRDS = "Thirds of the scenes: care minus all-camera."
+THIRDS = "Thirds of the scenes, by tracked objects or by explained detections: care minus all-camera."
 UNIFORM = "The paper does not say in which measure history-uniform falls below history: both are tested."
 
 

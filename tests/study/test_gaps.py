@@ -89,12 +89,11 @@ def thirds(scenes, column="tracks"):
 
 @pytest.mark.parametrize("column", ["tracks", "explained"])
 def test_thirds_tell_dense_scenes_from_sparse_ones(column):
-    dense, sparse, gap = (
-        Third(which, column, OVERALL).gap(thirds(15, column), 0.1) for which in ("dense", "sparse", GAP)
-    )
+    played = thirds(15, column)
+    dense, sparse, gap = (Third(which, column, OVERALL).gap(played, 0.1) for which in ("dense", "sparse", GAP))
     assert (dense.mean, sparse.mean, gap.mean) == pytest.approx((20.0, 0.0, 20.0))
     assert (dense.sign, sparse.sign, gap.sign) == (1, 0, 1)
-    assert Third(GAP, column, FIRST_SIGHTING).gap(plays, 0.1).mean == 0.0
+    assert Third(GAP, column, FIRST_SIGHTING).gap(played, 0.1).mean == 0.0
 
 
 def test_small_thirds_have_no_interval_and_smaller_ones_no_gap():

@@ -15,6 +15,8 @@ def test_source_detector_and_conditions_make_a_setting_and_floor_seeds_do_not():
         return setting_of(play("a", "care", [0], [1], **more))
 
     assert setting() == setting(floor_seed=2, budget=0.35) == Setting("streets", "returns")
+    unknown = {"camera_rotation_sigma_deg": None}
+    assert setting_of(play("a", "care", [0], [1]) | unknown) == Setting("streets", "returns")
     assert setting(source="nuscenes").label == "nuScenes, detector returns"
     near = {"detector": "cluster", "detector.eps": 0.5}
     assert setting(**near) == Setting("streets", "cluster eps=0.5")
