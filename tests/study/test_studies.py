@@ -30,7 +30,7 @@ def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
 def test_an_unknown_study_is_one_clear_line(tmp_path):
     write_rows(STUDY, tmp_path / "episodes.parquet", "gardening")
     with pytest.raises(
-        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, sweep"
+        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, protocol, sweep"
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -73,7 +73,8 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
 
 
 def test_no_study_is_left_out_above():
-    assert set(EPISODES) == set(STUDIES)
+    """The protocol has plays for episodes, and its own test."""
+    assert {*EPISODES, "protocol"} == set(STUDIES)
 
 
 def test_only_the_papers_study_quotes_the_paper_on_collisions():
