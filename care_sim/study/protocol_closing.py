@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.study.contrasts import GATE_POINTS
 from care_sim.study.entries import percent
-from care_sim.study.episode import Row
 from care_sim.study.gaps import Pair
 from care_sim.study.protocol_entries import whole
 from care_sim.study.protocol_notes import counts
 from care_sim.study.protocol_paper import GATE
 from care_sim.study.protocol_rows import REFERENCE, Plays, plays_of
+from care_sim.study.task import Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from care_sim.study.episode import Row
 from care_sim.study.levels_figure import levels_figure
 from care_sim.study.pareto_figure import pareto_figure
 from care_sim.study.protocol_rows import SOURCES, plays_of
+from care_sim.study.task import Row
 
 KINDS = ("pareto", "levels")
 FIGURE_NAMES = tuple(f"{kind}-{source}{rest}" for kind in KINDS for source in SOURCES for rest in ("", "-*"))

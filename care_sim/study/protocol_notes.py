@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.study.entries import percent
-from care_sim.study.episode import Row
 from care_sim.study.protocol_rows import FULL, Plays
+from care_sim.study.task import Row
 
 UNITS = "Recall in points; TTFD in keyframes, where less is better."
 FEW_SCENES = (

@@ -13,8 +13,8 @@ from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged,
 from care_sim.evaluation.strata import thirds
 from care_sim.frames import Floats
 from care_sim.perception.registry import PROXY
-from care_sim.study.episode import Row
 from care_sim.study.summary import policy_of, tags_of_row, with_parameters
+from care_sim.study.task import Row
 
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 REFERENCE = "care"

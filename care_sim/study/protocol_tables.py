@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, level
 from care_sim.study.entries import marked, percent, tag_notes
-from care_sim.study.episode import Row
 from care_sim.study.gaps import RATIOS, Pair
 from care_sim.study.protocol_entries import PAPER, whole, written
 from care_sim.study.protocol_notes import UNITS, few_scenes, left_out, papers, played
@@ -13,6 +12,7 @@ from care_sim.study.protocol_rows import FULL, REFERENCE, Plays, plays_of
 from care_sim.study.protocol_statements import statements_tables
 from care_sim.study.protocol_strata import allocation_tables, strata_tables, thirds_tables
 from care_sim.study.table import Table
+from care_sim.study.task import Row
 
 LEVEL_COLUMNS = (
     "budget",
