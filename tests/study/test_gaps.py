@@ -43,7 +43,7 @@ def test_equal_scene_weights_count_scenes():
 def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds():
     """Of 30 events CARE finds 12 and 6 with its two floors, history none."""
     rows = [
-        play(f"{n}", policy, found(10, sighted[seed] if policy == "care" else 0), [1] * 10, floor_seed=seed)
+        play(f"{n}", policy, found(10, sighted[seed] if policy == "care" else 0, late=1), [1] * 10, floor_seed=seed)
         for n in range(3)
         for policy in ("care", "history")
         for seed, sighted in ((0, (4, 2)), (1, (4, 2)))
