@@ -30,7 +30,7 @@ ROWS = study(FOUND)
 
 
 def tables(rows=ROWS):
-    return {table.title.partition("returns: ")[2]: table for table in protocol_tables(rows)}
+    return {table.title.rpartition(": ")[2]: table for table in protocol_tables(rows)}
 
 
 def block(table, heading):
