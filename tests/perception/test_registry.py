@@ -144,6 +144,7 @@ def scripted(torch, path):
 
     class Middle(torch.nn.Module):
         def forward(self, points: torch.Tensor, sensor_height_m: float):
+            assert points.dtype == torch.float32
             if points.shape[0] == 0:
                 return torch.zeros(0, dtype=torch.int64), torch.zeros(0, 7), torch.zeros(0)
             x, y = points[:, 0].mean(), points[:, 1].mean()
