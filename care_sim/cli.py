@@ -13,6 +13,7 @@ import tyro
 
 from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
+from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
 
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -66,6 +67,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "crowding": Crowding,
     "protocol": Protocol,
     "report": Report,
+    "export": Export,
     "policies": Policies,
     "scenarios": Scenarios,
     "bench": Bench,

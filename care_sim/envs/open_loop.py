@@ -33,8 +33,11 @@ UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 class OpenLoopEnv(SensingEnv[OpenLoop]):
     """A scene in which the agent chooses the LiDAR's cells and nothing reacts to what is seen.
 
-    ### Action, observation
-    Those of `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs in both.
+    ### Action
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score for every cell.
+
+    ### Observation
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs in both loops.
 
     ### Reward
     Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at best.

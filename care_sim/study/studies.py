@@ -14,6 +14,10 @@ from care_sim.study.crowding import crowding_tables
 from care_sim.study.faults import fault_tables
 from care_sim.study.kinds import EPISODES, PLAYS, Kind
 from care_sim.study.paper import NO_COLLISION
+from care_sim.study.protocol_captions import PROTOCOL_CAPTION
+from care_sim.study.protocol_closing import protocol_closing
+from care_sim.study.protocol_figures import FIGURE_NAMES, protocol_figures
+from care_sim.study.protocol_tables import protocol_tables
 from care_sim.study.rows import read_notes
 from care_sim.study.statements import statements
 from care_sim.study.table import Table
@@ -25,8 +29,8 @@ from care_sim.study.task import Row
 class Study:
     """How the rows of a study are shown: all pure functions of them.
 
-    `closing` are sentences after the tables; `figure_names` every figure that the study can draw; `caption` says
-    how to read its tables; `kind` is what it plays.
+    `closing` are sentences after the tables; `figure_names` every figure that the study can draw, as patterns in which
+    a * stands for any text; `caption` says how to read its tables; `kind` is what it plays.
     """
 
     name: str
@@ -67,8 +71,8 @@ _ALL = (
         COMPARED,
     ),
     Study("ablate", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
-    Study("protocol", lambda _rows: [], _no_figures, lambda _rows: [], (), "", PLAYS),
     Study("faults", fault_tables, faults_figure.fault_figures, _sweep_closing, faults_figure.NAMES, COMPARED),
+    Study("protocol", protocol_tables, protocol_figures, protocol_closing, FIGURE_NAMES, PROTOCOL_CAPTION, PLAYS),
 )
 STUDIES = {study.name: study for study in _ALL}
 SWEEP = STUDIES["sweep"]

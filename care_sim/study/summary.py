@@ -92,8 +92,13 @@ def key_of(row: Row) -> Key:
 
 def policy_of(row: Row) -> str:
     """The policy with its parameters."""
-    given = [(n.removeprefix("policy."), v) for n, v in row.items() if n.startswith("policy.") and v is not None]
-    return " ".join([row["policy"], *(f"{name}={_text(value)}" for name, value in given)])
+    return with_parameters(row, "policy")
+
+
+def with_parameters(row: Row, kind: str) -> str:
+    """The name in the column `kind`, with the parameters in the columns whose names begin with it and a dot."""
+    given = [(name.removeprefix(f"{kind}."), value) for name, value in row.items() if name.startswith(f"{kind}.")]
+    return " ".join([row[kind], *(f"{name}={_text(value)}" for name, value in given if value is not None)])
 
 
 def _text(value: Any) -> str:
