@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from care_sim.errors import InvalidInput
 from care_sim.film import NOBODY, Annotations
 from care_sim.grid import AngularGrid
+from care_sim.sources.nuscenes.categories import CATEGORIES, DETECTION_NAMES
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.films import film
 from care_sim.sources.nuscenes.splits import VAL, scenes
@@ -194,20 +195,53 @@ def test_a_detection_elsewhere_or_of_another_class_lies_on_nobody(tmp_path):
     assert shot.sights.objects.tolist() == [NOBODY, NOBODY]
 
 
+COCO = {"image_id": "t", "bbox": [0, 0, 5, 5], "category_id": 3, "score": 1}
+OWN = {"sample_data_token": "t", "bbox_corners": [0, 0, 5, 5], "category_name": "car", "score": 1}
+
+
 @pytest.mark.parametrize(
-    "rows",
+    ("row", "reason"),
     [
-        [{"sample_data_token": "t"}],
-        [{"image_id": "t", "bbox": [0, 0, 1], "category_id": 3, "score": 1}],
-        [{"image_id": "t", "bbox": [0, 0, -5, 5], "category_id": 3, "score": 1}],
-        {"annotations": 3},
+        ({"sample_data_token": "t"}, "it lacks 'bbox_corners'"),
+        (COCO | {"bbox": [0, 0, 1]}, r"no box of four numbers: \[0, 0, 1\]"),
+        (COCO | {"bbox": [0, 0, -5, 5]}, "a box without width or height"),
+        (COCO | {"bbox": "0055"}, "no box of four numbers: '0055'"),
+        (COCO | {"category_id": 0}, "category_id must be a whole number >= 1, got 0"),
+        (COCO | {"category_id": 91}, "category_id must be at most 90, got 91"),
+        (OWN | {"bbox_corners": [0, 0, 5, float("nan")]}, "no box of four numbers"),
+        (OWN | {"category_name": "vehicle.carr"}, "unknown category 'vehicle.carr'; known: animal, "),
+        (OWN | {"score": 87}, r"score must lie in \[0, 1\], got 87"),
+        (OWN | {"score": "0.5"}, r"score must lie in \[0, 1\], got '0.5'"),
+        (OWN | {"sample_data_token": None}, "no token of a picture: None"),
+        (3, "no map of fields: 3"),
     ],
 )
-def test_a_detection_that_cannot_be_read_is_named(tmp_path, rows):
+def test_a_detection_that_cannot_be_read_is_named(tmp_path, row, reason):
     path = tmp_path / "found.json"
-    path.write_text(json.dumps(rows))
-    with pytest.raises(InvalidInput, match=r"found.json: detection 0 cannot be read"):
+    path.write_text(json.dumps([OWN, row]))
+    with pytest.raises(InvalidInput, match=rf"found.json: detection 1 cannot be read \({reason}"):
         DetectionFile(path)
+
+
+@pytest.mark.parametrize("content", [{"annotations": 3}, {"results": 3}, {"results": {"t": 3}}, None, "x"])
+def test_a_file_without_detections_is_named(tmp_path, content):
+    path = tmp_path / "found.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(InvalidInput, match=r"found.json: must hold a list of detections, or a map `results`"):
+        DetectionFile(path)
+
+
+def test_a_detection_on_no_picture_of_the_database_is_named(tmp_path):
+    path = tmp_path / "found.json"
+    path.write_text(json.dumps([OWN | {"sample_data_token": "nowhere"}]))
+    with pytest.raises(InvalidInput, match=r"found.json: a detection on 'nowhere', which .*sample_data.json"):
+        first(database(tmp_path), detections=DetectionFile(path))
+
+
+def test_every_category_of_the_taxonomy_has_its_place():
+    assert len(CATEGORIES) == 23 + 9, "the 23 of the annotations, and 9 more of the lidarseg extension"
+    assert {*CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
+    assert len(DETECTION_NAMES) == 10
 
 
 def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
@@ -235,6 +269,23 @@ def test_splits_choose_scenes(tmp_path):
         scenes(tables, "gone")
     with pytest.raises(InvalidInput, match="unknown split 'x'; known: all, gone, mine, val"):
         scenes(tables, "x")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ([SCENE], "must map names of splits to lists of names of scenes"),
+        (None, "must map names of splits to lists of names of scenes"),
+        ({"mine": SCENE}, "the split 'mine' must be a list of names of scenes"),
+        ({"mine": [["a"]]}, "the split 'mine' must be a list of names of scenes"),
+        ({"mine": [SCENE, SCENE]}, "the split 'mine' names a scene twice"),
+    ],
+)
+def test_a_wrong_file_of_splits_is_named(tmp_path, content, message):
+    root = database(tmp_path)
+    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(content))
+    with pytest.raises(InvalidInput, match=f"splits.json: {message}"):
+        scenes(Database(root), "mine")
 
 
 def dangling(field, table, value="nowhere"):
@@ -282,13 +333,33 @@ BREAKS = {
         "47 bytes are no whole number of points of 20 bytes",
     ),
     "no rotation": (
-        dangling("rotation", "ego_pose", [0, 0, 0, 0]), f"ego_pose.json: 'pose-{SCENE}-0-LIDAR_TOP' has no"
+        dangling("rotation", "ego_pose", [0, 0, 0, 0]), f"'pose-{SCENE}-0-LIDAR_TOP' has a rotation of length"
     ),
     "no size": (dangling("size", "sample_annotation", [1, 2]), "sample_annotation.json: 'scene-0103-0-0' has no size"),
+    "odd category": (
+        dangling("name", "category", "vehicle.spaceship"),
+        "category.json: 'category-vehicle.car': unknown category 'vehicle.spaceship'; known: animal, ",
+    ),
+    "box of no sample": (dangling("sample_token", "sample_annotation"), "sample.json: no row with the token 'nowhere'"),
+    "two alike": (
+        lambda root: change(root, "sample_annotation", lambda rows: rows.append(rows[0])),
+        f"sample_annotation.json: 2 rows with the token '{SCENE}-0-0'",
+    ),
+    "an object twice": (
+        lambda root: change(root, "sample_annotation", lambda rows: rows.append(rows[0] | {"token": "other"})),
+        f"sample_annotation.json: the sample '{SCENE}-0' holds the instance '{SCENE}-a' 2 times",
+    ),
+    "no first sample": (dangling("first_sample_token", "scene", ""), "sample.json: no row with the token ''"),
+    "other last sample": (
+        dangling("last_sample_token", "scene"),
+        f"sample.json: {SCENE} ends with '{SCENE}-0', and should with 'nowhere'",
+    ),
+    "no row": (lambda root: change(root, "sensor", lambda rows: rows.insert(2, 7)), "sensor.json: row 2 must be a map"),
+    "no time": (dangling("timestamp", "sample", "now"), f"row {SCENE}-0: timestamp must be a whole number, got 'now'"),
     "a circle": (dangling("next", "sample", f"{SCENE}-0"), "is no later than the sample before it"),
     "no intrinsics": (
         lambda root: change(root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=[])),
-        "calibrated_sensor.json: 'calibrated-CAM_FRONT' has no 3 x 3 camera_intrinsic",
+        "calibrated_sensor.json: 'calibrated-CAM_FRONT' has no camera_intrinsic of 3 x 3 finite numbers",
     ),
 }  # fmt: skip
 
@@ -304,6 +375,47 @@ def test_what_is_wrong_with_a_database_is_said_in_one_line(tmp_path, name):
         first(root)
     assert "\n" not in str(caught.value)
     assert str(root) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "reason"),
+    [
+        ("rotation", [0, 0, 0, "1"], "has no rotation of 4 finite numbers"),
+        ("rotation", [1, 0, 0], "has no rotation of 4 finite numbers"),
+        ("translation", [1, 2, float("nan")], "has no translation of 3 finite numbers"),
+        ("size", [1, 2, float("inf")], "has no size of 3 finite numbers"),
+        ("size", [1, 0, 2], "has a size without width, length or height"),
+        ("size", [1, -3, 2], "has a size without width, length or height"),
+        ("num_lidar_pts", None, "num_lidar_pts must be a whole number, got None"),
+        ("visibility_token", ["4"], r"visibility_token must be text, got \['4'\]"),
+        ("instance_token", 7, "instance_token must be text, got 7"),
+    ],
+)
+def test_a_wrong_box_is_named(tmp_path, field, value, reason):
+    root = database(tmp_path)
+    change(root, "sample_annotation", lambda rows: rows[0].update({field: value}))
+    with pytest.raises(InvalidInput, match=rf"sample_annotation.json: .*{SCENE}-0-0'?:? {reason}"):
+        first(root)
+
+
+@pytest.mark.parametrize(
+    "intrinsic", [[[1, 2], [3]], [["a"] * 3] * 3, [[float("nan")] * 3] * 3, [[0.0] * 3] * 3], ids=str
+)
+def test_wrong_intrinsics_are_named(tmp_path, intrinsic):
+    root = database(tmp_path)
+    change(root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=intrinsic))
+    with pytest.raises(InvalidInput, match=r"calibrated_sensor.json: 'calibrated-CAM_FRONT' has .*camera_intrinsic"):
+        first(root)
+
+
+def test_a_place_that_is_not_finite_is_named(tmp_path):
+    root = database(tmp_path)
+    (sweep,) = root.glob("samples/LIDAR_TOP/*")
+    points = np.fromfile(sweep, "<f4").reshape(-1, 5)
+    points[2, 1] = np.nan
+    points.tofile(sweep)
+    with pytest.raises(InvalidInput, match=r"pcd.bin: point 2 has a place that is not finite"):
+        first(root)
 
 
 def test_samples_run_forward_in_time(tmp_path):

@@ -18,14 +18,20 @@ OWN_CAR_M = 1.0
 def read_points(path: Path) -> Floats:
     """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is right, y forward.
 
-    Raises InvalidInput for a missing or truncated file.
+    Raises InvalidInput for a missing or truncated file, and for a place that is not finite.
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such file")
-    values = np.fromfile(path, np.uint8)
+    try:
+        values = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot be read ({error})") from error
     if values.size % (4 * VALUES_A_POINT) or not values.size:
         raise InvalidInput(f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} bytes")
     points = values.view("<f4").reshape(-1, VALUES_A_POINT).astype(float)
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    if not finite.all():
+        raise InvalidInput(f"{path}: point {finite.argmin()} has a place that is not finite")
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
 
 
