@@ -83,7 +83,10 @@ def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
     root = database(tmp_path)
     between = {"token": "between", "is_key_frame": False, "filename": "sweeps/gone.pcd.bin"}
     change(root, "sample_data", lambda rows: rows.append(rows[0] | between))
+    change(root, "ego_pose", lambda rows: rows.append(rows[0] | {"token": "between"}))
     assert len(first(root).shots[0].cloud) == 4
+    tables = Database(root)
+    assert "between" not in {*tables.rows("sample_data"), *tables.rows("ego_pose")}, "they would fill the memory"
 
 
 def test_a_keyframe_without_annotations_plays(tmp_path):
@@ -234,7 +237,7 @@ def test_a_file_without_detections_is_named(tmp_path, content):
 def test_a_detection_on_no_picture_of_the_database_is_named(tmp_path):
     path = tmp_path / "found.json"
     path.write_text(json.dumps([OWN | {"sample_data_token": "nowhere"}]))
-    with pytest.raises(InvalidInput, match=r"found.json: a detection on 'nowhere', which .*sample_data.json"):
+    with pytest.raises(InvalidInput, match=r"found.json: a detection on 'nowhere', which is no keyframe of .*sample_data.json"):
         first(database(tmp_path), detections=DetectionFile(path))
 
 

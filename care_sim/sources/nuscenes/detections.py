@@ -50,11 +50,11 @@ class DetectionFile:
                 self._found[picture].append(detection)
 
     def check(self, database: Database) -> None:
-        """Raise InvalidInput for a detection on a picture that the database does not hold."""
+        """Raise InvalidInput for a detection on what is no picture of a keyframe of the database."""
         for picture in self._found:
             if picture not in database.pictures:
                 table = database.path("sample_data")
-                raise InvalidInput(f"{self.path}: a detection on {picture!r}, which {table} does not hold")
+                raise InvalidInput(f"{self.path}: a detection on {picture!r}, which is no keyframe of {table}")
 
     def sights(self, cameras: Sequence[RecordedCamera], pictures: Sequence[Row], annotations: Annotations) -> Sights:
         """The detections on the pictures of a keyframe, one a camera, each with the object that it lies on."""

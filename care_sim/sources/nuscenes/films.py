@@ -42,7 +42,7 @@ def film(
     `detections`, else from projected annotations.
 
     Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated sweep, a detection
-    on a picture that the database does not hold.
+    on what is no picture of a keyframe.
     """
     if detections is not None:
         detections.check(database)

@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -61,9 +61,9 @@ class Database:
         return self.folder / f"{table}.json"
 
     def rows(self, table: str) -> dict[str, Row]:
-        """All rows of a table by token."""
+        """The rows of a table by token. Of recordings and car poses only those of keyframes: one in six."""
         if table not in self._tables:
-            self._tables[table] = _indexed(self.path(table), FIELDS[table])
+            self._tables[table] = self._read(table)
         return self._tables[table]
 
     def row(self, table: str, token: str) -> Row:
@@ -117,14 +117,32 @@ class Database:
             raise InvalidInput(f"{self.path('sample')}: {scene['name']} ends with {end!r}, and should with {wanted!r}")
         return found
 
+    def _read(self, table: str) -> dict[str, Row]:
+        """The rows and fields that are needed; whatever else a table holds is dropped while it is parsed."""
+        kinds = {"token": str, **FIELDS[table]}
+
+        def taken(row: Row) -> object:
+            return {name: row[name] for name in kinds if name in row} if self._is_needed(table, row) else _DROPPED
+
+        return _indexed(self.path(table), read_json(self.path(table), taken), kinds)
+
+    def _is_needed(self, table: str, row: Row) -> bool:
+        if table == "sample_data":
+            return row.get("is_key_frame") is not False
+        return table != "ego_pose" or "token" not in row or str(row["token"]) in self._poses_read
+
+    @cached_property
+    def _poses_read(self) -> frozenset[str]:
+        return frozenset(row["ego_pose_token"] for row in self.rows("sample_data").values())
+
     @cached_property
     def pictures(self) -> frozenset[str]:
-        """The tokens and the file names of all recordings."""
+        """The tokens and the file names of all recordings of keyframes."""
         return frozenset(name for token, row in self.rows("sample_data").items() for name in (token, row["filename"]))
 
     @cached_property
     def _data_of_samples(self) -> dict[str, list[Row]]:
-        return _grouped(row for row in self.rows("sample_data").values() if row["is_key_frame"])
+        return _grouped(self.rows("sample_data").values())
 
     @cached_property
     def _boxes_of_samples(self) -> dict[str, list[Row]]:
@@ -134,10 +152,13 @@ class Database:
         return _grouped(boxes)
 
 
-def read_json(path: Path) -> Any:
-    """The content of a JSON file. Raises InvalidInput for one that is missing or truncated."""
+def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
+    """The content of a JSON file, every map in it replaced by what is `taken` of it.
+
+    Raises InvalidInput for a file that is missing or truncated.
+    """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"), object_hook=taken)
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
@@ -152,18 +173,22 @@ def _only_version(root: Path) -> Path:
     return versions[0]
 
 
-def _indexed(path: Path, fields: Mapping[str, type]) -> dict[str, Row]:
-    rows = read_json(path)
-    if not isinstance(rows, list):
+_DROPPED = object()
+
+
+def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str, Row]:
+    """The rows by token, once every field is of its kind."""
+    if not isinstance(content, list):
         raise InvalidInput(f"{path}: must hold a list of rows")
-    kinds = {"token": str, **fields}
-    for number, row in enumerate(rows):
+    for number, row in enumerate(content):
+        if row is _DROPPED:
+            continue
         if not isinstance(row, dict):
             raise InvalidInput(f"{path}: row {number} must be a map of fields")
         for name, kind in kinds.items():
             if type(row.get(name)) is not kind:
                 raise InvalidInput(f"{path}: {_what_is_wrong(row, number, name, kind)}")
-    return _by_token(path, rows)
+    return _by_token(path, [row for row in content if row is not _DROPPED])
 
 
 def _what_is_wrong(row: Row, number: int, name: str, kind: type) -> str:
