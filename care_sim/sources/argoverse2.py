@@ -112,10 +112,10 @@ def film(log: Path, grid: AngularGrid | None = None) -> Film:
     cars = _car_frames(poses, moments)
     times = (moments - moments[0]) / NANOSECONDS
     egos = motions(times, cars)
-    shots = []
+    grid, shots = grid or AngularGrid(), []
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
-        seen = shoot(_props(boxes, moments[row]), sensor, SENSOR_HEIGHT_M, grid or AngularGrid())
+        seen = shoot(_props(boxes, moments[row]), sensor, SENSOR_HEIGHT_M, grid)
         shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
     return Film(log.name, SURROUND_CAMERAS, SENSOR_HEIGHT_M, KEYFRAME_S, tuple(shots))
 

@@ -237,7 +237,9 @@ def test_a_file_without_detections_is_named(tmp_path, content):
 def test_a_detection_on_no_picture_of_the_database_is_named(tmp_path):
     path = tmp_path / "found.json"
     path.write_text(json.dumps([OWN | {"sample_data_token": "nowhere"}]))
-    with pytest.raises(InvalidInput, match=r"found.json: a detection on 'nowhere', which is no keyframe of .*sample_data.json"):
+    with pytest.raises(
+        InvalidInput, match=r"found.json: a detection on 'nowhere', which is no keyframe of .*sample_data.json"
+    ):
         first(database(tmp_path), detections=DetectionFile(path))
 
 
