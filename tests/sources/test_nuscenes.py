@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.errors import InvalidInput
 from care_sim.film import NOBODY, Annotations
+from care_sim.frames import Frame
 from care_sim.grid import AngularGrid
 from care_sim.sources.nuscenes.categories import CATEGORIES, DETECTION_NAMES
 from care_sim.sources.nuscenes.detections import DetectionFile
@@ -17,6 +18,7 @@ from care_sim.sources.nuscenes.tables import Database
 from care_sim.types import CLASSES
 
 SCENE = "scene-0103"
+UPRIGHT = Frame(0.0, 0.0, 1.8, 0.0)
 CAR = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a")
 WORLD = np.array([[18.0, 2.0, 0.8], [18.1, 1.9, 0.5], [18.0, 2.0, 0.3], [30.0, -5.0, 0.1], [0.95, 0.2, 1.4]])
 """Points in the world, the car at its origin: three on the rear of CAR, one on the road, one on our own roof."""
@@ -69,14 +71,24 @@ def test_a_point_belongs_to_the_box_it_lies_in_as_the_box_is_turned():
     boxes = np.array([[10.0, 0.0, 0.0, 8.0, 1.0, 2.0, np.pi / 4]])
     on_the_diagonal, across_it = [12.0, 2.0, 0.0], [12.0, -2.0, 0.0]
     annotations = Annotations(np.array([5]), np.array([0]), boxes)
-    assert owners(np.array([on_the_diagonal, across_it]), annotations).tolist() == [5, NOBODY]
+    assert owners(np.array([on_the_diagonal, across_it]), annotations, UPRIGHT).tolist() == [5, NOBODY]
+
+
+def test_boxes_stand_upright_however_the_sensor_leans():
+    """The sensor's front is 3 degrees down: 6 m off a bus's middle that makes 0.3 m."""
+    sensor = Frame(3.0, 1.0, 1.8, 0.4, pitch=np.deg2rad(3.0))
+    bus = np.array([[20.0, 2.0, 1.7, 12.0, 2.9, 3.4, 0.4]])
+    ends = bus[0, :3] + [[5.9 * np.cos(0.4), 5.9 * np.sin(0.4), h] for h in (1.6, -1.6, 1.8, -1.8)]
+    annotations = Annotations(np.array([7]), np.array([2]), sensor.boxes_to_local(bus))
+    found = owners(sensor.vectors_to_local(ends - sensor.origin), annotations, sensor)
+    assert found.tolist() == [7, 7, NOBODY, NOBODY]
 
 
 def test_a_point_in_two_boxes_belongs_to_the_smaller():
     boxes = np.array([[10.0, 0, 0, 2, 2, 2, 0], [10.0, 0, 0, 9, 9, 9, 0], [10.0, 0, 0, 4, 4, 4, 0]])
     annotations = Annotations(np.array([3, 4, 5]), np.zeros(3, np.int64), boxes)
     points = np.array([[10.5, 0.0, 0.0], [11.5, 0.0, 0.0], [13.0, 0.0, 0.0]])
-    assert owners(points, annotations).tolist() == [3, 5, 4]
+    assert owners(points, annotations, UPRIGHT).tolist() == [3, 5, 4]
 
 
 def test_recordings_between_keyframes_are_no_keyframes(tmp_path):

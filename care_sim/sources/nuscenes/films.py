@@ -72,7 +72,7 @@ class _Stage:
         boxes = [box for box in self.database.annotations(sample["token"]) if _counts(self.database, box)]
         annotations = _annotations(self.database, boxes, self.numbers, sensor)
         points = read_points(self.database.root / recordings[LIDAR]["filename"])
-        cloud = recorded_cloud(points, self.grid, annotations)
+        cloud = recorded_cloud(points, self.grid, annotations, sensor)
         sights = self._sights(recordings, boxes, annotations)
         return Shot(time_s, sample["token"], sensor, ego, annotations, sights, cloud)
 
