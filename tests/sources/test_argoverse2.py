@@ -67,6 +67,7 @@ def test_a_box_has_its_own_roll_and_pitch(tmp_path):
     flat = film(parked(tmp_path / "flat", box("SIGN", (12.0, 0.0, 1.64), slab))).shots[0]
     steep = film(parked(tmp_path / "steep", box("BUS", (12.0, 0.0, 1.64), slab, pitch=1.2))).shots[0]
     assert len(returns_of(steep, 0)) > 100
+    assert np.ptp(returns_of(steep, 0)[:, 2]) > 4.0, "it is hit wherever it stands, however flat it was"
     assert len(flat.annotations) == 0
 
 

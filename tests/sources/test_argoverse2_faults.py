@@ -6,6 +6,15 @@ from av2_log import CAR_AHEAD, box, parked, replaced, rewrite, stamp
 from care_sim.errors import InvalidInput
 from care_sim.sources.argoverse2 import film
 
+
+def damaged(table, name):
+    """A column of text whose bytes are none."""
+    letters = pa.py_buffer(b"\xff" * len(table))
+    ends = pa.py_buffer(np.arange(len(table) + 1, dtype=np.int32))
+    column = pa.StringArray.from_buffers(len(table), ends, letters)
+    return table.set_column(table.column_names.index(name), name, column)
+
+
 BREAKS = {
     "no annotations": (lambda log: (log / "annotations.feather").unlink(), r"annotations\*\.feather: no such file"),
     "no poses": (lambda log: (log / "city_SE3_egovehicle.feather").unlink(), "city_SE3_egovehicle.feather: no such"),
@@ -37,6 +46,10 @@ BREAKS = {
     "text as numbers": (
         lambda log: rewrite(log / "annotations.feather", lambda t: replaced(t, "track_uuid", [7] * len(t))),
         "annotations.feather: column 'track_uuid' must hold str values, has int64",
+    ),
+    "no text": (
+        lambda log: rewrite(log / "annotations.feather", lambda t: damaged(t, "category")),
+        "annotations.feather: no readable Feather file",
     ),
     "a folder": (
         lambda log: ((log / "annotations.feather").unlink(), (log / "annotations.feather").mkdir()),
