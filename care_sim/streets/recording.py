@@ -41,7 +41,7 @@ class _Stage:
 
     def __init__(self, street: Street, world: BulletWorld):
         self._street, self._world = street, world
-        self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds])
+        self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
         self._classes = np.array([NOBODY if label is None else CLASSES.index(label) for label in labels])
         self._bodies: dict[int, int] = {}
