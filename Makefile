@@ -2,12 +2,20 @@
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures
 # make test       set up with the development tools, run every test
 # make check      format, lint, types, tests
+# make official RESULTS=FILE DATA=FOLDER   score a file of `care-sim export` with the nuScenes devkit, which has an
+#                 environment of its own; SPLIT=val, VERSION=v1.0-trainval and OUT=FOLDER unless given otherwise
+# make test-official   test that with the devkit
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+PIP := python -m pip install --quiet --disable-pip-version-check --constraint
+INSTALL := $(BIN)/$(PIP) constraints.txt
+OFFICIAL := .venv-official
+SPLIT := val
+VERSION := v1.0-trainval
+OUT = $(basename $(RESULTS))-official
 
-.PHONY: setup reproduce test check lint clean
+.PHONY: setup reproduce test check lint official test-official clean
 
 setup: $(VENV)/.installed
 
@@ -37,5 +45,18 @@ check: $(VENV)/.developing
 	$(BIN)/ruff format .
 	$(MAKE) lint test
 
+$(OFFICIAL)/.installed: constraints-official.txt
+	$(PYTHON) -m venv --clear $(OFFICIAL)
+	$(OFFICIAL)/bin/$(PIP) $< nuscenes-devkit
+	touch $@
+
+official: $(OFFICIAL)/.installed
+	$(if $(and $(RESULTS),$(DATA)),,$(error make official needs RESULTS=FILE and DATA=FOLDER))
+	$(OFFICIAL)/bin/python -m nuscenes.eval.detection.evaluate "$(RESULTS)" --dataroot "$(DATA)" \
+	  --eval_set "$(SPLIT)" --version "$(VERSION)" --output_dir "$(OUT)" --plot_examples 0 --render_curves 0
+
+test-official: $(VENV)/.developing $(OFFICIAL)/.installed
+	$(BIN)/python -m pytest tests/official
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(OFFICIAL) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,6 +1,7 @@
 """CARE-Sim: a closed-loop benchmark for adaptive LiDAR sensing.
 
-Importing the package registers the environments `CARE-Dartout-v0`, `CARE-Dense-v0` and `CARE-CutIn-v0`.
+Importing the package registers the environments of the closed loop, `CARE-Dartout-v0`, `CARE-Dense-v0` and
+`CARE-CutIn-v0`, and of the open loop, `CARE-Street-v0` and `CARE-Replay-v0`.
 """
 
 from importlib.metadata import version

@@ -16,7 +16,7 @@ from gymnasium.utils.performance import benchmark_init, benchmark_step
 from rich.console import Console
 
 from care_sim.control import BrakingController
-from care_sim.envs.closed_loop import Observed
+from care_sim.envs.sensing import Observed
 from care_sim.errors import InvalidInput
 from care_sim.perception.detectors import ReturnsDetector
 from care_sim.perception.memory import TrackMemory

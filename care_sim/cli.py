@@ -13,6 +13,8 @@ import tyro
 
 from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
+from care_sim.study.export import Export
+from care_sim.study.protocol import Protocol
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -63,13 +65,15 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "ablate": Ablate,
     "faults": Faults,
     "crowding": Crowding,
+    "protocol": Protocol,
     "report": Report,
+    "export": Export,
     "policies": Policies,
     "scenarios": Scenarios,
     "bench": Bench,
 }
 
-STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding")
+STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 """Commands that keep what they have finished."""
 
 

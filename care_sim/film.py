@@ -79,7 +79,7 @@ class Shot:
     cloud: Cloud
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Film:
     """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between keyframes."""
 

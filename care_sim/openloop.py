@@ -21,11 +21,15 @@ from care_sim.types import Belief, Detections, Rig, Scan, Tracks
 
 @dataclass(frozen=True)
 class Exposure:
-    """The record of one keyframe of the open loop: what was fired, and what the detector made of the returns."""
+    """The record of one keyframe of the open loop: what was fired, and what the detector made of the returns.
+
+    `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 at a first sight.
+    """
 
     index: int
     fired: Cells
     detections: Detections
+    velocities: Floats
 
 
 class OpenLoop:
@@ -66,11 +70,12 @@ class OpenLoop:
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
         self._identities.note(tracks, objects)
+        velocities = self._memory.velocities(tracks, shot.sensor)
         self.index += 1
         self._memory.predict()
         if not self.over:
             self._look(self._picture_of(fired, cloud))
-        return Exposure(index, fired, detections)
+        return Exposure(index, fired, detections, velocities)
 
     def true_boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object, or
@@ -95,8 +100,10 @@ class OpenLoop:
         )
 
     def _distances(self, shot: Shot) -> Floats:
-        """(n,) metres to every object of the film, far beyond sight for those that are not annotated now."""
-        distances = np.full(len(self._rows), 1e6)
+        """(n,) metres to every object of the film, 0 for those that are not annotated now: else distance would begin a
+        burst of misses while they are away, and their appearance would fall into it.
+        """
+        distances = np.zeros(len(self._rows))
         rows = [self._rows[number] for number in shot.annotations.objects.tolist()]
         distances[rows] = np.hypot(shot.annotations.boxes[:, 0], shot.annotations.boxes[:, 1])
         return distances

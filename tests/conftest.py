@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from av2_log import at, box, write
 from hypothesis import settings
 
 from care_sim.grid import AngularGrid
@@ -47,3 +48,21 @@ def seen():
         return ImageDetections.from_rows(np.array(rows, dtype=float).reshape(-1, len(ImageDetections.COLUMNS)))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def drive(tmp_path_factory):
+    """An Argoverse 2 log of 10 keyframes: 5 m/s past a van and two cars; halfway a person steps out of a house."""
+
+    def seen(sweep):
+        ahead = 30.0 - 0.5 * sweep
+        standing = [
+            box("BOX_TRUCK", (ahead, -4.0, 0.9), (6.0, 2.2, 2.6), track="van"),
+            box("REGULAR_VEHICLE", (ahead + 9.0, -4.0, 0.42), track="parked"),
+            box("REGULAR_VEHICLE", (ahead - 15.0, 3.5, 0.42), yaw=3.1, track="oncoming"),
+        ]
+        person = box("PEDESTRIAN", (ahead + 6.0, 7.0 - 0.1 * (sweep - 25), 0.6), (0.6, 0.7, 1.8), yaw=-1.57)
+        return [*standing, person] if sweep >= 25 else standing
+
+    folder = tmp_path_factory.mktemp("logs") / "drive"
+    return write(folder, [seen(n) for n in range(50)], [at(0.5 * n) for n in range(50)])

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from care_sim import bench
-from care_sim.envs import IDS
+from care_sim.envs import CLOSED_LOOP
 from care_sim.errors import InvalidInput
 from care_sim.perception.memory import TrackMemory
 from care_sim.policies.base import Policy
@@ -25,7 +25,7 @@ def measured(tmp_path_factory):
 
 
 def test_every_environment_is_measured_in_every_round(measured):
-    assert set(measured["speed"]) == {*IDS, bench.REFERENCE}
+    assert set(measured["speed"]) == {*CLOSED_LOOP, bench.REFERENCE}
     for figures in measured["speed"].values():
         assert all(len(figures[name]) == 2 for name in ("steps_per_s", "inits_per_s"))
         assert min(figures["steps_per_s"] + figures["inits_per_s"]) > 0

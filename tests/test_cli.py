@@ -9,8 +9,8 @@ from care_sim.policies import BUILT_IN
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.commands import Reproduce
 from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.kinds import EPISODES
 from care_sim.study.options import Options
-from care_sim.study.report import ROWS
 from care_sim.study.rows import read_rows
 
 SHORT = ["--scenario-parameters", "duration_s=0.3"]
@@ -70,10 +70,10 @@ def test_a_folder_that_cannot_be_written_is_named(capsys, tmp_path):
 
 
 def test_a_damaged_parquet_file_is_named(capsys, tmp_path):
-    (tmp_path / ROWS).write_bytes(b"PAR1 and then nothing")
+    (tmp_path / EPISODES.file).write_bytes(b"PAR1 and then nothing")
     code, _, err = run(capsys, "report", tmp_path)
     assert (code, err.count("\n")) == (2, 1)
-    assert ROWS in err
+    assert EPISODES.file in err
 
 
 def test_run_prints_the_timeline_and_the_outcome(capsys):
@@ -88,7 +88,7 @@ def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
     axes = ["--scenarios", "dartout", "--policies", "random", "full", "--budgets", "0.05", "0.1"]
     code, out, err = run(capsys, "sweep", *axes, "--seeds", "3", "4", "--out", tmp_path, "--workers", "1", *SHORT)
     assert code == 0, err
-    rows = read_rows(tmp_path / ROWS)
+    rows = read_rows(tmp_path / EPISODES.file)
     assert {(row["policy"], row["budget"], row["seed"]) for row in rows} == {
         (policy, budget, seed)
         for policy, budget in (("random", 0.05), ("random", 0.1), ("full", 1.0))
@@ -118,7 +118,7 @@ def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_name
     code, _, err = run(capsys, "sweep", *axes, *short)
     assert code == 1
     assert err.count("care-sim: left out: policy torn cannot be loaded: ModuleNotFoundError") == 2
-    rows = read_rows(out / ROWS)
+    rows = read_rows(out / EPISODES.file)
     assert {row["policy"] for row in rows} == set(BUILT_IN)
     assert {row["scenario"] for row in rows} == set(SCENARIOS)
     code, _, err = run(capsys, "sweep", "--policies", "torn", "--seeds", "1", "--out", out)
@@ -134,9 +134,9 @@ def test_further_policies_join_a_set_study_and_a_broken_one_is_left_out(capsys, 
     study = Reproduce(seeds=(1,), workers=1, also=("torn", "uncertainty"))
     assert study.play("sweep", short, tmp_path / "out") == 1
     assert "left out: policy torn cannot be loaded" in capsys.readouterr().err
-    assert {row["policy"] for row in read_rows(tmp_path / "out" / ROWS)} == {"care", "uncertainty"}
+    assert {row["policy"] for row in read_rows(tmp_path / "out" / EPISODES.file)} == {"care", "uncertainty"}
     assert Reproduce(seeds=(1,), workers=1, also=("torn",)).play("sweep", short, tmp_path / "alone") == 1
-    assert {row["policy"] for row in read_rows(tmp_path / "alone" / ROWS)} == {"care"}
+    assert {row["policy"] for row in read_rows(tmp_path / "alone" / EPISODES.file)} == {"care"}
 
 
 def test_a_condition_has_one_value_or_several(capsys, tmp_path):

@@ -2,11 +2,17 @@
 
 import gymnasium
 
-IDS = {
+CLOSED_LOOP = {
     "CARE-Dartout-v0": "care_sim.envs.closed_loop:DartoutEnv",
     "CARE-Dense-v0": "care_sim.envs.closed_loop:DenseEnv",
     "CARE-CutIn-v0": "care_sim.envs.closed_loop:CutInEnv",
 }
+OPEN_LOOP = {
+    "CARE-Street-v0": "care_sim.envs.open_loop:StreetEnv",
+    "CARE-Replay-v0": "care_sim.envs.open_loop:ReplayEnv",
+}
+IDS = CLOSED_LOOP | OPEN_LOOP
+"""Entry points of all environments, by id."""
 
 
 def register_all() -> None:

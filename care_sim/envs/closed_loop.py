@@ -1,36 +1,26 @@
 """The closed-loop environments: thin Gymnasium adapters around `care_sim.loop`."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any, ClassVar
 
-import gymnasium
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from care_sim import reward as rewards
-from care_sim.allocation import budget_cells, fired_cells
-from care_sim.conditions import Conditions
-from care_sim.envs.spaces import checked_scores, observation_space
-from care_sim.envs.truth import EpisodeTruth
+from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
 from care_sim.errors import InvalidInput
 from care_sim.evaluation.metrics import outcome
-from care_sim.grid import AngularGrid
 from care_sim.loop import ClosedLoop
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import check_engine
-from care_sim.sensors.lidar import LIDAR_POSITION, dead_cells
-from care_sim.truth import Truth
-from care_sim.types import Action, Keyframe, Rig
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.types import Action, Keyframe
 from care_sim.world.world import whole_steps
 
-Observed = dict[str, NDArray[np.float32]]
-_CONDITIONS = {field.name for field in fields(Conditions)}
 
-
-class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
+class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     """A scenario in which the agent chooses the LiDAR's cells and a fixed controller brakes.
 
     ### Action
@@ -87,41 +77,14 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         whole_steps(keyframe_s)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
-        grid = AngularGrid()
-        conditions = Conditions(**{name: parameters.pop(name) for name in [*parameters] if name in _CONDITIONS})
+        conditions = conditions_of(parameters)
         check_engine(conditions.engine)
-        dead_cells(grid, conditions.lidar_dead_rows)
-        self.conditions = conditions
-        self.rig = Rig(
-            grid,
-            (FRONT_CAMERA,),
-            budget_cells(budget, grid.size),
-            conditions.reserve_fraction,
-            keyframe_s,
-            conditions.azimuth_margin,
-            conditions.elevation_margin,
-            LIDAR_POSITION[2],
-        )
+        super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s)
         self.scenario = make_scenario(self.scenario_name, **parameters)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
-        self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
-        self.observation_space = observation_space(self.rig)
         self.keyframes: list[Keyframe] = []
         self._weights = rewards.weights(reward_weights)
-        self._loop: ClosedLoop | None = None
-
-    @property
-    def loop(self) -> ClosedLoop:
-        """The running episode. Raises gymnasium.error.ResetNeeded before the first reset."""
-        if self._loop is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
-        return self._loop
-
-    @property
-    def truth(self) -> Truth:
-        """What privileged policies may ask for; `make_policy` hands it to them and to nobody else."""
-        return EpisodeTruth(lambda: self.loop)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -131,29 +94,19 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
         `info` holds the seed that repeats the episode; there are no `options`.
         """
         super().reset(seed=seed)
-        entropy = seed if seed is not None else int(self.np_random.integers(2**32))
+        entropy = self.entropy(seed)
         scenario, camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(5)
         self.close()
         world = self.scenario.build(np.random.default_rng(scenario))
-        self._loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
-        self._floor_rng = np.random.default_rng(_floor_of(floor, self.conditions.floor_seed))
-        self._in_view = self._detected = self._over = False
+        self._in_view = self._detected = False
         self.keyframes = []
-        return self._loop.belief.to_observation(), {"seed": entropy}
+        loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
+        return self.begin(loop, floor), {"seed": entropy}
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe.
-
-        Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
-        gymnasium.error.ResetNeeded before `reset` and after the end.
-        """
+        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
         loop = self.loop
-        if self._over:
-            raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
-        scores = checked_scores(action, self.rig.grid.shape)
-        # Drawn at every keyframe, so that it is the same for every policy.
-        floor = self._floor_rng.permutation(self.rig.grid.size)
-        frame = loop.keyframe(fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None))
+        frame = loop.keyframe(self.chosen(action))
         self.keyframes.append(frame)
         self._in_view |= frame.in_view
         self._detected |= frame.detected
@@ -177,13 +130,13 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
 
     def close(self) -> None:
         """Free the simulator. The environment can be reset again."""
-        if self._loop is not None:
-            self._loop.world.close()
-            self._loop = None
+        if self._running is not None:
+            self._running.world.close()
+            self._running = None
 
     def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         return {
-            "fired": frame.fired if self.conditions.floor else frame.fired.tolist(),
+            "fired": self.reported(frame.fired),
             "detected": frame.detected,
             "in_view": frame.in_view,
             "braking": frame.braking,
@@ -192,12 +145,6 @@ class ClosedLoopEnv(gymnasium.Env[Observed, Action]):
             "time_s": frame.time_s,
             "reward_terms": terms,
         }
-
-
-def _floor_of(seed: np.random.SeedSequence, number: int) -> np.random.SeedSequence:
-    """Floor 0 is the seed's own, the others are its children."""
-    children = (number - 1,) if number else ()
-    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
 
 
 class DartoutEnv(ClosedLoopEnv):

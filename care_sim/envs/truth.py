@@ -1,16 +1,30 @@
 """The truth about the coming keyframe of an environment's running episode."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from care_sim.frames import Floats
-from care_sim.loop import ClosedLoop
-from care_sim.types import Scan, Tracks
+from care_sim.types import Belief, Scan, Tracks
+
+
+class Loop(Protocol):
+    """What the environments ask of a loop, besides its keyframes."""
+
+    belief: Belief
+
+    def true_boxes(self, tracks: Tracks) -> Floats:
+        """(n, 7) true boxes of the objects behind forecasts."""
+        ...
+
+    def full_scan(self) -> Scan:
+        """What every cell would return now."""
+        ...
 
 
 class EpisodeTruth:
     """A `care_sim.truth.Truth` that follows an environment from episode to episode."""
 
-    def __init__(self, running: Callable[[], ClosedLoop]):
+    def __init__(self, running: Callable[[], Loop]):
         self._running = running
 
     def boxes(self, tracks: Tracks) -> Floats:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
 from care_sim.errors import InvalidInput
 from care_sim.film import Annotations
@@ -35,8 +36,7 @@ def found(annotations: Annotations, detections: Detections) -> Mask:
 
 def _distances(annotations: Annotations, detections: Detections) -> Floats:
     """(n, m) planar metres between the centres, inf where the pair is no match."""
-    offsets = annotations.boxes[:, None, :2] - detections.boxes[None, :, :2]
-    distances = np.hypot(offsets[..., 0], offsets[..., 1])
+    distances = cdist(annotations.boxes[:, :2], detections.boxes[:, :2])
     matching = (distances <= MATCH_M) & (annotations.classes[:, None] == detections.classes)
     return np.where(matching, distances, np.inf)
 
@@ -44,7 +44,7 @@ def _distances(annotations: Annotations, detections: Detections) -> Floats:
 def _optimal(distances: Floats) -> NDArray[np.intp]:
     near = np.isfinite(distances)
     rows = np.flatnonzero(near.any(axis=1))
-    distances = distances[np.ix_(rows, near.any(axis=0))]
+    distances = distances[rows][:, near.any(axis=0)]
     worse_than_all = MATCH_M * (min(distances.shape) + 1)
     served, by = linear_sum_assignment(np.minimum(distances, worse_than_all))
     return rows[served[np.isfinite(distances[served, by])]]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.evaluation import matching
 from care_sim.evaluation.sightings import Sightings
 from care_sim.grid import Cells
@@ -60,6 +60,23 @@ class Score:
     delays: Cells
     chances: Cells
 
+    @classmethod
+    def of(cls, sightings: Sightings, masks: Sequence[Mask], censored_at: int = CENSORED_AT) -> "Score":
+        """The score of a scene whose keyframes were matched one by one.
+
+        `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found (`matching.found`).
+        Raises InvalidInput where they are not one a keyframe and one value an annotation, and for a `censored_at` that
+        is no whole number of 1 or more.
+        """
+        check_whole("censored_at", censored_at, 1)
+        _check_one_a_keyframe(sightings, len(masks), "masks")
+        for index, (shown, mask) in enumerate(zip(sightings.keyframes, masks, strict=True)):
+            _check_one_an_annotation(sightings.scene, index, len(shown), mask)
+        found = np.concatenate(masks)[sightings.in_range]
+        ages = _ages(sightings, censored_at)
+        delays = np.where(found, ages, censored_at).min(axis=1, initial=censored_at)
+        return cls(sightings, found, delays, np.sum(ages < censored_at, axis=1))
+
     def tally(self, within: Mask | None = None) -> Tally:
         """The sums, of all or of the rows (r,) of `sightings.frames` that lie `within` a stratum.
 
@@ -93,15 +110,9 @@ def score(sightings: Sightings, reports: Sequence[Detections], censored_at: int 
 
     Raises InvalidInput where the reports are not one a keyframe, and as `matching.found` does.
     """
-    if len(reports) != len(sightings.keyframes):
-        raise InvalidInput(
-            f"scene {sightings.scene}: {len(sightings.keyframes)} keyframes need as many reports, got {len(reports)}"
-        )
-    matched = [matching.found(shown, report) for shown, report in zip(sightings.keyframes, reports, strict=True)]
-    found = np.concatenate(matched)[sightings.in_range]
-    ages = _ages(sightings, censored_at)
-    delays = np.where(found, ages, censored_at).min(axis=1, initial=censored_at)
-    return Score(sightings, found, delays, np.sum(ages < censored_at, axis=1))
+    _check_one_a_keyframe(sightings, len(reports), "reports")
+    masks = [matching.found(shown, report) for shown, report in zip(sightings.keyframes, reports, strict=True)]
+    return Score.of(sightings, masks, censored_at)
 
 
 def _ages(sightings: Sightings, censored_at: int) -> Cells:
@@ -109,3 +120,17 @@ def _ages(sightings: Sightings, censored_at: int) -> Cells:
     rows, events = sightings.frames, sightings.frames.take(sightings.events)
     late = rows.keyframes - events.keyframes[:, None]
     return np.where(rows.objects == events.objects[:, None], late, censored_at)
+
+
+def _check_one_a_keyframe(sightings: Sightings, count: int, what: str) -> None:
+    keyframes = len(sightings.keyframes)
+    if count != keyframes:
+        raise InvalidInput(f"scene {sightings.scene}: {keyframes} keyframes need as many {what}, got {count}")
+
+
+def _check_one_an_annotation(scene: str, keyframe: int, annotations: int, mask: Mask) -> None:
+    if mask.shape != (annotations,) or mask.dtype != np.bool_:
+        raise InvalidInput(
+            f"scene {scene}, keyframe {keyframe}: {annotations} annotations need a boolean mask ({annotations},), "
+            f"got {mask.dtype} {mask.shape}"
+        )

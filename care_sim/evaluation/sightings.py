@@ -19,7 +19,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_number
 from care_sim.film import Annotations
 from care_sim.frames import Floats
 from care_sim.grid import Cells
@@ -69,15 +69,22 @@ class Sightings:
     def of(cls, scene: str, keyframes: Sequence[Annotations], range_m: float = RANGE_M) -> "Sightings":
         """The sightings of the scene's annotations, one entry a keyframe.
 
-        Raises InvalidInput for a scene without a keyframe and for an object annotated twice at one keyframe.
+        Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one keyframe or without a
+        finite centre, and for a range below 0.
         """
         if not keyframes:
             raise InvalidInput(f"scene {scene}: a scene must have at least one keyframe")
-        _check_unique(scene, keyframes)
+        check_number("range_m", range_m, 0)
         rows = _table(keyframes)
+        _check(scene, rows)
         in_range = rows.ranges <= range_m
         frames = rows.take(in_range)
         return cls(scene, tuple(keyframes), in_range, frames, _first_sightings(frames))
+
+    def scored(self, keyframe: int) -> NDArray[np.bool_]:
+        """(n,) which annotations of a keyframe are in range."""
+        start = sum(map(len, self.keyframes[:keyframe]))
+        return self.in_range[start : start + len(self.keyframes[keyframe])]
 
 
 def _first_sightings(frames: ObjectFrames) -> Cells:
@@ -96,9 +103,11 @@ def _table(keyframes: Sequence[Annotations]) -> ObjectFrames:
     )
 
 
-def _check_unique(scene: str, keyframes: Sequence[Annotations]) -> None:
-    for index, annotations in enumerate(keyframes):
-        numbers, counts = np.unique(annotations.objects, return_counts=True)
-        if np.any(counts > 1):
-            twice = numbers[counts.argmax()]
-            raise InvalidInput(f"scene {scene}, keyframe {index}: object {twice} is annotated more than once")
+def _check(scene: str, rows: ObjectFrames) -> None:
+    lost = np.flatnonzero(~np.isfinite(rows.ranges))
+    order = np.lexsort((rows.objects, rows.keyframes))
+    again = order[1:][(np.diff(rows.keyframes[order]) == 0) & (np.diff(rows.objects[order]) == 0)]
+    for fault, faulty in (("has no finite centre", lost), ("is annotated more than once", again)):
+        for row in faulty[:1]:
+            place = f"scene {scene}, keyframe {rows.keyframes[row]}"
+            raise InvalidInput(f"{place}: object {rows.objects[row]} {fault}")

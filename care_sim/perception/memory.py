@@ -67,6 +67,11 @@ class TrackMemory:
         self._start(ids[new], detections.classes[new], seen[new])
         return ids
 
+    def velocities(self, ids: Cells, sensor: Frame) -> Floats:
+        """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0 of a new one."""
+        rows = np.searchsorted(self._tracks.ids, ids)
+        return turned(self._tracks.velocities[rows], -sensor.yaw)
+
     def _assign(self, classes: Cells, seen: Floats) -> tuple[Cells, Cells]:
         tracks = self._tracks
         offset = tracks.boxes[:, None, :2] - seen[None, :, :2]

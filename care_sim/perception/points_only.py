@@ -14,6 +14,9 @@ from care_sim.frames import Floats, turned
 from care_sim.grid import Cells
 from care_sim.types import CLASSES, Detections
 
+MOST_DETECTIONS = 500
+"""Boxes a keyframe: as many as the official nuScenes evaluation takes."""
+
 
 class BrokenDetector(InvalidInput):
     """A detector that cannot be loaded or made, fails, or returns what is no `Detections`."""
@@ -26,7 +29,8 @@ class PointDetector(Protocol):
         """Detections in the sensor frame from points (P, 3) in the sensor frame, metres; P may be 0.
 
         The sensor is `sensor_height_m` above the road. The points are the detector's own to change. `returns` are
-        the points on each object, `scores` confidences from 0 to 1, or None.
+        the points on each object, `scores` confidences from 0 to 1, or None. Whatever is returned becomes a track, so
+        what is too unsure to act on is left out here; at most MOST_DETECTIONS.
         """
         ...
 
@@ -48,23 +52,28 @@ class PointsOnly:
         points = np.array(cloud.points, dtype=np.float64)
         try:
             found = self._detector.detect(points, self._sensor_height_m)
-        except (InvalidInput, MissingExtra):
+        except MissingExtra:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             raise BrokenDetector(f"detector {self._name} fails on {len(cloud)} points: {reason}") from error
-        detections = checked(self._name, found)
+        detections = checked(self._name, found, len(cloud))
         return detections, _objects_behind(detections.boxes, cloud)
 
 
 def inside(points: Floats, boxes: Floats) -> NDArray[np.bool_]:
-    """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7)."""
+    """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7). Raises InvalidInput for other boxes."""
+    if boxes.ndim != 2 or boxes.shape[1] != 7:
+        raise InvalidInput(f"boxes must have the shape (n, 7), got {boxes.shape}")
     rows = [np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1) for box in boxes]
     return np.array(rows, np.bool_).reshape(len(boxes), len(points))
 
 
-def checked(name: str, found: Any) -> Detections:
-    """`found` with arrays of the contract's types. Raises BrokenDetector with the detector's `name` and the fault."""
+def checked(name: str, found: Any, points: int) -> Detections:
+    """`found` among so many `points`, with arrays of the contract's types; without detections they may be empty lists.
+
+    Raises BrokenDetector with the detector's `name` and the fault.
+    """
     if not isinstance(found, Detections):
         raise BrokenDetector(f"detector {name} must return Detections, got {type(found).__name__}")
     columns = ("classes", "boxes", "returns") if found.scores is None else ("classes", "boxes", "returns", "scores")
@@ -73,7 +82,7 @@ def checked(name: str, found: Any) -> Detections:
         shape = (len(table["classes"]), 7) if column == "boxes" else (len(table["classes"]),)
         if values.shape != shape:
             raise BrokenDetector(f"detector {name}: {column} must have the shape {shape}, got {values.shape}")
-    for fault in _faults(**table):
+    for fault in _faults(points, **table):
         raise BrokenDetector(f"detector {name}: {fault}")
     classes, returns = table["classes"].astype(np.int64), table["returns"].astype(np.int64)
     return Detections(classes, table["boxes"], returns, table.get("scores"))
@@ -92,16 +101,21 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
         numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError) as error:
         raise BrokenDetector(f"detector {name}: {column} must be an array of numbers, got {values!r:.80}") from error
-    if not np.isfinite(numbers).all():
-        raise BrokenDetector(f"detector {name}: {column} must be finite")
-    return numbers
+    if not (np.abs(numbers) <= np.finfo(np.float32).max).all():
+        raise BrokenDetector(f"detector {name}: {column} must be finite, in single precision")
+    return numbers if numbers.size else numbers.reshape((0, 7) if column == "boxes" else 0)
 
 
-def _faults(classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None) -> list[str]:
-    rules = {
-        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": np.isin(classes, range(len(CLASSES))),
+def _faults(points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None) -> list[str]:
+    rules: dict[str, NDArray[np.bool_] | bool] = {
+        f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes) <= MOST_DETECTIONS,
+        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": _is_count(classes) & (classes < len(CLASSES)),
         "lengths, widths and heights of boxes must be above 0": boxes[:, 3:6] > 0,
-        "returns must be whole numbers of 0 or more": (returns >= 0) & (returns % 1 == 0),
+        f"returns must be whole numbers from 0 to the {points} points": _is_count(returns) & (returns <= points),
         "scores must lie in [0, 1]": True if scores is None else (scores >= 0) & (scores <= 1),
     }
     return [rule for rule, kept in rules.items() if not np.all(kept)]
+
+
+def _is_count(numbers: Floats) -> NDArray[np.bool_]:
+    return np.asarray((numbers >= 0) & (numbers % 1 == 0))

@@ -44,7 +44,7 @@ def make_detector(name: str, sensor_height_m: float, **parameters: object) -> De
         detector = make(**parameters)
     except (InvalidInput, MissingExtra):
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BrokenDetector(f"detector {name} refuses {parameters}: {_in_a_line(error)}") from error
     if not callable(getattr(detector, "detect", None)):
         raise BrokenDetector(f"detector {name} is no PointDetector: {type(detector).__name__} has no method detect")
@@ -86,7 +86,8 @@ def _check_parameters(name: str, make: Callable[..., object], parameters: dict[s
         if given not in signature.parameters:
             raise unknown(f"parameter of detector {name}", given, signature.parameters)
     for parameter in accepted:
-        if parameter.default is parameter.empty and parameter.name not in parameters:
+        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_POSITIONAL
+        if needed and parameter.name not in parameters:
             raise InvalidInput(f"detector {name} needs the parameter {parameter.name}")
 
 

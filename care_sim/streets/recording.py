@@ -1,6 +1,7 @@
 """The film of a street: at every keyframe the whole grid is cast once, and six cameras are rendered."""
 
 from contextlib import closing
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
 from care_sim.streets.draft import KEYFRAME_S
-from care_sim.streets.street import Street
+from care_sim.streets.street import Street, make_street
 from care_sim.types import CLASSES
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
@@ -34,6 +35,12 @@ def record(
         stage = _Stage(street, world)
         shots = tuple(stage.shot(k, grid, cameras) for k in range(len(street.ego)))
     return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots)
+
+
+@lru_cache(maxsize=1)
+def street_film(seed: int) -> Film:
+    """The film of the street of a seed; the last one is kept, for policies that meet the same street in turn."""
+    return record(make_street(seed))
 
 
 class _Stage:

@@ -49,9 +49,14 @@ class Street:
         return content.hexdigest()
 
 
+def street_name(seed: int) -> str:
+    """What the street of a seed is called."""
+    return f"street-{seed:04d}-{_layout(seed)}"
+
+
 def make_street(seed: int) -> Street:
     """The street of a seed. Layouts come in turn, everything else is drawn; nothing outside the seed enters."""
-    layout = list(LAYOUTS)[seed % len(LAYOUTS)]
+    layout = _layout(seed)
     plans, traffic, furniture, people = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4))
     plan = LAYOUTS[layout](plans)
     draft = Draft(traffic)
@@ -70,4 +75,8 @@ def make_street(seed: int) -> Street:
         populate(draft, road, reach)
     every = round(KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]
-    return Street(f"street-{seed:04d}-{layout}", tuple(draft.kinds), poses, drive.poses[::every], drive.motion[::every])
+    return Street(street_name(seed), tuple(draft.kinds), poses, drive.poses[::every], drive.motion[::every])
+
+
+def _layout(seed: int) -> str:
+    return list(LAYOUTS)[seed % len(LAYOUTS)]

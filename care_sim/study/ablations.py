@@ -8,11 +8,11 @@ from typing import Any
 from care_sim.forgetting import ForgettingRules
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.entries import interval, median, quarters
-from care_sim.study.episode import Row
 from care_sim.study.factors import USUAL, Level, Place
 from care_sim.study.played import Played
 from care_sim.study.summary import Cell
 from care_sim.study.table import Table
+from care_sim.study.task import Row
 
 PLACES = (Place("dartout", 0.03), Place("dartout", 0.10), Place("dense", 0.02), Place("dense", 0.03))
 """The dart-out at the paper's tightest budget and at the one it reports, the dense street at the tightest and

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from care_sim.policies import tags_of
 from care_sim.study.contrasts import detection
-from care_sim.study.episode import Row
 from care_sim.study.summary import Setting, setting_of
+from care_sim.study.task import Row
 
 Worlds = dict[tuple[Setting, int], Row]
 
@@ -18,7 +18,12 @@ def annotated(rows: Sequence[Row]) -> list[Row]:
     never detected the actor, so that `regret_m` counts with the most its distance can have been and is a bound.
     """
     full = {(setting_of(row), row["seed"]): row for row in rows if row["policy"] == "full"}
-    return [{**row, "tags": "+".join(tags_of(row["policy"])), **_regret(row, full)} for row in rows]
+    return [{**row, **_regret(row, full)} for row in tagged(rows)]
+
+
+def tagged(rows: Sequence[Row]) -> list[Row]:
+    """The rows with the column `tags`."""
+    return [{**row, "tags": "+".join(tags_of(row["policy"]))} for row in rows]
 
 
 def _regret(row: Row, full: Worlds) -> Row:

@@ -11,9 +11,9 @@ from matplotlib.transforms import ScaledTranslation
 
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.entries import marked, percent, tag_notes
-from care_sim.study.episode import Row
 from care_sim.study.styles import FULL, Style, styles
 from care_sim.study.summary import Cell, summarise
+from care_sim.study.task import Row
 
 NAMES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
 """Every figure that a sweep can draw."""

@@ -3,28 +3,22 @@
 What imports the simulator or draws is imported by the command that needs it: help stays quick.
 """
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from care_sim.errors import InvalidInput
 from care_sim.study.options import USUAL, Options, seeds_of
+from care_sim.study.running import Running, console, in_turn, playable
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from care_sim.study.config import EpisodeConfig
 
     Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
-
-DONE, FAILED = 0, 1
-PIPE_WIDTH = 180
-"""Columns of a table that is not printed on a terminal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,34 +50,15 @@ class Run:
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer = Photographer(self.picture)
-        print_timeline(config, *trace(config, photographer), _console())
+        print_timeline(config, *trace(config, photographer), console())
         photographer.report()
         return 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Study:
+class _Study(Running):
     seeds: tuple[int, ...] = (5,)
     """One number: that many seeds, from 0. Several: these seeds."""
-    workers: int = os.cpu_count() or 1
-    """Episodes that are played at the same time on this machine; a cluster plays as many as it has threads."""
-    cluster: str | None = None
-    """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
-
-    def conduct(self, study: str, configs: "Sequence[EpisodeConfig]", out: Path, left_out: Sequence[str] = ()) -> int:
-        """Play the episodes, print their tables, name those that failed and the policies that were left out."""
-        from care_sim.study import executors
-        from care_sim.study.report import ROWS, conduct, print_report
-        from care_sim.study.rows import read_rows
-        from care_sim.study.studies import STUDIES
-
-        make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
-        failures = conduct(configs, out, self.workers, make_executor, STUDIES[study])
-        if len(failures) < len(configs):
-            print_report(read_rows(out / ROWS), _console(), STUDIES[study])
-            print(f"Results are in {out}")
-        _name([*(f"failed: {failure}" for failure in failures), *left_out])
-        return FAILED if failures or left_out else DONE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,11 +90,13 @@ class Sweep(_Study):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
         scenarios, common = expanded(self.scenarios, SCENARIOS), self.conditions.arguments()
-        policies, left_out = _playable(self.policies, scenarios, self.budgets[0], **common)
+        policies, left_out = playable(
+            self.policies, lambda name: grid(scenarios, [name], self.budgets[:1], [0], **common)
+        )
         if not policies:
             raise InvalidInput("none of the policies can be played")
-        rates = _in_turn(self.false_negative_rates, "false_negative_rate", common)
-        latencies = _in_turn(self.camera_latencies, "camera_latency", common)
+        rates = in_turn(self.false_negative_rates, "false_negative_rate", common)
+        latencies = in_turn(self.camera_latencies, "camera_latency", common)
         configs = grid(scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common)
         return self.conduct("sweep", configs, self.out, left_out)
 
@@ -134,8 +111,9 @@ class _SetStudy(_Study):
     def play(self, study: str, configurations: "Configurations", out: Path) -> int:
         """Play the configurations of the seeds, with the policies that join in."""
         from care_sim.scenarios import SCENARIOS
+        from care_sim.study.config import grid
 
-        also, left_out = _playable(self.also, list(SCENARIOS), 0.1)
+        also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
         return self.conduct(study, configurations(seeds_of(self.seeds), also), out, left_out)
 
 
@@ -204,43 +182,9 @@ class Report:
 
     def __call__(self) -> int:
         """Run it."""
-        from care_sim.study.report import ROWS, print_report, write_report
-        from care_sim.study.rows import read_rows
-        from care_sim.study.studies import study_of
+        from care_sim.study.report import print_report, reported, write_report
 
-        rows, study = read_rows(self.folder / ROWS), study_of(self.folder / ROWS)
-        print_report(rows, _console(), study)
-        write_report(rows, self.folder, study)
+        rows, study, left_out = reported(self.folder)
+        print_report(rows, console(), study, left_out)
+        write_report(rows, self.folder, study, left_out)
         return 0
-
-
-def _playable(
-    names: Sequence[str], scenarios: Sequence[str], budget: float, **common: Any
-) -> tuple[list[str], list[str]]:
-    """The policies that can be played, and a line for each that cannot, which is printed too."""
-    from care_sim.policies import policy_names
-    from care_sim.study.selection import expanded, playable
-
-    policies, broken = playable(expanded(names, policy_names()), scenarios, budget, **common)
-    left_out = [f"left out: {reason}" for reason in broken.values()]
-    _name(left_out)
-    return policies, left_out
-
-
-def _in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
-    """The values of a condition that a sweep plays in turn; takes the one value out of `common`."""
-    one = common.pop(name)
-    if several and one != getattr(USUAL, name):
-        raise InvalidInput(f"give {name} one value or several, not both")
-    return several or (one,)
-
-
-def _name(problems: Sequence[str]) -> None:
-    for problem in problems:
-        print(f"care-sim: {problem}", file=sys.stderr)
-
-
-def _console() -> "Console":
-    from rich.console import Console
-
-    return Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=PIPE_WIDTH)

@@ -1,38 +1,23 @@
-"""What an episode is made of: checked when written down, and named by a digest."""
+"""What an episode is made of: checked when written down."""
 
-import hashlib
-import json
-from collections.abc import Iterable, Sequence
-from copy import copy
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
-import numpy as np
 
-import care_sim
 from care_sim.conditions import UNFELT_BY_FULL, Conditions
-from care_sim.envs import IDS
-from care_sim.errors import check_whole
-from care_sim.policies import make_policy
-from care_sim.policies.base import Policy
+from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario
-from care_sim.study.provenance import SESSION, code_digest, policy_digest
+from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, check_seed, collected, departures, flat
 
-Parameters = tuple[tuple[str, Any], ...]
-"""Names and values, of a scenario's physics or of a policy."""
-
-ENVIRONMENTS = {name.split("-")[1].lower(): name for name in IDS}
+ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 """Environment id of every scenario."""
-
-LARGEST_SEED = 2**63 - 1
-"""What a column of a results file holds."""
 
 
 @dataclass(frozen=True)
-class EpisodeConfig(Conditions):
+class EpisodeConfig(Conditions, Task):
     """Everything that decides an episode.
 
     The fields are the arguments of the environments (see `care_sim.envs.closed_loop.ClosedLoopEnv`);
@@ -48,20 +33,17 @@ class EpisodeConfig(Conditions):
     policy_parameters: Parameters = ()
 
     def __post_init__(self) -> None:
-        _check_seed(self.seed)
-        for name in ("scenario_parameters", "policy_parameters"):
-            object.__setattr__(self, name, tuple((key, _plain(value)) for key, value in getattr(self, name)))
+        check_seed(self.seed)
+        self.settle("scenario_parameters", "policy_parameters")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
         with self.make_env() as env:
             self.make_policy(env)
         super().__post_init__()
 
-    def with_seed(self, seed: int) -> "EpisodeConfig":
+    def with_seed(self, seed: int) -> Self:
         """The same of another seed; what is sound for one is for all, so that only the seed is checked."""
-        _check_seed(seed)
-        other = copy(self)
-        object.__setattr__(other, "seed", int(seed))
-        return other
+        check_seed(seed)
+        return self.changed(seed=int(seed))
 
     def make_env(self) -> gymnasium.Env[Any, Any]:
         """The environment of this episode, not yet reset."""
@@ -69,45 +51,40 @@ class EpisodeConfig(Conditions):
             f"care_sim:{ENVIRONMENTS[self.scenario]}",
             disable_env_checker=True,
             budget=self.budget,
-            **{field.name: getattr(self, field.name) for field in fields(Conditions)},
+            **{name: getattr(self, name) for name in CONDITIONS},
             **dict(self.scenario_parameters),
         )
 
-    def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
-        """The policy of this episode for its environment."""
-        return make_policy(self.policy, env, **dict(self.policy_parameters))
-
-    def row(self) -> dict[str, Any]:
+    def row(self) -> Row:
         """Every parameter flat; those of scenario and policy as `scenario.NAME` and `policy.NAME`."""
-        flat = {name: getattr(self, name) for name in PLAIN_FIELDS}
-        flat |= {f"scenario.{name}": value for name, value in self.scenario_parameters}
-        return flat | {f"policy.{name}": value for name, value in self.policy_parameters}
-
-    def digest(self) -> str:
-        """Hash of the effective configuration; package version, code and an installed policy's code included.
-
-        It never repeats in another run when an installed policy has no source to read.
-        """
-        installed = policy_digest(self.policy)
-        code = [code_digest(), self._session if installed is None else installed]
-        effective = [sorted(self.row().items()), care_sim.__version__, *code]
-        return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
-
-    @cached_property
-    def _session(self) -> str:
-        """The run that first asked for the digest, which the workers keep."""
-        return SESSION
+        plain = {name: getattr(self, name) for name in PLAIN_FIELDS}
+        return plain | flat("scenario", self.scenario_parameters) | flat("policy", self.policy_parameters)
 
     @property
     def label(self) -> str:
         """A short name for people: scenario, policy, budget, seed and what departs from the defaults."""
-        usual = {field.name: field.default for field in fields(self)}
         main = ("scenario", "policy", "budget", "seed")
-        changes = [f"{n}={v}" for n, v in self.row().items() if n not in main and v != usual.get(n)]
+        changes = departures(self, main)
         return " ".join([f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes])
 
+    @property
+    def order(self) -> int:
+        """Seed by seed, so that an interrupted study leaves whole pairs."""
+        return self.seed
 
-PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *(field.name for field in fields(Conditions))]
+    @property
+    def batch(self) -> Hashable:
+        """Every episode has a world of its own."""
+        return self
+
+    @property
+    def likenesses(self) -> tuple[Likeness, ...]:
+        """All but the seed; scenario, policy and budget; the policy; nothing."""
+        all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
+        return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
+
+
+PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITIONS]
 """Fields that are one value."""
 
 _USUAL = {field.name: field.default for field in fields(Conditions)}
@@ -141,23 +118,6 @@ def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) ->
     return EpisodeConfig(scenario, policy, budget, **given)
 
 
-def _check_seed(seed: object) -> None:
-    check_whole("seed", seed, 0, LARGEST_SEED)
-
-
-def _plain(value: Any) -> Any:
-    """A parameter's value as Python's own type, which files can hold."""
-    return value.item() if isinstance(value, np.generic) else tuple(value) if isinstance(value, list) else value
-
-
 def without_seeds(configs: Sequence[EpisodeConfig]) -> list[dict[str, Any]]:
     """The configurations as plain data, each once, with the list of its seeds."""
-    seeds: dict[str, list[int]] = {}
-    kept: dict[str, dict[str, Any]] = {}
-    for config in configs:
-        plain = asdict(config)
-        seed = plain.pop("seed")
-        key = json.dumps(plain)
-        kept[key] = plain
-        seeds.setdefault(key, []).append(seed)
-    return [{**plain, "seeds": seeds[key]} for key, plain in kept.items()]
+    return collected([asdict(config) for config in configs], "seed", "seeds")

@@ -6,10 +6,10 @@ from care_sim.scenarios.dense import PLACES
 from care_sim.study.config import EpisodeConfig, grid
 from care_sim.study.contrasts import Contrast
 from care_sim.study.entries import interval, mean, median, percent
-from care_sim.study.episode import Row
 from care_sim.study.played import Played
 from care_sim.study.summary import Key, key_of
 from care_sim.study.table import Table
+from care_sim.study.task import Row
 
 BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
 VEHICLES = range(len(PLACES) + 1)

@@ -9,8 +9,8 @@ from matplotlib.patches import Rectangle
 
 from care_sim.study.crowding import COLLAPSE_M, Crowd
 from care_sim.study.entries import mean, percent
-from care_sim.study.episode import Row
 from care_sim.study.table import Bold
+from care_sim.study.task import Row
 
 NAME = "crowding"
 PALE = 0.55

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.study.contrasts import Contrast
 from care_sim.study.table import Bold
@@ -68,10 +69,13 @@ def unsigned(contrast: Contrast | None) -> str:
 
 
 def ends(contrast: Contrast) -> str:
-    """The interval of a difference; an end that would round to zero has one decimal more."""
-    decimals = contrast.measure.decimals
-    low, high = (_end(end, decimals) for end in contrast.difference.interval[1:])
-    return f"[{low},{high}]"
+    """The interval of a difference."""
+    return bounds(contrast.difference.interval, contrast.measure.decimals)
+
+
+def bounds(interval: Interval, decimals: int) -> str:
+    """The ends of an interval; one that would round to zero has one decimal more."""
+    return f"[{_end(interval.low, decimals)},{_end(interval.high, decimals)}]"
 
 
 def _end(end: float, decimals: int) -> str:

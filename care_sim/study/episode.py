@@ -4,8 +4,7 @@ import hashlib
 import resource
 import sys
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,19 +12,22 @@ import care_sim
 from care_sim.errors import InvalidInput
 from care_sim.loop import ClosedLoop
 from care_sim.study.config import EpisodeConfig
+from care_sim.study.task import Row
 from care_sim.types import Keyframe, Observation
 from care_sim.world.world import World
 
-Row = dict[str, Any]
+
+def attempt(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
+    """What a worker does: play episodes; of each its row, or in one line why there is none."""
+    return [answer(run_episode, config) for config in batch]
 
 
-def attempt(config: EpisodeConfig) -> Row | str:
-    """What a worker does: play an episode; its row, or in one line why there is none.
-
-    An exception stays in the worker, which alone may know its class.
+def answer(play: Callable[..., Row], *arguments: object) -> Row | str:
+    """What `play` returns, or in one line why it returns nothing: an exception stays in the worker, which alone may
+    know its class.
     """
     try:
-        return run_episode(config)
+        return play(*arguments)
     except InvalidInput as error:
         return _one_line(str(error))
     except (Exception, SystemExit) as error:

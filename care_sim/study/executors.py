@@ -43,7 +43,7 @@ def cluster(address: str) -> ExecutorFactory:
 
 
 def places(executor: Executor, workers: int) -> int:
-    """How many episodes are played at the same time: `workers`, or as many as a cluster has threads now."""
+    """How many batches are played at the same time: `workers`, or as many as a cluster has threads now."""
     return executor.threads() if isinstance(executor, ClusterExecutor) else workers
 
 

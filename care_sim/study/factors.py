@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from care_sim.study.config import EpisodeConfig, grid
 from care_sim.study.entries import percent
-from care_sim.study.episode import Row
 from care_sim.study.summary import Key, key_of
+from care_sim.study.task import Row
 
 
 class Place(NamedTuple):

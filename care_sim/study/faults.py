@@ -8,11 +8,11 @@ from typing import Any
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.contrasts import Contrast
 from care_sim.study.entries import interval, median
-from care_sim.study.episode import Row
 from care_sim.study.factors import Level, Place
 from care_sim.study.played import Played
 from care_sim.study.summary import Cell
 from care_sim.study.table import Bold, Table
+from care_sim.study.task import Row
 
 PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
 """The paper's own: the budget at which it injects faults, and the one at which it tells the reserves apart."""

@@ -9,12 +9,12 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from care_sim.study.episode import Row
 from care_sim.study.factors import Place
 from care_sim.study.faults import FAULTS, PLACES, Fault, policies_of
 from care_sim.study.played import Played
 from care_sim.study.styles import FULL, Style, styles
 from care_sim.study.summary import Cell
+from care_sim.study.task import Row
 
 COLUMNS = 5
 """Panels side by side; a place at least stays free for the legend."""

@@ -17,7 +17,8 @@ def save(figure: Figure, stem: Path) -> None:
 
 
 def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:
-    """Remove the figures of the given names from a folder, all but those `kept`."""
-    for name in names:
-        for suffix in _FORMATS if name not in kept else ():
-            (folder / f"{name}{suffix}").unlink(missing_ok=True)
+    """Remove the figures of the given names from a folder, all but those `kept`; a * in a name stands for any text."""
+    found = [path for name in names for suffix in _FORMATS for path in folder.glob(f"{name}{suffix}")]
+    for path in found:
+        if path.stem not in kept:
+            path.unlink(missing_ok=True)

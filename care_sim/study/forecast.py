@@ -1,41 +1,37 @@
-"""How long the rest of a study will take, from what its episodes took so far."""
+"""How long the rest of a study will take, from what its tasks took so far."""
 
 import math
 from collections import Counter
 from collections.abc import Iterable
 
-from care_sim.study.config import EpisodeConfig
-
-Likeness = tuple[object, ...]
-"""What episodes have in common."""
+from care_sim.study.task import Likeness, Task
 
 
 class Forecast:
-    """Predicts the time that the waiting episodes of a run still need.
+    """Predicts the time that the waiting tasks of a run still need.
 
-    An episode is expected to take as long as the mean of those most like it: all equal but the seed, else
-    scenario, policy and budget, else the policy, else all. What this run has measured comes before what
-    an `earlier` run did, perhaps on another machine: pairs of configuration and seconds.
+    A task is expected to take as long as the mean of those most like it (`Task.likenesses`). What this run has
+    measured comes before what an `earlier` run did, perhaps on another machine: pairs of task and seconds.
     """
 
-    def __init__(self, waiting: Iterable[EpisodeConfig], earlier: Iterable[tuple[EpisodeConfig, float]] = ()):
-        self._waiting = Counter(map(_likenesses, waiting))
+    def __init__(self, waiting: Iterable[Task], earlier: Iterable[tuple[Task, float]] = ()):
+        self._waiting = Counter(task.likenesses for task in waiting)
         self._now, self._earlier = _Means(), _Means()
-        for config, seconds in earlier:
-            self._earlier.add(_likenesses(config), seconds)
+        for task, seconds in earlier:
+            self._earlier.add(task.likenesses, seconds)
 
     @property
     def waiting(self) -> int:
-        """Episodes that have not ended."""
+        """Tasks that have not ended."""
         return self._waiting.total()
 
-    def finished(self, config: EpisodeConfig, seconds: float) -> None:
-        """An episode has ended after so many seconds; one that failed counts as 0."""
-        self._waiting[_likenesses(config)] -= 1
-        self._now.add(_likenesses(config), seconds)
+    def finished(self, task: Task, seconds: float) -> None:
+        """A task has ended after so many seconds; one that failed counts as 0."""
+        self._waiting[task.likenesses] -= 1
+        self._now.add(task.likenesses, seconds)
 
     def remaining_s(self, workers: int) -> float:
-        """Seconds until the last episode ends, with so many workers; NaN while nothing is known."""
+        """Seconds until the last task ends, with so many workers; NaN while nothing is known."""
         expected = {kind: self._expected_s(kind) for kind, number in self._waiting.items() if number > 0}
         if not expected:
             return 0.0
@@ -59,9 +55,3 @@ class _Means:
     def get(self, likeness: Likeness) -> float | None:
         total, number = self._sums.get(likeness, (0.0, 0))
         return total / number if number else None
-
-
-def _likenesses(config: EpisodeConfig) -> tuple[Likeness, ...]:
-    """What an episode shares with others, the closest likeness first."""
-    all_but_seed = tuple(item for item in config.row().items() if item[0] != "seed")
-    return all_but_seed, (config.scenario, config.policy, config.budget), (config.policy,), ()

@@ -7,8 +7,8 @@ from types import TracebackType
 from typing import Self
 
 from care_sim.errors import InvalidInput
-from care_sim.study.episode import Row
 from care_sim.study.rows import with_tuples
+from care_sim.study.task import Row
 
 
 class Journal:

@@ -9,7 +9,7 @@ from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from care_sim.study.config import Parameters
+    from care_sim.study.task import Parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +24,8 @@ class Options(Conditions):
     def arguments(self) -> dict[str, Any]:
         """As arguments of `EpisodeConfig`."""
         pairs = {
-            "scenario_parameters": _pairs(self.scenario_parameters),
-            "policy_parameters": _pairs(self.policy_parameters),
+            "scenario_parameters": parameters(self.scenario_parameters),
+            "policy_parameters": parameters(self.policy_parameters),
         }
         return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
 
@@ -43,7 +43,8 @@ def seeds_of(numbers: Sequence[int]) -> list[int]:
     return list(range(numbers[0]))
 
 
-def _pairs(texts: Sequence[str]) -> "Parameters":
+def parameters(texts: Sequence[str]) -> "Parameters":
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
     return tuple(_pair(text) for text in texts)
 
 

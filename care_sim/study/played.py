@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from care_sim.study.contrasts import DETECTION, Contrast, contrast
 from care_sim.study.entries import marked, tag_notes
-from care_sim.study.episode import Row
 from care_sim.study.summary import Cell, Key, grouped, summarise, tags_of_row
+from care_sim.study.task import Row
 
 
 class Played:

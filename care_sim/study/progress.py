@@ -10,36 +10,37 @@ from datetime import timedelta
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from care_sim.study.config import EpisodeConfig
-from care_sim.study.episode import Row
 from care_sim.study.executors import ExecutorFactory
 from care_sim.study.forecast import Forecast
 from care_sim.study.journal import Journal
+from care_sim.study.kinds import Kind
 from care_sim.study.runner import Audience, Failure, run_all
+from care_sim.study.task import Row, Task
 
 EARLY = 0.05
-"""Share of the episodes after which the prediction is kept, and after which a line is due."""
+"""Share of the tasks after which the prediction is kept, and after which a line is due."""
 FIRST_LINE_S = 10.0
 LINE_S = 60.0
 
 Show = Callable[[int, str], None]
-"""Shows how many episodes are done and, in words, what is left."""
+"""Shows how many tasks are done and, in words, what is left."""
 
 
 def run_with_progress(
-    configs: Sequence[EpisodeConfig], journal: Journal, workers: int, make_executor: ExecutorFactory
+    configs: Sequence[Task], journal: Journal, workers: int, make_executor: ExecutorFactory, kind: Kind
 ) -> list[Failure]:
-    """Run the episodes that the journal does not hold yet, and show on stderr how far they are.
+    """Run the tasks that the journal does not hold yet, and show on stderr how far they are.
 
     Returns those that failed; see `care_sim.study.runner.run_all`.
     """
     found = [(config, journal[config.digest()]["wall_s"]) for config in configs if config.digest() in journal]
     forecast = Forecast((config for config in configs if config.digest() not in journal), found)
-    with bar(len(configs)) if sys.stderr.isatty() else nullcontext(Lines(len(configs))) as show:
+    unit = kind.unit
+    with bar(len(configs), unit) if sys.stderr.isatty() else nullcontext(Lines(len(configs), unit)) as show:
         reporter = Reporter(forecast, show, len(configs))
-        failures = run_all(configs, journal, workers, make_executor, reporter)
+        failures = run_all(configs, journal, workers, make_executor, reporter, kind.attempt)
     if len(found) < len(configs):
-        print(reporter.summary(), file=sys.stderr)
+        print(reporter.summary(unit), file=sys.stderr)
     return failures
 
 
@@ -64,17 +65,17 @@ class Reporter(Audience):
             self._predict()
         self._tell()
 
-    def finished(self, config: EpisodeConfig, row: Row | None) -> None:
-        """Learn how long an episode took."""
+    def finished(self, config: Task, row: Row | None) -> None:
+        """Learn how long a task took."""
         self._forecast.finished(config, row["wall_s"] if row else 0.0)
         self._predict()
         if math.isnan(self._predicted_s) and self._new - self._forecast.waiting >= EARLY * self._new:
             self._predicted_s = self._end - self._started
         self._tell()
 
-    def summary(self) -> str:
+    def summary(self, unit: str) -> str:
         """How long it took, and how long it should have."""
-        took = f"{self._new} episodes took {_exact(self._clock() - self._started)}"
+        took = f"{self._new} {unit} took {_exact(self._clock() - self._started)}"
         many = self._new >= 1 / EARLY
         return f"{took}; {_exact(self._predicted_s)} predicted after {EARLY:.0%}" if many else took
 
@@ -88,9 +89,9 @@ class Reporter(Audience):
 
 
 @contextmanager
-def bar(total: int) -> Iterator[Show]:
+def bar(total: int, unit: str) -> Iterator[Show]:
     """A bar on a terminal."""
-    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn(unit), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, TextColumn("{task.fields[left]}"), console=Console(stderr=True)) as progress:
         task = progress.add_task("", total=total, left="")
         yield lambda done, left: progress.update(task, completed=done, left=left)
@@ -99,8 +100,8 @@ def bar(total: int) -> Iterator[Show]:
 class Lines:
     """A line after ten seconds, then every minute, or sooner when another twentieth is done."""
 
-    def __init__(self, total: int, clock: Callable[[], float] = time.monotonic):
-        self._total = total
+    def __init__(self, total: int, unit: str, clock: Callable[[], float] = time.monotonic):
+        self._total, self._unit = total, unit
         self._clock = clock
         self._last_s, self._last_done = clock(), -total
 
@@ -110,7 +111,7 @@ class Lines:
         much = done - self._last_done >= EARLY * self._total
         if quiet_s >= LINE_S or (quiet_s >= FIRST_LINE_S and much):
             self._last_s, self._last_done = self._clock(), done
-            print(", ".join(filter(None, (f"episodes {done}/{self._total}", left))), file=sys.stderr, flush=True)
+            print(", ".join(filter(None, (f"{self._unit} {done}/{self._total}", left))), file=sys.stderr, flush=True)
 
 
 def spoken(seconds: float) -> str:

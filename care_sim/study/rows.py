@@ -1,32 +1,36 @@
-"""Rows of episodes in a Parquet file."""
+"""Rows of a study in a Parquet file."""
 
+import json
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from care_sim.errors import InvalidInput
-from care_sim.study.config import PLAIN_FIELDS
-from care_sim.study.episode import Row
-from care_sim.types import Outcome
+from care_sim.study.task import Row
 
-REQUIRED = {*PLAIN_FIELDS, *Outcome.__dataclass_fields__}
-"""Columns without which a file is none of ours."""
-STUDY = b"care_sim.study"
-"""Where the schema of a file names the study that its rows belong to."""
+STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"
+"""Where the schema of a file names the study that its rows belong to, and what is missing in it."""
 
 
-def write_rows(rows: Sequence[Row], path: Path, study: str = "sweep") -> None:
-    """Write rows and the name of their study to a Parquet file in one move: readers see the old file or the new."""
+def write_rows(rows: Sequence[Row], path: Path, study: str = "sweep", left_out: Sequence[str] = ()) -> None:
+    """Write rows, the name of their study and what it lacks to a Parquet file."""
     names = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: pa.array([row.get(name) for row in rows]) for name in names}
+    columns = {name: [row.get(name) for row in rows] for name in names}
+    write_columns(columns, path, {STUDY: study, LEFT_OUT: json.dumps([*left_out])})
+
+
+def write_columns(columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, str] | None = None) -> None:
+    """Write columns to a Parquet file in one move: readers see the old file or the new."""
+    arrays = {name: pa.array(column) for name, column in columns.items()}
     measured = {
-        name: column.cast(pa.float64()) if column.type == pa.null() else column for name, column in columns.items()
+        name: column.cast(pa.float64()) if column.type == pa.null() else column for name, column in arrays.items()
     }
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    pq.write_table(pa.table(measured).replace_schema_metadata({STUDY: study}), unfinished)
+    pq.write_table(pa.table(measured).replace_schema_metadata(notes), unfinished)
     unfinished.replace(path)
 
 
@@ -35,19 +39,22 @@ def with_tuples(row: Row) -> Row:
     return {name: tuple(value) if isinstance(value, list) else value for name, value in row.items()}
 
 
-def read_rows(path: Path) -> list[Row]:
-    """Read rows back. Raises InvalidInput for a file that is damaged or holds no episodes."""
+def read_rows(path: Path, required: Collection[str] = ()) -> list[Row]:
+    """Read rows back. Raises InvalidInput for a file that is damaged or lacks a required column."""
     rows = [with_tuples(row) for row in _read(path).to_pylist()]
-    missing = REQUIRED - set(rows[0] if rows else ())
-    if missing:
-        raise InvalidInput(f"{path} holds no rows of episodes: it lacks {', '.join(sorted(missing))}")
+    missing = set(required) - set(rows[0] if rows else ())
+    if missing or not rows:
+        lacking = f"it lacks {', '.join(sorted(missing))}" if missing else "it is empty"
+        raise InvalidInput(f"{path} holds no rows of a study: {lacking}")
     return rows
 
 
-def read_study(path: Path) -> str | None:
-    """The name of the study that wrote a file, None without one. Raises InvalidInput for a damaged file."""
-    name = (_read(path).schema.metadata or {}).get(STUDY)
-    return name.decode() if name else None
+def read_notes(path: Path) -> tuple[str | None, list[str]]:
+    """The name of the study that wrote a file, None without one, and what it left out. Raises InvalidInput for a
+    damaged file.
+    """
+    notes = _read(path).schema.metadata or {}
+    return (notes[STUDY].decode() if STUDY in notes else None), json.loads(notes.get(LEFT_OUT, b"[]"))
 
 
 def _read(path: Path) -> pa.Table:

@@ -1,18 +1,22 @@
-"""Runs episodes over workers; survives the death of a worker and finds the episode that killed it."""
+"""Runs tasks over workers; survives the death of a worker and finds the batch that killed it."""
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
+from typing import Any
 
-from care_sim.study.config import EpisodeConfig
-from care_sim.study.episode import Row, attempt
+from care_sim.study.episode import attempt
 from care_sim.study.executors import ClusterLost, ExecutorFactory, places, processes
 from care_sim.study.journal import Journal
+from care_sim.study.task import Row, Task, batches
 
-Flying = dict[Future[Row | str], EpisodeConfig]
-"""The episodes in flight."""
+Batch = Sequence[Task]
+Attempt = Callable[[Any], list[Row | str]]
+"""Plays a batch in a worker: of each task its row, or in one line why there is none."""
+Flying = dict[Future[list[Row | str]], Batch]
+"""The batches in flight."""
 
 PATIENCE_S = 2.0
 """How long nothing may happen before the audience is told so."""
@@ -20,9 +24,9 @@ PATIENCE_S = 2.0
 
 @dataclass(frozen=True)
 class Failure:
-    """An episode that did not finish, and why."""
+    """A task that did not finish, and why."""
 
-    config: EpisodeConfig
+    config: Task
     reason: str
 
     def __str__(self) -> str:
@@ -35,26 +39,25 @@ class Audience:
     def playing(self, workers: int) -> None:
         """So many workers play now; told every few seconds at least."""
 
-    def finished(self, config: EpisodeConfig, row: Row | None) -> None:
-        """An episode has ended; None when it failed."""
+    def finished(self, config: Task, row: Row | None) -> None:
+        """A task has ended; None when it failed."""
 
 
 def run_all(
-    configs: Sequence[EpisodeConfig],
+    configs: Sequence[Task],
     journal: Journal,
     workers: int,
     make_executor: ExecutorFactory = processes,
     audience: Audience | None = None,
+    attempt: Attempt = attempt,
 ) -> list[Failure]:
-    """Run every episode that the journal does not hold yet, seed by seed; returns those that failed.
+    """Run every task that the journal does not hold yet, in their order; returns those that failed.
 
-    An interrupt leaves every finished episode in the journal, in whole pairs but for the last seed. When a
-    worker dies, the episodes then in flight are run again one by one, so that only the guilty one fails.
-    Raises ClusterLost when a cluster's scheduler is gone.
+    An interrupt leaves every finished batch in the journal. When a worker dies, the batches then in flight are run
+    again one by one, so that only the guilty one fails. Raises ClusterLost when a cluster's scheduler is gone.
     """
-    run = _Run(journal, workers, make_executor, audience or Audience())
-    missing = (config for config in configs if config.digest() not in journal)
-    waiting = deque(sorted(missing, key=lambda config: config.seed))
+    run = _Run(journal, workers, make_executor, audience or Audience(), attempt)
+    waiting = deque(batches([config for config in configs if config.digest() not in journal]))
     while waiting:
         for suspect in run.together(waiting):
             run.alone(suspect)
@@ -62,15 +65,18 @@ def run_all(
 
 
 class _Run:
-    def __init__(self, journal: Journal, workers: int, make_executor: ExecutorFactory, audience: Audience):
+    def __init__(
+        self, journal: Journal, workers: int, make_executor: ExecutorFactory, audience: Audience, attempt: Attempt
+    ):
         self.failures: list[Failure] = []
+        self._attempt = attempt
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
         self._audience = audience
 
-    def together(self, waiting: deque[EpisodeConfig]) -> list[EpisodeConfig]:
-        """Run until nothing waits or a worker dies; returns the episodes in flight at a death.
+    def together(self, waiting: "deque[list[Task]]") -> list[Batch]:
+        """Run until nothing waits or a worker dies; returns the batches in flight at a death.
 
         No more are in flight than there are workers, so that few are suspected.
         """
@@ -82,22 +88,22 @@ class _Run:
                     self._land(flying)
             except BrokenExecutor:
                 wait(flying)
-        return [config for future, config in flying.items() if not self._kept(config, future)]
+        return [batch for future, batch in flying.items() if not self._kept(batch, future)]
 
-    def alone(self, config: EpisodeConfig) -> None:
-        """Run one episode in a worker of its own."""
+    def alone(self, batch: Batch) -> None:
+        """Run one batch in a worker of its own."""
         with self._make_executor(1) as executor:
-            future = _submit(executor, config)
+            future = self._submit(executor, batch)
             wait([future])
-        if not self._kept(config, future):
-            self._fail(config, "the worker process died")
+        if not self._kept(batch, future):
+            self._fail(batch, "the worker process died")
 
-    def _launch(self, executor: Executor, waiting: deque[EpisodeConfig], flying: Flying) -> None:
-        """Fill the places; a cluster without any gets one episode, which waits for a worker."""
+    def _launch(self, executor: Executor, waiting: "deque[list[Task]]", flying: Flying) -> None:
+        """Fill the places; a cluster without any gets one batch, which waits for a worker."""
         workers = places(executor, self._workers)
         self._audience.playing(workers)
         while waiting and len(flying) < max(workers, 1):
-            flying[_submit(executor, waiting[0])] = waiting[0]
+            flying[self._submit(executor, waiting[0])] = waiting[0]
             waiting.popleft()
 
     def _land(self, flying: Flying) -> None:
@@ -107,42 +113,43 @@ class _Run:
                 raise BrokenExecutor
             del flying[future]
 
-    def _kept(self, config: EpisodeConfig, future: Future[Row | str]) -> bool:
-        """Record how an episode ended; False when it was cut off by the death of a worker."""
+    def _kept(self, batch: Batch, future: Future[list[Row | str]]) -> bool:
+        """Record how a batch ended; False when it was cut off by the death of a worker."""
         error = future.exception()
         if isinstance(error, ClusterLost):
             raise error
         if isinstance(error, BrokenExecutor):
             return False
         if error is None:
-            self._record(config, future.result())
+            for config, ending in zip(batch, future.result(), strict=True):
+                self._record(config, ending)
         else:
-            self._fail(config, " ".join(f"{type(error).__name__}: {error}".split()))
+            self._fail(batch, " ".join(f"{type(error).__name__}: {error}".split()))
         return True
 
-    def _record(self, config: EpisodeConfig, ending: Row | str) -> None:
+    def _record(self, config: Task, ending: Row | str) -> None:
         if isinstance(ending, str):
-            self._fail(config, ending)
+            self._fail([config], ending)
         elif ending["digest"] != config.digest():
-            self._fail(config, "the worker runs another version of care-sim or of the policy")
+            self._fail([config], "the worker runs another version of care-sim or of the policy")
         else:
             self._journal.append(ending)
             self._audience.finished(config, ending)
 
-    def _fail(self, config: EpisodeConfig, reason: str) -> None:
-        self.failures.append(Failure(config, reason))
-        self._audience.finished(config, None)
+    def _fail(self, batch: Batch, reason: str) -> None:
+        for config in batch:
+            self.failures.append(Failure(config, reason))
+            self._audience.finished(config, None)
+
+    def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
+        """Hand a batch over; a fork server that does not answer at once on a busy machine is asked again."""
+        for patience_s in (0.5, 2.0):
+            try:
+                return executor.submit(self._attempt, batch)
+            except ConnectionError:
+                time.sleep(patience_s)
+        return executor.submit(self._attempt, batch)
 
 
-def _is_cut_off(future: Future[Row | str]) -> bool:
+def _is_cut_off(future: Future[list[Row | str]]) -> bool:
     return future.exception() is not None
-
-
-def _submit(executor: Executor, config: EpisodeConfig) -> Future[Row | str]:
-    """Hand an episode over; a fork server that does not answer at once on a busy machine is asked again."""
-    for patience_s in (0.5, 2.0):
-        try:
-            return executor.submit(attempt, config)
-        except ConnectionError:
-            time.sleep(patience_s)
-    return executor.submit(attempt, config)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from care_sim.study.entries import median
-from care_sim.study.episode import Row
 from care_sim.study.paper import CAMERA_POLICIES, paper_cells
 from care_sim.study.summary import Cell, summarise
+from care_sim.study.task import Row
 
 Cells = dict[tuple[str, str, float, str], Cell]
 """By scenario, policy, budget and camera fault ('' without one)."""

@@ -11,21 +11,26 @@ from care_sim.study import budget_figure, crowding_figure, faults_figure
 from care_sim.study.ablations import ablation_tables
 from care_sim.study.captions import CAPTION, COMPARED
 from care_sim.study.crowding import crowding_tables
-from care_sim.study.episode import Row
 from care_sim.study.faults import fault_tables
+from care_sim.study.kinds import EPISODES, PLAYS, Kind
 from care_sim.study.paper import NO_COLLISION
-from care_sim.study.rows import read_study
+from care_sim.study.protocol_captions import PROTOCOL_CAPTION
+from care_sim.study.protocol_closing import protocol_closing
+from care_sim.study.protocol_figures import FIGURE_NAMES, protocol_figures
+from care_sim.study.protocol_tables import protocol_tables
+from care_sim.study.rows import read_notes
 from care_sim.study.statements import statements
 from care_sim.study.table import Table
 from care_sim.study.tables import sweep_tables
+from care_sim.study.task import Row
 
 
 @dataclass(frozen=True)
 class Study:
     """How the rows of a study are shown: all pure functions of them.
 
-    `closing` are sentences after the tables; `figure_names` every figure that the study can draw; `caption` says
-    how to read its tables.
+    `closing` are sentences after the tables; `figure_names` every figure that the study can draw, as patterns in which
+    a * stands for any text; `caption` says how to read its tables; `kind` is what it plays.
     """
 
     name: str
@@ -34,6 +39,7 @@ class Study:
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
     caption: str = CAPTION
+    kind: Kind = EPISODES
 
 
 def collisions(rows: Sequence[Row]) -> str:
@@ -66,6 +72,7 @@ _ALL = (
     ),
     Study("ablate", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
     Study("faults", fault_tables, faults_figure.fault_figures, _sweep_closing, faults_figure.NAMES, COMPARED),
+    Study("protocol", protocol_tables, protocol_figures, protocol_closing, FIGURE_NAMES, PROTOCOL_CAPTION, PLAYS),
 )
 STUDIES = {study.name: study for study in _ALL}
 SWEEP = STUDIES["sweep"]
@@ -76,7 +83,7 @@ def study_of(path: Path) -> Study:
 
     Raises InvalidInput for the name of a study that this version does not know.
     """
-    name = read_study(path) or SWEEP.name
+    name = read_notes(path)[0] or SWEEP.name
     if name not in STUDIES:
         raise unknown(f"study in {path}", name, STUDIES)
     return STUDIES[name]

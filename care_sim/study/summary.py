@@ -13,7 +13,7 @@ from care_sim.errors import is_number
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.study.config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.contrasts import DETECTION, Contrast, contrast, detection
-from care_sim.study.episode import Row
+from care_sim.study.task import Row
 
 Conditions = tuple[tuple[str, Any], ...]
 
@@ -92,8 +92,13 @@ def key_of(row: Row) -> Key:
 
 def policy_of(row: Row) -> str:
     """The policy with its parameters."""
-    given = [(n.removeprefix("policy."), v) for n, v in row.items() if n.startswith("policy.") and v is not None]
-    return " ".join([row["policy"], *(f"{name}={_text(value)}" for name, value in given)])
+    return with_parameters(row, "policy")
+
+
+def with_parameters(row: Row, kind: str) -> str:
+    """The name in the column `kind`, with the parameters in the columns whose names begin with it and a dot."""
+    given = [(name.removeprefix(f"{kind}."), value) for name, value in row.items() if name.startswith(f"{kind}.")]
+    return " ".join([row[kind], *(f"{name}={_text(value)}" for name, value in given if value is not None)])
 
 
 def _text(value: Any) -> str:

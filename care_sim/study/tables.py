@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.study.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
 from care_sim.study.entries import ends, interval, marked, percent, spread, tag_notes, unsigned
-from care_sim.study.episode import Row
 from care_sim.study.paper import Published, paper_cells, published
 from care_sim.study.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
 from care_sim.study.table import Table
+from care_sim.study.task import Row
 
 COLUMNS = (
     "budget",

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from care_sim.study.config import EpisodeConfig
-from care_sim.study.episode import Row
+from care_sim.study.task import Row
 from care_sim.types import Keyframe, Outcome
 
 COLUMNS = ("time\ns", "speed\nm/s", "sensor to\nactor m", "hull to\nhull m", "cells\nfired", "seen", "found", "brake")

@@ -1,4 +1,4 @@
-"""Every registered environment through the same checks."""
+"""Every environment of the closed loop through the same checks."""
 
 import pickle
 import warnings
@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 import care_sim
 from care_sim.conditions import Conditions
-from care_sim.envs import IDS
+from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.reward import WEIGHTS
 from care_sim.scenarios.base import Scenario
@@ -61,7 +61,7 @@ def unexplained(caught):
     return [message for message in messages if not any(known in message for known in EXPLAINED)]
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_gymnasium_finds_nothing_to_complain_about(name):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -71,7 +71,7 @@ def test_gymnasium_finds_nothing_to_complain_about(name):
     assert unexplained(caught) == []
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_stable_baselines3_finds_nothing_to_complain_about(name):
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     with warnings.catch_warnings(record=True) as caught:
@@ -82,7 +82,7 @@ def test_stable_baselines3_finds_nothing_to_complain_about(name):
     assert unexplained(caught) == []
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_an_episode_stays_inside_its_spaces_and_ends(name):
     env = make(name, duration_s=2.0)
     observation, info = env.reset(seed=3)
@@ -111,7 +111,7 @@ def test_an_episode_stays_inside_its_spaces_and_ends(name):
     env.close()
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_the_import_name_makes_the_environment_too(name):
     env = gymnasium.make(f"care_sim:{name}", disable_env_checker=True)
     again = gymnasium.make(pickle.loads(pickle.dumps(env.spec)), disable_env_checker=True)
@@ -119,8 +119,8 @@ def test_the_import_name_makes_the_environment_too(name):
     assert again.unwrapped.scenario == env.unwrapped.scenario
 
 
-def test_every_environment_documents_itself():
-    for name in IDS:
+def test_it_documents_itself():
+    for name in CLOSED_LOOP:
         text = type(make(name).unwrapped).__doc__
         assert name in text
         for heading in ("### Action", "### Observation", "### Reward", "### Episode end", "### Arguments"):

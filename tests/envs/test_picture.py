@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.envs import IDS, drawing
+from care_sim.envs import CLOSED_LOOP, drawing
 from care_sim.envs.picture import BRAKING, DETECTED, HEIGHT, HIDDEN, TRACKED, WIDTH, draw_keyframe
 from care_sim.grid import AngularGrid
 from care_sim.pinhole import PinholeCamera
@@ -50,7 +50,7 @@ def dense():
     env.close()
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_it_has_one_size_before_and_after_the_first_scan(name):
     env, policy = make(name, render_mode="rgb_array")
     observation, _ = env.reset(seed=1)

@@ -6,12 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.errors import InvalidInput
-from care_sim.evaluation.recall import Tally, score
+from care_sim.evaluation import matching
+from care_sim.evaluation.recall import Score, Tally, score
 from care_sim.evaluation.sightings import Sightings
 from care_sim.film import Annotations
 from care_sim.frames import turned
 from care_sim.types import Detections
 
+NONE = np.zeros(0, bool)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -114,6 +116,12 @@ def test_censoring_can_be_set(shown, reported):
     assert score(scene, [reported()] * 3, censored_at=2).delays.tolist() == [2]
 
 
+@pytest.mark.parametrize("censored_at", [0, 2.5])
+def test_censoring_takes_a_whole_keyframe_at_least(shown, reported, censored_at):
+    with pytest.raises(InvalidInput, match="censored_at must be a whole number >= 1"):
+        score(Sightings.of("any", [shown()]), [reported()], censored_at)
+
+
 def test_an_empty_scene_has_nothing_to_find(shown, reported):
     assert score(Sightings.of("quiet", [shown(), shown()]), [reported(("car", 1, 1)), reported()]).tally() == Tally()
 
@@ -121,6 +129,29 @@ def test_an_empty_scene_has_nothing_to_find(shown, reported):
 def test_reports_must_be_one_a_keyframe(shown, reported):
     with pytest.raises(InvalidInput, match="scene brief: 2 keyframes need as many reports, got 1"):
         score(Sightings.of("brief", [shown(), shown()]), [reported()])
+
+
+def test_a_scene_matched_keyframe_by_keyframe_scores_the_same(street, detector):
+    keyframes = street(3)
+    reports, sightings = detector(keyframes, 4), Sightings.of("any", keyframes)
+    masks = [matching.found(shown, report) for shown, report in zip(keyframes, reports, strict=True)]
+    kept = Score.of(sightings, masks)
+    assert kept.tally().found > 0
+    assert kept.event_rows() == score(sightings, reports).event_rows()
+    assert Score.of(sightings, masks, censored_at=2).delays.max() == 2
+
+
+@pytest.mark.parametrize(
+    ("masks", "says"),
+    [
+        ([[]], "scene brief: 2 keyframes need as many masks, got 1"),
+        ([[], [True, False]], r"scene brief, keyframe 1: 1 annotations need a boolean mask \(1,\), got bool \(2,\)"),
+        ([[], [1]], r"scene brief, keyframe 1: 1 annotations need a boolean mask \(1,\), got int64 \(1,\)"),
+    ],
+)
+def test_masks_must_fit_the_annotations(shown, masks, says):
+    with pytest.raises(InvalidInput, match=says):
+        Score.of(Sightings.of("brief", [shown(), shown((1, "car", 9, 0))]), [np.array(m) if m else NONE for m in masks])
 
 
 def test_tallies_add():

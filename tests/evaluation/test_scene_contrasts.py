@@ -9,9 +9,9 @@ from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, a
 
 
 def tallies(*scenes):
-    """Scenes from (events, sighted), ten object frames an event, a frame found for each event sighted."""
+    """Scenes from (events, sighted), ten object frames an event, two frames found for each event sighted."""
     return {
-        f"scene {n}": Tally(events, sighted, 6 * (events - sighted), 10 * events, sighted)
+        f"scene {n}": Tally(events, sighted, 6 * (events - sighted), 10 * events, 2 * sighted)
         for n, (events, sighted) in enumerate(scenes)
     }
 
@@ -22,7 +22,7 @@ def test_levels_by_event_and_by_scene():
     assert found.by_event == pytest.approx(100 * 5 / 12)
     assert found.by_scene == pytest.approx(45.0)
     assert level(TTFD, tallies((10, 4), (2, 1))).by_event == pytest.approx(6 * 7 / 12)
-    assert level(OVERALL, tallies((10, 4), (2, 1))).by_event == pytest.approx(100 * 5 / 120)
+    assert level(OVERALL, tallies((10, 4), (2, 1))).by_event == pytest.approx(100 * 10 / 120)
 
 
 def test_a_level_of_nothing():
@@ -49,8 +49,9 @@ def test_a_contrast_turned_round_changes_its_sign():
 
 
 def test_a_policy_against_itself_is_certainly_equal():
-    same = tallies((10, 4), (2, 1), (5, 0))
-    assert contrast(FIRST_SIGHTING, same, same).by_event == (0.0, 0.0, 0.0)
+    same = tallies((10, 4), (2, 1), (5, 0), (9, 3), (1, 1))
+    found = contrast(FIRST_SIGHTING, same, same)
+    assert (found.by_event, found.scenes, found.excludes_zero) == ((0.0, 0.0, 0.0), 5, False)
 
 
 def test_scenes_are_paired_by_name_and_only_shared_ones_count():

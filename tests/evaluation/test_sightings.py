@@ -91,6 +91,23 @@ def test_an_object_annotated_twice_is_named(shown):
         Sightings.of("twins", [shown(), shown((3, "car", 1, 1), (5, "car", 2, 2), (5, "car", 3, 3))])
 
 
+def test_one_number_at_two_keyframes_is_one_object_and_numbers_may_have_gaps(shown):
+    scene = Sightings.of("gaps", [shown((900, "car", 5, 0)), shown((900, "car", 5, 0), (2, "car", 5, 0))])
+    assert events(scene) == [(1, 2)]
+
+
+@pytest.mark.parametrize("centre", [(np.nan, 0.0), (0.0, np.inf)])
+def test_an_object_that_is_nowhere_is_named(shown, centre):
+    with pytest.raises(InvalidInput, match="scene lost, keyframe 1: object 5 has no finite centre"):
+        Sightings.of("lost", [shown(), shown((3, "car", 1, 1), (5, "car", *centre))])
+
+
+@pytest.mark.parametrize("range_m", [-1.0, np.nan])
+def test_a_range_that_is_none_is_refused(shown, range_m):
+    with pytest.raises(InvalidInput, match="range_m must be a finite number >= 0"):
+        Sightings.of("any", [shown()], range_m)
+
+
 @given(SEEDS)
 def test_a_first_sighting_is_the_earliest_of_an_object_that_was_not_there_at_start(street, seed):
     keyframes = street(seed)

@@ -45,6 +45,17 @@ def test_velocity_from_two_frames_and_a_forecast_one_keyframe_ahead():
     assert memory.tracks(STILL).boxes[0, :2] == pytest.approx([10 + 8 * 0.2, 2 - 3 * 0.2])
 
 
+def test_each_detection_is_told_the_velocity_of_its_track_and_a_new_one_0():
+    """Over ground, in the axes of a sensor that looks along y; tracks that died leave gaps in the ids."""
+    memory, turned = TrackMemory(DT, MemoryRules(coast_s=0.0)), Frame(0.0, 0.0, 1.84, np.pi / 2)
+    gone = [("bus", 30, 30), ("car", 10, 2), ("pedestrian", 5, -5)]
+    memory.update(detections(*gone, sensor=turned), turned)
+    memory.predict()
+    ids = memory.update(detections(("bicycle", 9, 9), ("pedestrian", 5, -4.9), ("car", 10.8, 2), sensor=turned), turned)
+    assert ids.tolist() == [3, 2, 1]
+    assert memory.velocities(ids, turned) == pytest.approx(np.array([[0, 0], [1, 0], [0, -8]]))
+
+
 def test_velocity_follows_a_change_at_once():
     frames = moving("pedestrian", 10, 0, 0, 1, 3)
     last = frames[-1][0]

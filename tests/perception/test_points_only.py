@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_points import HEIGHT, shell
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.film import NOBODY, Annotations, Cloud
 from care_sim.perception.detectors import ReturnsProxy
 from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
@@ -23,6 +23,8 @@ def cloud(*bodies):
 
 
 SCENE = cloud((30, shell(8, 6, 0.4, 4.61, 1.95, 1.72)), (NOBODY, np.full((5, 3), 20.0)), (7, PERSON[None, :3]))
+
+FEW = f"returns must be whole numbers from 0 to the {len(SCENE)} points"
 
 
 class Says:
@@ -80,6 +82,12 @@ def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
     assert PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)[1].tolist() == [7, 30, NOBODY]
 
 
+def test_most_returns_on_an_object_decide_and_those_on_the_road_do_not():
+    """In the car's box: two returns of the person, three of the car, and four of the road."""
+    amid = Cloud(np.arange(9), np.tile(CAR[:3], (9, 1)), np.array([7, 7, 30, 30, 30, *[NOBODY] * 4]))
+    assert PointsOnly("mine", Says(detections()), HEIGHT).detect(amid, OBJECTS)[1].tolist() == [30]
+
+
 @pytest.mark.parametrize(
     ("found", "fault"),
     [
@@ -88,10 +96,17 @@ def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
         (detections(classes=np.array([0.5])), "classes must be whole numbers from 0 to 4"),
         (detections(classes=np.array([0, 1])), r"boxes must have the shape \(2, 7\), got \(1, 7\)"),
         (detections(boxes=CAR), r"boxes must have the shape \(1, 7\), got \(7,\)"),
-        (detections(boxes=np.full((1, 7), np.nan)), "boxes must be finite"),
+        (detections(boxes=np.full((1, 7), np.nan)), "boxes must be finite, in single precision"),
+        (detections(boxes=CAR[None] * 1e39), "boxes must be finite, in single precision"),
+        (detections(boxes=CAR[None] * [1, 1, 1, 1, 1, 0, 1]), "lengths, widths and heights of boxes must be above 0"),
         (detections(boxes=np.zeros((1, 7))), "lengths, widths and heights of boxes must be above 0"),
-        (detections(returns=np.array([-1])), "returns must be whole numbers of 0 or more"),
+        (detections(returns=np.array([-1])), FEW),
+        (detections(returns=np.array([len(SCENE) + 1])), FEW),
+        (detections(returns=np.array([2.5])), FEW),
         (detections(returns="many"), "returns must be an array of numbers, got 'many'"),
+        (detections(classes=None), "classes must be finite, in single precision"),
+        (detections(classes=["car"]), r"classes must be an array of numbers, got \['car'\]"),
+        (detections(scores=np.array([-0.1])), r"scores must lie in \[0, 1\]"),
         (detections(scores=np.array([1.5])), r"scores must lie in \[0, 1\]"),
         (detections(scores=np.array([])), r"scores must have the shape \(1,\), got \(0,\)"),
     ],
@@ -99,6 +114,40 @@ def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
 def test_what_is_no_detections_is_refused_with_the_detectors_name(found, fault):
     with pytest.raises(BrokenDetector, match=f"^detector mine:? {fault}$"):
         PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)
+
+
+@pytest.mark.parametrize(("count", "allowed"), [(500, True), (501, False)])
+def test_more_boxes_than_an_official_evaluation_takes_are_refused(count, allowed):
+    many = Detections(np.zeros(count), np.tile(CAR, (count, 1)), np.ones(count))
+    detector = PointsOnly("mine", Says(many), HEIGHT)
+    if allowed:
+        assert len(detector.detect(SCENE, OBJECTS)[0]) == count
+    else:
+        with pytest.raises(BrokenDetector, match=r"^detector mine: at most 500 detections are allowed, got 501$"):
+            detector.detect(SCENE, OBJECTS)
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [(SystemExit(3), "SystemExit: 3"), (InvalidInput("odd points"), "InvalidInput: odd points"),
+     (RuntimeError("first\n  second"), "RuntimeError: first second")],
+)  # fmt: skip
+def test_whatever_a_detector_raises_is_one_line_with_its_name(error, says):
+    class Raises:
+        def detect(self, points, height):
+            raise error
+
+    with pytest.raises(BrokenDetector, match=rf"^detector mine fails on \d+ points: {says}$"):
+        PointsOnly("mine", Raises(), HEIGHT).detect(SCENE, OBJECTS)
+
+
+def test_a_library_that_is_missing_says_so_itself():
+    class Lacks:
+        def detect(self, points, height):
+            raise MissingExtra("pip install 'mine[gpu]'")
+
+    with pytest.raises(MissingExtra, match=r"^pip install 'mine\[gpu\]'$"):
+        PointsOnly("mine", Lacks(), HEIGHT).detect(SCENE, OBJECTS)
 
 
 def test_a_detector_that_fails_is_named():
@@ -113,9 +162,9 @@ def test_a_detector_that_fails_is_named():
 def test_lists_and_no_detections_are_welcome():
     listed, _ = PointsOnly("mine", Says(Detections([4], [PERSON.tolist()], [2])), HEIGHT).detect(SCENE, OBJECTS)
     assert (listed.classes.dtype, listed.boxes.dtype, listed.scores) == (np.int64, np.float64, None)
-    nothing = Detections(np.array([]), np.empty((0, 7)), np.array([]))
-    found, objects = PointsOnly("mine", Says(nothing), HEIGHT).detect(SCENE, OBJECTS)
-    assert (len(found), len(objects)) == (0, 0)
+    for nothing in (Detections(np.array([]), np.empty((0, 7)), np.array([])), Detections([], [], [], [])):
+        found, objects = PointsOnly("mine", Says(nothing), HEIGHT).detect(SCENE, OBJECTS)
+        assert (len(found), found.boxes.shape, len(objects)) == (0, (0, 7), 0)
 
 
 def test_points_within_boxes():
@@ -124,6 +173,8 @@ def test_points_within_boxes():
     points = np.array([[2.3, 3.3, 0.4], [2.3, 0.7, 0.4], [1.0, 2.0, 0.6]])
     assert inside(points, box[None]).tolist() == [[True, False, False]]
     assert inside(points, np.empty((0, 7))).shape == (0, 3)
+    with pytest.raises(InvalidInput, match=r"boxes must have the shape \(n, 7\), got \(1, 6\)"):
+        inside(points, box[None, :6])
 
 
 def test_the_proxy_reports_objects_with_three_returns_and_their_true_boxes():

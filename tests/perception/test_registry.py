@@ -39,6 +39,18 @@ class Stubborn(Middle):
         raise RuntimeError("no weights")
 
 
+def listed(*places):
+    return Middle(len(places))
+
+
+def loose(**things):
+    return Middle(things["label"])
+
+
+def quits():
+    raise SystemExit(2)
+
+
 class Blind:
     """Detects nothing, by nothing."""
 '''
@@ -47,7 +59,8 @@ class Blind:
 @pytest.fixture
 def installed(install):
     things = {"middle": "Middle", "stubborn": "Stubborn", "blind": "Blind", "number": "module", "lost": "Nowhere"}
-    install("own_detectors", MODULE, returns="Middle", **things)
+    things |= {"listed": "listed", "loose": "loose", "quits": "quits"}
+    install("own_detectors", MODULE, returns="Middle", torchscript="Middle", **things)
 
 
 def test_ours_are_known():
@@ -61,7 +74,7 @@ def test_the_cluster_detector_finds_a_car_and_names_the_object(open3d):
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[3:] == ["blind", "lost", "middle", "number", "stubborn"]
+    assert detector_names()[3:] == ["blind", "listed", "loose", "lost", "middle", "number", "quits", "stubborn"]
     detector = make_detector("middle", HEIGHT, label=0)
     assert isinstance(detector, PointsOnly)
     found, _ = detector.detect(CLOUD, CAR)
@@ -69,14 +82,37 @@ def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
     assert found.classes.tolist() == [0]
 
 
+def test_a_maker_that_takes_any_number_of_things_needs_none(installed):
+    assert make_detector("listed", HEIGHT).detect(CLOUD, CAR)[0].classes.tolist() == [0]
+
+
+def test_a_maker_that_takes_parameters_by_any_name_is_handed_them(installed):
+    assert make_detector("loose", HEIGHT, label=2).detect(CLOUD, CAR)[0].classes.tolist() == [2]
+
+
 def test_a_built_in_name_is_taken(installed):
     assert isinstance(make_detector("returns", HEIGHT), ReturnsProxy)
+    with pytest.raises(InvalidInput, match="detector torchscript needs the parameter file"):
+        make_detector("torchscript", HEIGHT)
+
+
+def test_of_two_with_one_name_the_first_on_the_path_counts(install):
+    install("behind", MODULE, twin="Stubborn")
+    install("ahead", MODULE, twin="Middle")
+    assert len(make_detector("twin", HEIGHT).detect(CLOUD, CAR)[0]) == 1
+
+
+def test_a_package_that_ends_the_program_gets_one_line(install):
+    install("rude_detectors", "raise SystemExit('no device')", rude="Any")
+    with pytest.raises(BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"):
+        make_detector("rude", HEIGHT)
 
 
 @pytest.mark.parametrize(
     ("name", "line"),
     [
         ("stubborn", r"detector stubborn refuses \{\}: RuntimeError: no weights"),
+        ("quits", r"detector quits refuses \{\}: SystemExit: 2"),
         ("blind", "detector blind is no PointDetector: Blind has no method detect"),
         ("number", "detector number cannot be loaded: own_detectors:module makes nothing"),
         ("lost", "detector lost cannot be loaded: AttributeError: .*Nowhere"),
@@ -117,6 +153,20 @@ def scripted(torch, path):
 
     torch.jit.script(Middle()).save(str(path))
     return path
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_torchscript_file_that_gives_no_boxes_is_named(tmp_path):
+    torch = pytest.importorskip("torch")
+
+    class Flat(torch.nn.Module):
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            return torch.zeros(2, dtype=torch.int64), points[:2], torch.zeros(2)
+
+    torch.jit.script(Flat()).save(str(tmp_path / "flat.pt"))
+    detector = make_detector("torchscript", HEIGHT, file=tmp_path / "flat.pt")
+    with pytest.raises(BrokenDetector, match=r"torchscript fails .* boxes must have the shape \(n, 7\), got \(2, 3\)"):
+        detector.detect(CLOUD, CAR)
 
 
 @pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")

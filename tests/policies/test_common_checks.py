@@ -1,4 +1,4 @@
-"""What every policy keeps to in every scenario, over keyframes in which the hidden one appears."""
+"""What every policy keeps to in every environment, over keyframes in which the hidden one appears."""
 
 from itertools import product
 
@@ -11,15 +11,15 @@ from care_sim.allocation import allocate
 from care_sim.policies import BUILT_IN
 from care_sim.types import CLASSES, MAX_DETECTIONS, Belief, ImageDetections
 
-SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]
-BEFORE, KEYFRAMES = 24, 6
-"""The hidden one comes into view two or four keyframes later."""
+BEFORE = {"CARE-Dartout-v0": 24, "CARE-Dense-v0": 24, "CARE-CutIn-v0": 24, "CARE-Street-v0": 2, "CARE-Replay-v0": 2}
+"""Keyframes until the hidden one is about to come into view; on the street many are, on the log one is."""
+KEYFRAMES = 6
 
 
 def driven_to_the_encounter(env):
     """The observation there, the floor having fired until then; with a full scan, which is slow, an earlier one."""
     observation, _ = env.reset(seed=0)
-    for _ in range(BEFORE if observation["budget"] < 1 else 2):
+    for _ in range(BEFORE[env.spec.id] if observation["budget"] < 1 else 2):
         observation, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
     return read_only(observation)
 
@@ -41,13 +41,14 @@ def played(env, policy):
         observation = read_only(following)
 
 
-@pytest.fixture(scope="module", params=product(SCENARIOS, BUILT_IN), ids="-".join)
+@pytest.fixture(scope="module", params=product(BEFORE, BUILT_IN), ids="-".join)
 def case(request):
     """An environment, and the name of the policy for it."""
-    scenario, name = request.param
+    environment, name = request.param
     if name == "farthest-points":
         request.getfixturevalue("open3d")
-    env = gymnasium.make(scenario, budget=1.0 if name == "full" else 0.05)
+    place = {"source": f"argoverse2:{request.getfixturevalue('drive')}"} if environment == "CARE-Replay-v0" else {}
+    env = gymnasium.make(environment, budget=1.0 if name == "full" else 0.05, **place)
     yield env, name
     env.close()
 

@@ -7,7 +7,8 @@ import pytest
 import care_sim
 from care_sim.errors import InvalidInput
 from care_sim.policies import BUILT_IN, policy_names, tags_of
-from care_sim.study.selection import playable
+from care_sim.study.config import grid
+from care_sim.study.selection import made
 
 MODULE = '''
 import numpy as np
@@ -200,8 +201,11 @@ def test_a_policy_that_cannot_be_made_is_named_with_the_reason(broken, env, name
 
 def test_broken_policies_do_not_stop_the_others(broken, installed, env):
     assert set(BUILT_IN) | set(REASONS) | {"horizon", "leaving"} <= set(policy_names())
-    made, reasons = playable(["care", "torn", "horizon", "exploding", "leaving", "deaf"], ["dartout", "dense"], 0.1)
-    assert made == ["care", "horizon"]
+    sound, reasons = made(
+        ["care", "torn", "horizon", "exploding", "leaving", "deaf"],
+        lambda name: grid(["dartout", "dense"], [name], [0.1], [0]),
+    )
+    assert sound == ["care", "horizon"]
     assert reasons["torn"] == "policy torn cannot be loaded: AttributeError: module 'broken' has no attribute 'Nowhere'"
     assert reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3"
     assert reasons["exploding"] == "policy exploding refuses to start: KeyError: 'weights'"
@@ -219,7 +223,7 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
 )
 def test_what_a_user_got_wrong_stops_all(policies, common, complaint):
     with pytest.raises(InvalidInput, match=complaint):
-        playable(policies, ["dartout"], 0.1, **common)
+        made(policies, lambda name: grid(["dartout"], [name], [0.1], [0], **common))
 
 
 def test_a_function_that_makes_a_policy_is_one(broken, env):

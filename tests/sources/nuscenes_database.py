@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 LIDAR = ((0.943713, 0.0, 1.84023), (0.7077955, -0.0064922, 0.0106462, -0.7063073), None)
 SENSORS = {
@@ -32,17 +33,28 @@ SENSORS = {
         (809.221, 829.220, 481.778),
     ),
 }  # fmt: skip
-CATEGORIES = ("vehicle.car", "human.pedestrian.adult", "vehicle.bicycle", "vehicle.trailer", "vehicle.bus.rigid")
+CATEGORIES = (
+    "vehicle.car", "human.pedestrian.adult", "vehicle.bicycle", "vehicle.trailer", "vehicle.bus.rigid", "vehicle.truck",
+)  # fmt: skip
+ATTRIBUTES = ("vehicle.parked", "vehicle.moving", "cycle.without_rider", "pedestrian.standing", "pedestrian.moving")
 LEVELS = {"1": "v0-40", "2": "v40-60", "3": "v60-80", "4": "v80-100"}
 
 
-def annotated(category, place, size=(1.9, 4.6, 1.7), yaw=0.0, instance=None, visible="4", points=10):
+def annotated(category, place, size=(1.9, 4.6, 1.7), yaw=0.0, instance=None, visible="4", points=10, attribute=None):
     """An annotation in the world; `size` is width, length, height as in the table."""
+    attributes = [f"attribute-{attribute}"] if attribute else []
     return {
         "instance": instance or category, "category": category, "translation": list(place), "size": list(size),
         "rotation": [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)], "visibility_token": visible,
-        "num_lidar_pts": points, "num_radar_pts": 0,
+        "num_lidar_pts": points, "num_radar_pts": 0, "attribute_tokens": attributes,
     }  # fmt: skip
+
+
+def as_recorded(points):
+    """Rows of a sweep file for points (n, 3) in the car's frame."""
+    w, x, y, z = LIDAR[1]
+    own = Rotation.from_quat([x, y, z, w]).inv().apply(np.asarray(points) - LIDAR[0])
+    return np.column_stack([own, np.full(len(own), 7.0), np.zeros(len(own))])
 
 
 def pose(x=0.0, y=0.0, yaw=0.0):
@@ -55,6 +67,7 @@ def write(root, scenes, version="v1.0-trainval"):
     tables["sensor"] = [{"token": f"sensor-{c}", "channel": c, "modality": modality(c)} for c in SENSORS]
     tables["calibrated_sensor"] = [calibration(channel, *values) for channel, values in SENSORS.items()]
     tables["category"] = [{"token": f"category-{name}", "name": name, "description": ""} for name in CATEGORIES]
+    tables["attribute"] = [{"token": f"attribute-{name}", "name": name, "description": ""} for name in ATTRIBUTES]
     tables["visibility"] = [{"token": token, "level": level, "description": ""} for token, level in LEVELS.items()]
     tables["log"] = [{"token": "log", "logfile": "", "vehicle": "n015", "date_captured": "", "location": ""}]
     tables["map"] = [{"token": "map", "log_tokens": ["log"], "category": "semantic_prior", "filename": ""}]
@@ -125,13 +138,24 @@ def add_box(tables, token, sample, scene, box):
     instance, category = f"{scene}-{box.pop('instance')}", box.pop("category")
     if instance not in [row["token"] for row in tables["instance"]]:
         tables["instance"].append({
-            "token": instance, "category_token": f"category-{category}", "nbr_annotations": 1,
-            "first_annotation_token": token, "last_annotation_token": token,
+            "token": instance, "category_token": f"category-{category}", "nbr_annotations": 0,
+            "first_annotation_token": token, "last_annotation_token": "",
         })  # fmt: skip
-    links = {"prev": "", "next": "", "attribute_tokens": []}
+    prev = link(tables, instance, token)
     tables["sample_annotation"].append(
-        {"token": token, "sample_token": sample, "instance_token": instance} | box | links
+        {"token": token, "sample_token": sample, "instance_token": instance, "prev": prev, "next": ""} | box
     )
+
+
+def link(tables, instance, token):
+    """Make an annotation the last of its instance; the token of the one before it."""
+    (row,) = (row for row in tables["instance"] if row["token"] == instance)
+    prev = row["last_annotation_token"]
+    row.update(last_annotation_token=token, nbr_annotations=row["nbr_annotations"] + 1)
+    for box in tables["sample_annotation"]:
+        if box["token"] == prev:
+            box["next"] = token
+    return prev
 
 
 def change(root, table, edit, version="v1.0-trainval"):

@@ -1,8 +1,7 @@
 """One small scene of one car, and its film."""
 
 import numpy as np
-from nuscenes_database import LIDAR, annotated, pose, write
-from scipy.spatial.transform import Rotation
+from nuscenes_database import annotated, as_recorded, pose, write
 
 from care_sim.sources.nuscenes.films import film
 from care_sim.sources.nuscenes.splits import scenes
@@ -12,13 +11,6 @@ SCENE = "scene-0103"
 CAR = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a")
 WORLD = np.array([[18.0, 2.0, 0.8], [18.1, 1.9, 0.5], [18.0, 2.0, 0.3], [30.0, -5.0, 0.1], [0.95, 0.2, 1.4]])
 """Points in the world, the car at its origin: three on the rear of CAR, one on the road, one on our own roof."""
-
-
-def as_recorded(points):
-    """Rows of a sweep file for points (n, 3) in the car's frame."""
-    w, x, y, z = LIDAR[1]
-    own = Rotation.from_quat([x, y, z, w]).inv().apply(np.asarray(points) - LIDAR[0])
-    return np.column_stack([own, np.full(len(own), 7.0), np.zeros(len(own))])
 
 
 def database(folder, samples=None):

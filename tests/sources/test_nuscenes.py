@@ -2,8 +2,8 @@ import json
 
 import numpy as np
 import pytest
-from nuscenes_database import SENSORS, annotated, change, pose, write
-from nuscenes_scene import CAR, SCENE, WORLD, as_recorded, database, first
+from nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
+from nuscenes_scene import CAR, SCENE, WORLD, database, first
 from scipy.spatial.transform import Rotation
 
 from care_sim.errors import InvalidInput

@@ -2,8 +2,8 @@ import json
 
 import numpy as np
 import pytest
-from nuscenes_database import change, pose
-from nuscenes_scene import CAR, SCENE, WORLD, as_recorded, database, first
+from nuscenes_database import as_recorded, change, pose
+from nuscenes_scene import CAR, SCENE, WORLD, database, first
 
 from care_sim.errors import InvalidInput
 from care_sim.sources.nuscenes.splits import scenes

@@ -82,7 +82,7 @@ def test_the_digest_tells_every_parameter_apart():
 
 def test_the_digest_covers_the_code(monkeypatch):
     before = GOOD.digest()
-    monkeypatch.setattr("care_sim.study.config.code_digest", lambda: "edited")
+    monkeypatch.setattr("care_sim.study.task.code_digest", lambda: "edited")
     assert GOOD.digest() != before
     assert len(provenance.code_digest()) == 16
 
@@ -121,7 +121,7 @@ def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers
     monkeypatch.setattr(provenance, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
     ours = EpisodeConfig("dense", "near")
     before = ours.digest()
-    monkeypatch.setattr("care_sim.study.config.SESSION", "another run")
+    monkeypatch.setattr("care_sim.study.task.SESSION", "another run")
     assert EpisodeConfig("dense", "near").digest() != before
     assert pickle.loads(pickle.dumps(ours)).digest() == before
 

@@ -58,7 +58,7 @@ def test_the_heat_map_has_a_number_in_every_cell_and_frames_the_collapse():
 
 
 def test_only_figures_of_known_names_are_removed(tmp_path):
-    for name in ("a.png", "a.svg", "b.png", "mine.png"):
+    for name in ("a.png", "a.svg", "b.png", "mine.png", "c-1.png", "c-2.svg", "c-1.txt", "c.png"):
         (tmp_path / name).touch()
-    remove_others(tmp_path, ["a", "b"], kept={"b"})
-    assert {path.name for path in tmp_path.iterdir()} == {"b.png", "mine.png"}
+    remove_others(tmp_path, ["a", "b", "c-*"], kept={"b", "c-2"})
+    assert {path.name for path in tmp_path.iterdir()} == {"b.png", "mine.png", "c-2.svg", "c-1.txt", "c.png"}

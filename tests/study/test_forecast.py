@@ -102,7 +102,7 @@ class Clock:
 
 def test_lines_come_after_ten_seconds_then_each_minute_or_twentieth(capsys):
     clock = Clock()
-    lines = Lines(1000, clock)
+    lines = Lines(1000, "episodes", clock)
     for now, done in [(1, 0), (9, 5), (10, 6), (15, 500), (21, 501), (40, 510), (80, 520), (81, 530), (100, 579)]:
         clock.now = now
         lines(done, "6 min left" if now > 10 else "")
@@ -126,7 +126,7 @@ def test_the_reporter_counts_down_and_says_how_good_it_was():
     reporter.playing(2)
     assert shown[:3] == [(10, "no worker is connected"), (10, ""), (11, "39 s left")]
     assert shown[-1] == (50, "0 s left")
-    assert reporter.summary() == "40 episodes took 0:00:40; 0:00:40 predicted after 5%"
+    assert reporter.summary("episodes") == "40 episodes took 0:00:40; 0:00:40 predicted after 5%"
 
 
 def test_an_episode_that_fails_is_counted_and_takes_no_time():
@@ -136,7 +136,7 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
     reporter.playing(1)
     reporter.finished(configs[0], None)
     assert shown[-1] == (1, "0 s left")
-    assert reporter.summary() == "3 episodes took 0:00:00"
+    assert reporter.summary("episodes") == "3 episodes took 0:00:00"
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ import pytest
 from care_sim.study.config import EpisodeConfig, grid
 from care_sim.study.episode import run_episode, trace
 from care_sim.study.journal import Journal
-from care_sim.study.report import JOURNAL, ROWS, conduct
+from care_sim.study.kinds import EPISODES
+from care_sim.study.report import JOURNAL, conduct
 from care_sim.study.rows import read_rows
 from care_sim.study.runner import Audience, run_all
 from care_sim.types import Outcome
@@ -107,11 +108,11 @@ def test_the_hash_tells_episodes_apart_and_repeats():
 def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path):
     configs = short(["history", "full"], budgets=(0.05, 0.1))
     assert conduct(configs, tmp_path, workers=2) == []
-    rows = read_rows(tmp_path / ROWS)
+    rows = read_rows(tmp_path / EPISODES.file)
     assert [row["digest"] for row in rows] == [config.digest() for config in configs]
     assert rows[0]["episode_hash"] == run_episode(configs[0])["episode_hash"]
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"config.json", JOURNAL, ROWS, "tables.md", "tables.tex"}
+    assert names == {"config.json", JOURNAL, EPISODES.file, "tables.md", "tables.tex"}
 
 
 def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
@@ -124,7 +125,7 @@ def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
     lines = path.read_text().splitlines()
     assert lines[0] == first
     assert len(lines) == 4
-    assert len(read_rows(tmp_path / ROWS)) == 3
+    assert len(read_rows(tmp_path / EPISODES.file)) == 3
 
 
 def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):
@@ -160,7 +161,7 @@ def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_pat
     conduct(configs, tmp_path, workers=1)
     played = [json.loads(line)["seed"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
     assert played == [0, 0, 1, 1, 2, 2]
-    assert [row["digest"] for row in read_rows(tmp_path / ROWS)] == [config.digest() for config in configs]
+    assert [row["digest"] for row in read_rows(tmp_path / EPISODES.file)] == [config.digest() for config in configs]
 
 
 def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
@@ -194,7 +195,7 @@ def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
 def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):
     (failure,) = conduct(short(["history", "raises", "care"]), tmp_path, workers=1)
     assert failure.config.policy == "raises"
-    assert [row["policy"] for row in read_rows(tmp_path / ROWS)] == ["history", "care"]
+    assert [row["policy"] for row in read_rows(tmp_path / EPISODES.file)] == ["history", "care"]
     assert conduct(short(["history"]), tmp_path, workers=1) == []
 
 

@@ -9,30 +9,30 @@ from care_sim.errors import InvalidInput
 from care_sim.study import ablations, crowding, faults, paper
 from care_sim.study.annotation import annotated
 from care_sim.study.config import grid
-from care_sim.study.report import ROWS, conduct, print_report, write_report
+from care_sim.study.report import conduct, print_report, write_report
 from care_sim.study.rows import read_rows, write_rows
 from care_sim.study.studies import STUDIES, study_of
 
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_file_knows_its_study(name, tmp_path):
-    write_rows(STUDY, tmp_path / ROWS, name)
-    assert study_of(tmp_path / ROWS) is STUDIES[name]
+    write_rows(STUDY, tmp_path / "episodes.parquet", name)
+    assert study_of(tmp_path / "episodes.parquet") is STUDIES[name]
 
 
 def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
-    path = tmp_path / ROWS
+    path = tmp_path / "episodes.parquet"
     write_rows(STUDY, path)
     pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
     assert study_of(path).name == "sweep"
 
 
 def test_an_unknown_study_is_one_clear_line(tmp_path):
-    write_rows(STUDY, tmp_path / ROWS, "gardening")
+    write_rows(STUDY, tmp_path / "episodes.parquet", "gardening")
     with pytest.raises(
-        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, sweep"
+        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, protocol, sweep"
     ):
-        study_of(tmp_path / ROWS)
+        study_of(tmp_path / "episodes.parquet")
 
 
 EPISODES = {"sweep": STUDY, "paper": STUDY, "crowding": CROWD, "ablate": STUDY, "faults": STUDY}
@@ -65,15 +65,16 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     }
     for name, configs in played.items():
         rows = annotated([row(config, 10.0 + number % 7) for number, config in enumerate(configs)])
-        write_rows(rows, tmp_path / ROWS, name)
-        read = read_rows(tmp_path / ROWS)
+        write_rows(rows, tmp_path / "episodes.parquet", name)
+        read = read_rows(tmp_path / "episodes.parquet")
         tables = STUDIES[name].tables(read)
         assert tables == STUDIES[name].tables(rows)
         assert name == "paper" or all(all(line[:3]) for table in tables for line in table.rows)
 
 
 def test_no_study_is_left_out_above():
-    assert set(EPISODES) == set(STUDIES)
+    """The protocol has plays for episodes, and its own test."""
+    assert {*EPISODES, "protocol"} == set(STUDIES)
 
 
 def test_only_the_papers_study_quotes_the_paper_on_collisions():
@@ -86,5 +87,5 @@ def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
     configs = grid(["dense"], ["random", "full"], [0.1], [0], scenario_parameters=short)
     assert conduct(configs, tmp_path, workers=1, study=STUDIES["crowding"]) == []
     assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
-    assert study_of(tmp_path / ROWS).name == "crowding"
-    assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / ROWS)[0])
+    assert study_of(tmp_path / "episodes.parquet").name == "crowding"
+    assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / "episodes.parquet")[0])

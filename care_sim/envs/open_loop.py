@@ -1,0 +1,180 @@
+"""The open-loop environments: thin Gymnasium adapters around `care_sim.openloop`."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import lru_cache
+from os import PathLike
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
+from care_sim.errors import InvalidInput
+from care_sim.evaluation import matching
+from care_sim.evaluation.recall import Score
+from care_sim.evaluation.sightings import Sightings
+from care_sim.film import Film
+from care_sim.openloop import Exposure, OpenLoop
+from care_sim.perception.detectors import Detector
+from care_sim.perception.registry import PROXY, make_detector
+from care_sim.pinhole import PinholeCamera
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.sources.recordings import film_of, recordings
+from care_sim.streets.draft import KEYFRAME_S
+from care_sim.streets.recording import street_film
+from care_sim.types import Action
+
+UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
+"""Conditions that a film, once made, cannot take on."""
+
+
+class OpenLoopEnv(SensingEnv[OpenLoop]):
+    """A scene in which the agent chooses the LiDAR's cells and nothing reacts to what is seen.
+
+    ### Action
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score for every cell.
+
+    ### Observation
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs in both loops.
+
+    ### Reward
+    Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at best.
+
+    ### Episode end
+    Truncated after the last keyframe. `info` has `fired` (cells), `time_s`, and `objects` and `found`: how many
+    annotated objects are within 50 m, and how many of them were found; at the end `info["outcome"]`, a dict of
+    `care_sim.evaluation.recall.Tally`. `env.unwrapped.score` then holds event by event what was found.
+
+    ### Arguments
+    `budget` beta in (0, 1]; `detector` by name (`care_sim.perception.registry.detector_names`) and
+    `detector_parameters`; any field of `care_sim.conditions.Conditions` but those for which the scene would have to
+    be filmed anew: an error of the cameras' mount, the ray engine. `min_returns` is the `returns` detector's. A value
+    that is not allowed raises `care_sim.InvalidInput`.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 (Gymnasium's interface)
+
+    def __init__(
+        self,
+        cameras: tuple[PinholeCamera, ...],
+        sensor_height_m: float,
+        keyframe_s: float,
+        *,
+        budget: float = 0.10,
+        detector: str = PROXY,
+        detector_parameters: Mapping[str, object] | None = None,
+        render_mode: str | None = None,
+        **parameters: Any,
+    ):
+        if render_mode is not None:
+            raise InvalidInput(f"render_mode must be None, got {render_mode!r}")
+        for name in UNFILMED:
+            if name in parameters:
+                raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
+        conditions = conditions_of(parameters)
+        if parameters:
+            raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
+        super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s)
+        own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
+        self._detector = detector, own | dict(detector_parameters or {})
+        self._made_detector()
+        self.exposures: list[Exposure] = []
+        self._masks: list[matching.Mask] = []
+
+    @property
+    def score(self) -> Score:
+        """What was found of the scene; complete once the episode is over."""
+        return Score.of(self._sightings, self._masks)
+
+    def start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
+        """Begin an episode over a film. Camera faults, noise and floor have independent streams, which the scene's
+        name and the seed decide.
+        """
+        entropy = seed, crc32(film.name.encode())
+        camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(4)
+        self._sightings = _sightings(film)
+        self.exposures, self._masks = [], []
+        loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._made_detector())
+        return self.begin(loop, floor), {"seed": seed, "scene": film.name}
+
+    def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
+        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
+        loop = self.loop
+        fired, shot = self.chosen(action), loop.shot
+        exposure = loop.keyframe(fired)
+        found = matching.found(shot.annotations, exposure.detections)
+        self.exposures.append(exposure)
+        self._masks.append(found)
+        scored = found[self._sightings.scored(exposure.index)]
+        self._over = loop.over
+        info: dict[str, Any] = {"fired": self.reported(fired), "time_s": shot.time_s}
+        info |= {"objects": len(scored), "found": int(scored.sum())}
+        if self._over:
+            info["outcome"] = asdict(self.score.tally())
+        reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
+        return loop.belief.to_observation(), reward, False, self._over, info
+
+    def _made_detector(self) -> Detector:
+        name, parameters = self._detector
+        return make_detector(name, self.rig.sensor_height_m, **parameters)
+
+
+@lru_cache(maxsize=1)
+def _sightings(film: Film) -> Sightings:
+    return Sightings.of(film.name, [shot.annotations for shot in film.shots])
+
+
+class StreetEnv(OpenLoopEnv):
+    """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
+
+    The seed of `reset` draws the street (`care_sim.streets`) and everything else that is random.
+    """
+
+    __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
+
+    def __init__(self, **parameters: Any):
+        super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], KEYFRAME_S, **parameters)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin an episode in the street of a seed. `info` holds the seed that repeats it; there are no `options`."""
+        super().reset(seed=seed)
+        entropy = self.entropy(seed)
+        return self.start(street_film(entropy), entropy)
+
+
+class ReplayEnv(OpenLoopEnv):
+    """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
+
+    `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of their scenes by name;
+    the first, unless given. `split`, `version` and `camera_detections` are those of
+    `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token that points nowhere, raises
+    `care_sim.InvalidInput` with its name. The seed of `reset` draws faults, noise and floor.
+    """
+
+    __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
+
+    def __init__(
+        self,
+        *,
+        source: str,
+        scene: str | None = None,
+        split: str | None = None,
+        version: str | None = None,
+        camera_detections: str | PathLike[str] | None = None,
+        **parameters: Any,
+    ):
+        options = {"split": split, "version": version, "camera_detections": camera_detections}
+        recorded = recordings(source, options)
+        self.film = film_of(recorded, recorded.scenes()[0] if scene is None else scene)
+        super().__init__(self.film.cameras, self.film.sensor_height_m, self.film.keyframe_s, **parameters)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin the scene anew. `info` holds the seed that repeats the episode; there are no `options`."""
+        super().reset(seed=seed)
+        return self.start(self.film, self.entropy(seed))

@@ -1,0 +1,100 @@
+"""What the environments of both loops share: a rig, its spaces, and a budget that no action can overspend."""
+
+from typing import Any, Generic, TypeVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from care_sim.allocation import budget_cells, fired_cells
+from care_sim.conditions import Conditions
+from care_sim.envs.spaces import checked_scores, observation_space
+from care_sim.envs.truth import EpisodeTruth, Loop
+from care_sim.floor import Floor
+from care_sim.grid import AngularGrid, Cells
+from care_sim.pinhole import PinholeCamera
+from care_sim.sensors.lidar import dead_cells
+from care_sim.truth import Truth
+from care_sim.types import Action, Rig
+
+Observed = dict[str, NDArray[np.float32]]
+
+
+AnyLoop = TypeVar("AnyLoop", bound=Loop)
+
+
+class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
+    """An environment whose action scores the cells of the angular grid."""
+
+    def __init__(
+        self,
+        conditions: Conditions,
+        cameras: tuple[PinholeCamera, ...],
+        sensor_height_m: float,
+        budget: float,
+        keyframe_s: float,
+    ):
+        grid = AngularGrid()
+        dead_cells(grid, conditions.lidar_dead_rows)
+        self.conditions = conditions
+        self.rig = Rig(
+            grid,
+            cameras,
+            budget_cells(budget, grid.size),
+            conditions.reserve_fraction,
+            keyframe_s,
+            conditions.azimuth_margin,
+            conditions.elevation_margin,
+            sensor_height_m,
+        )
+        self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
+        self.observation_space = observation_space(self.rig)
+        self._running: AnyLoop | None = None
+        self._over = False
+
+    @property
+    def loop(self) -> AnyLoop:
+        """The running episode. Raises gymnasium.error.ResetNeeded before the first reset."""
+        if self._running is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
+        return self._running
+
+    @property
+    def truth(self) -> Truth:
+        """What privileged policies may ask for; `make_policy` hands it to them and to nobody else."""
+        return EpisodeTruth(lambda: self.loop)
+
+    def entropy(self, seed: int | None) -> int:
+        """The seed of an episode: the given one, else one that the environment's own generator draws."""
+        return seed if seed is not None else int(self.np_random.integers(2**32))
+
+    def begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
+        """Start an episode over a loop and a floor; its first observation."""
+        self._running, self._over = loop, False
+        self._floor = Floor(floor, self.conditions.floor_seed, self.rig.grid.size)
+        return loop.belief.to_observation()
+
+    def chosen(self, action: Action) -> Cells:
+        """The cells that `action` fires at the coming keyframe.
+
+        Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
+        gymnasium.error.ResetNeeded before `reset` and after the end.
+        """
+        if self._over:
+            raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
+        scores = checked_scores(action, self.rig.grid.shape)
+        floor = self._floor.next()
+        return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
+
+    def reported(self, fired: Cells) -> Cells | list[int]:
+        """The fired cells as `info` holds them: without the floor a list, since Gymnasium's vector environments stack
+        arrays of one length.
+        """
+        return fired if self.conditions.floor else fired.tolist()
+
+
+def conditions_of(parameters: dict[str, Any]) -> Conditions:
+    """The conditions among keyword arguments, which lose them. Raises InvalidInput for a value not allowed."""
+    names = [name for name in parameters if name in Conditions.__dataclass_fields__]
+    return Conditions(**{name: parameters.pop(name) for name in names})

@@ -1,0 +1,73 @@
+"""Detections in the results form of the nuScenes detection task, which the official devkit scores.
+
+The form: https://github.com/nutonomy/nuscenes-devkit/blob/master/python-sdk/nuscenes/eval/detection/README.md
+"""
+
+import numpy as np
+
+from care_sim.conditions import MIN_RETURNS
+from care_sim.film import Shot
+from care_sim.forgetting import ForgettingRules
+from care_sim.frames import Floats, turned
+from care_sim.sources.nuscenes.tables import Row
+from care_sim.types import CLASSES, Detections
+
+MODALITIES = {"use_camera": True, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False}
+"""What the form's `meta` must tell. The camera decides where a policy looks, the LiDAR measures the boxes."""
+MOST_BOXES = 500
+"""A sample with more is refused."""
+STANDING_MPS = ForgettingRules.static_mps
+"""Up to this speed nothing moves: the paper's tau_static."""
+_VEHICLE = ("vehicle.parked", "vehicle.moving")
+ATTRIBUTES = {
+    "car": _VEHICLE,
+    "truck": _VEHICLE,
+    "bus": _VEHICLE,
+    "bicycle": ("cycle.without_rider", "cycle.with_rider"),
+    "pedestrian": ("pedestrian.standing", "pedestrian.moving"),
+}
+"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. The others of the eight official
+attributes, a vehicle that only stopped and a person who sits, are nothing that a box and its speed could tell.
+"""
+
+
+def boxes(shot: Shot, detections: Detections, velocities: Floats) -> list[Row]:
+    """The detections (n) of a keyframe as boxes of its sample, surest first, the MOST_BOXES surest of more.
+
+    `velocities` (n, 2) m/s over ground, in sensor axes. In the form, places, headings and velocities are those of the
+    world, sizes are width, length and height, and a rotation is a quaternion w, x, y, z.
+    """
+    scores = confidences(detections)
+    order = np.argsort(-scores, kind="stable")[:MOST_BOXES]
+    world, moves = shot.sensor.boxes_to_world(detections.boxes), turned(velocities, shot.sensor.yaw)
+    columns = zip(detections.classes[order].tolist(), world[order], moves[order], scores[order].tolist(), strict=True)
+    return [{"sample_token": shot.token, **_box(CLASSES[label], *rest)} for label, *rest in columns]
+
+
+def confidences(detections: Detections) -> Floats:
+    """(n,) the detector's own scores; for one that has none n / (n + MIN_RETURNS) of n returns: a half where an
+    object begins to count, towards 1 with more, and never 0, which the devkit reads as a recall not reached.
+    """
+    if detections.scores is not None:
+        return detections.scores
+    scores: Floats = detections.returns / (detections.returns + MIN_RETURNS)
+    return scores
+
+
+def attribute(name: str, speed_mps: float) -> str:
+    """The official attribute of a class at a speed over ground."""
+    standing, moving = ATTRIBUTES[name]
+    return moving if speed_mps > STANDING_MPS else standing
+
+
+def _box(name: str, box: Floats, velocity: Floats, score: float) -> Row:
+    x, y, z, length, width, height, yaw = box.tolist()
+    return {
+        "translation": [x, y, z],
+        "size": [width, length, height],
+        "rotation": [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))],
+        "velocity": velocity.tolist(),
+        "detection_name": name,
+        "detection_score": score,
+        "attribute_name": attribute(name, float(np.hypot(*velocity))),
+    }

@@ -1,0 +1,114 @@
+"""Folders of recorded drives by a text, such as `argoverse2:FOLDER`: which scenes they hold, and their films."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from pathlib import Path
+from typing import ClassVar
+
+from care_sim.errors import InvalidInput, unknown
+from care_sim.film import Film
+from care_sim.sources import argoverse2
+from care_sim.sources.nuscenes import films, splits
+from care_sim.sources.nuscenes.detections import DetectionFile
+from care_sim.sources.nuscenes.tables import Database, Row
+
+
+@dataclass(frozen=True)
+class Recordings(ABC):
+    """The recorded scenes in a folder. Raises InvalidInput, with file and token, for what cannot be read."""
+
+    kind: ClassVar[str]
+    folder: Path
+
+    @abstractmethod
+    def scenes(self) -> list[str]:
+        """The names of all scenes, in order."""
+
+    @abstractmethod
+    def film(self, scene: str) -> Film:
+        """The film of a scene by name."""
+
+
+@dataclass(frozen=True)
+class Argoverse2(Recordings):
+    """Argoverse 2 sensor logs; a scene is a log."""
+
+    kind = "argoverse2"
+
+    def scenes(self) -> list[str]:
+        """The names of the log folders."""
+        return [log.name for log in argoverse2.logs(self.folder)]
+
+    def film(self, scene: str) -> Film:
+        """See `care_sim.sources.argoverse2.film`."""
+        logs = {log.name: log for log in argoverse2.logs(self.folder)}
+        if scene not in logs:
+            raise unknown(f"log in {self.folder}", scene, logs)
+        return argoverse2.film(logs[scene])
+
+
+@dataclass(frozen=True)
+class NuScenes(Recordings):
+    """A nuScenes v1.0 database: the scenes of a `split`, of a `version` where the folder holds several; the cameras'
+    boxes come from the file `camera_detections`, else from projected annotations.
+    """
+
+    kind = "nuscenes"
+    split: str = "val"
+    version: str | None = None
+    camera_detections: Path | None = None
+
+    def scenes(self) -> list[str]:
+        """The names of the split's scenes."""
+        return list(self._rows())
+
+    def film(self, scene: str) -> Film:
+        """See `care_sim.sources.nuscenes.films.film`."""
+        rows = self._rows()
+        if scene not in rows:
+            raise unknown(f"scene of the split {self.split} in {self.folder}", scene, rows)
+        detections = _detections(self.camera_detections) if self.camera_detections else None
+        return films.film(_database(self.folder, self.version), rows[scene], detections=detections)
+
+    def _rows(self) -> dict[str, Row]:
+        return {row["name"]: row for row in splits.scenes(_database(self.folder, self.version), self.split)}
+
+
+KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
+
+
+def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
+    """The recordings that a text `KIND:FOLDER` names, with the `options` of its kind; those that are None are not
+    given. Raises InvalidInput for another text, a folder that is none, an option that the kind does not have.
+    """
+    kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
+    if not (colon and folder) or kind not in KINDS:
+        known = " or ".join(f"{name}:FOLDER" for name in KINDS)
+        raise InvalidInput(f"source must be {known}, got {text!r}")
+    if not Path(folder).is_dir():
+        raise InvalidInput(f"source {text}: {folder} is no folder")
+    given = {name: value for name, value in (options or {}).items() if value is not None}
+    for name in given:
+        if name not in {field.name for field in fields(KINDS[kind])}:
+            raise InvalidInput(f"{name} says nothing to {kind} recordings")
+    if "camera_detections" in given:
+        given["camera_detections"] = Path(str(given["camera_detections"]))
+    return KINDS[kind](Path(folder), **given)
+
+
+@lru_cache(maxsize=1)
+def film_of(source: Recordings, scene: str) -> Film:
+    """The film of a scene; the last one is kept, for policies that meet the same scene in turn."""
+    return source.film(scene)
+
+
+@lru_cache(maxsize=1)
+def _database(root: Path, version: str | None) -> Database:
+    return Database(root, version)
+
+
+@lru_cache(maxsize=1)
+def _detections(path: Path) -> DetectionFile:
+    return DetectionFile(path)

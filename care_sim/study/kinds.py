@@ -1,0 +1,55 @@
+"""What a study plays: episodes of the closed loop, or plays of the open loop. How both run and are kept."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from care_sim.study import episode, plays
+from care_sim.study.annotation import annotated, tagged
+from care_sim.study.config import PLAIN_FIELDS, without_seeds
+from care_sim.study.play_config import PLAY_FIELDS, without_scenes
+from care_sim.study.runner import Attempt
+from care_sim.study.task import Row
+from care_sim.types import Outcome
+
+
+@dataclass(frozen=True)
+class Kind:
+    """`unit` is what its tasks are called. `attempt` plays a batch; `finish` makes rows side by side into those that
+    are kept; `file` holds them, with at least the columns `required`; `listed` are configurations as plain data.
+    `aside` are further files, as columns by name, made of the rows as they were played.
+    """
+
+    unit: str
+    attempt: Attempt
+    finish: Callable[[Sequence[Row]], list[Row]]
+    file: str
+    required: frozenset[str]
+    listed: Callable[[Any], list[dict[str, Any]]]
+    aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
+
+
+EPISODES = Kind(
+    "episodes",
+    episode.attempt,
+    annotated,
+    "episodes.parquet",
+    frozenset({*PLAIN_FIELDS, *Outcome.__dataclass_fields__}),
+    without_seeds,
+)
+PLAYS = Kind(
+    "plays",
+    plays.attempt,
+    lambda rows: [plays.without_events(row) for row in tagged(rows)],
+    "plays.parquet",
+    frozenset({*PLAY_FIELDS, *plays.SUMS}),
+    without_scenes,
+    lambda rows: {"events.parquet": plays.event_columns(rows)},
+)
+KINDS = (EPISODES, PLAYS)
+
+
+def kind_in(folder: Path) -> Kind:
+    """The kind of the results in a folder; episodes where there are none."""
+    return next((kind for kind in KINDS if (folder / kind.file).is_file()), EPISODES)

@@ -1,0 +1,132 @@
+"""What a play is made of: a policy in a scene whose film is the same for all."""
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import product
+from typing import Any, Self
+
+import gymnasium
+
+from care_sim.conditions import UNFELT_BY_FULL, Conditions
+from care_sim.envs.open_loop import UNFILMED
+from care_sim.errors import InvalidInput
+from care_sim.perception.registry import PROXY
+from care_sim.study.scenes import Scene, Source
+from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, collected, departures, flat
+
+_FILMED = [name for name in CONDITIONS if name not in UNFILMED]
+_USUAL = {field.name: field.default for field in fields(Conditions)}
+
+
+@dataclass(frozen=True)
+class PlayConfig(Conditions, Task):
+    """Everything that decides a play: the scene of a source, the policy, the detector, the conditions.
+
+    Raises InvalidInput for anything that environment, detector or policy does not accept; whether the scene can be
+    read shows when it is played.
+    """
+
+    source: Source
+    scene: Scene
+    policy: str
+    budget: float = 0.1
+    detector: str = PROXY
+    detector_parameters: Parameters = ()
+    policy_parameters: Parameters = ()
+
+    def __post_init__(self) -> None:
+        self.settle("detector_parameters", "policy_parameters")
+        for name in UNFILMED:
+            if getattr(self, name) != _USUAL[name]:
+                raise InvalidInput(f"{name} cannot be changed in the open loop: its films are made without")
+        with gymnasium.make("care_sim:CARE-Street-v0", disable_env_checker=True, **self._arguments()) as env:
+            self.make_policy(env)
+        super().__post_init__()
+
+    def of_scene(self, scene: Scene, floor_seed: int) -> Self:
+        """The same in another scene with another floor, which need no check."""
+        return self.changed(scene=scene, floor_seed=floor_seed)
+
+    def make_env(self) -> gymnasium.Env[Any, Any]:
+        """The environment of this play, not yet reset."""
+        name, place = self.source.environment(self.scene)
+        return gymnasium.make(f"care_sim:{name}", disable_env_checker=True, **place, **self._arguments())
+
+    def row(self) -> Row:
+        """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`."""
+        plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
+        own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
+        return self.source.row() | {"scene": self.scene.name} | plain | own
+
+    @property
+    def label(self) -> str:
+        """A short name for people: scene, policy, budget and what departs from the defaults."""
+        main = (*self.source.row(), "scene", "policy", "budget", *(() if self.detector != PROXY else ("detector",)))
+        return " ".join([f"{self.scene.name} {self.policy} {self.budget:.4g}", *departures(self, main)])
+
+    @property
+    def order(self) -> int:
+        """Scene by scene; they come in order."""
+        return 0
+
+    @property
+    def batch(self) -> Hashable:
+        """All plays of a scene share its film."""
+        return self.source, self.scene
+
+    @property
+    def likenesses(self) -> tuple[Likeness, ...]:
+        """Policy, budget and detector; policy and detector; the detector; nothing."""
+        return (self.policy, self.budget, self.detector), (self.policy, self.detector), (self.detector,), ()
+
+    def _arguments(self) -> dict[str, Any]:
+        conditions = {name: getattr(self, name) for name in _FILMED}
+        parameters = dict(self.detector_parameters)
+        return {"budget": self.budget, "detector": self.detector, "detector_parameters": parameters} | conditions
+
+
+PLAY_FIELDS = ["source", "scene", "policy", "budget", "detector", *_FILMED]
+"""Columns that every row of a play has."""
+
+
+def play_grid(
+    source: Source,
+    scenes: Sequence[Scene],
+    policies: Iterable[str],
+    budgets: Sequence[float],
+    floor_seeds: Sequence[int] = (0,),
+    camera_latencies: Sequence[int] = (0,),
+    **common: Any,
+) -> list[PlayConfig]:
+    """All combinations, scene by scene and without repeats; `full` plays once for all that it does not feel.
+
+    `common` are further fields of `PlayConfig`.
+    """
+    axes = product(camera_latencies, policies, budgets)
+    made = [
+        _config(source, scenes[0], policy, budget, {"camera_latency": latency} | common)
+        for latency, policy, budget in axes
+    ]
+    configs = dict.fromkeys(made)
+    return [
+        config.of_scene(scene, floor_seed)
+        for scene in scenes
+        for config in configs
+        for floor_seed in (floor_seeds if config.policy != "full" else (0,))
+    ]
+
+
+def _config(source: Source, scene: Scene, policy: str, budget: float, given: dict[str, Any]) -> PlayConfig:
+    if policy == "full":
+        budget, given = 1.0, given | {name: _USUAL[name] for name in UNFELT_BY_FULL}
+    return PlayConfig(source, scene, policy, budget, **given)
+
+
+def without_scenes(configs: Sequence[PlayConfig]) -> list[dict[str, Any]]:
+    """The configurations as plain data, each once, with the list of its scenes."""
+    return collected([_plain(config) for config in configs], "scene", "scenes")
+
+
+def _plain(config: PlayConfig) -> dict[str, Any]:
+    own = {name: value for name, value in asdict(config).items() if name not in UNFILMED}
+    return own | config.source.row() | {"scene": config.scene.name}

@@ -1,0 +1,178 @@
+"""The plays of a scene: every policy meets the same film; one tidy row a play, and its events."""
+
+import hashlib
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+import care_sim
+from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
+from care_sim.evaluation.recall import Score, Tally
+from care_sim.evaluation.strata import strata
+from care_sim.film import Film
+from care_sim.grid import Cells
+from care_sim.openloop import Exposure
+from care_sim.residual import explained
+from care_sim.study.episode import answer, peak_rss_mb
+from care_sim.study.play_config import PlayConfig
+from care_sim.study.task import Row
+
+REFERENCE = "care"
+"""The policy with whose allocations those of the others are compared."""
+SUMS = tuple(field.name for field in fields(Tally))
+EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
+"""What is known of an event before any policy plays."""
+_NAMES = ("source", "scene", "policy", "budget", "detector", "floor_seed", "camera_latency", "digest")
+"""Columns by which an event finds its play."""
+
+
+def attempt(batch: Sequence[PlayConfig]) -> list[Row | str]:
+    """What a worker does: the plays of one scene; of each its row, or in one line why there is none."""
+    scene = PlayedScene()
+    return [answer(scene.row, config) for config in batch]
+
+
+@dataclass(frozen=True)
+class Playback:
+    """What happened in a play. `tracks` and `explained` are means a keyframe: tracks held, and camera detections
+    that a forecast explains.
+    """
+
+    film: Film
+    score: Score
+    exposures: list[Exposure]
+    tracks: float
+    explained: float
+    wall_s: float
+
+    @property
+    def fired(self) -> list[Cells]:
+        """The cells of every keyframe."""
+        return [exposure.fired for exposure in self.exposures]
+
+
+class PlayedScene:
+    """Plays policies in one scene; those of the reference are kept, since the others are compared with them."""
+
+    def __init__(self) -> None:
+        self._references: dict[PlayConfig, Playback] = {}
+
+    def row(self, config: PlayConfig) -> Row:
+        """The row of a play.
+
+        Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the same film was
+        played, and `episode_hash`, over what was fired and detected; the fields of `Tally`, those of every stratum as
+        `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the events; `tracks` and `explained`;
+        `differing_keyframes` and `differing_cells` against the reference; `keyframes`, `wall_s`, `peak_rss_mb`.
+        """
+        playback = self._playback(config)
+        score = playback.score
+        return {
+            **config.row(),
+            "version": care_sim.__version__,
+            "digest": config.digest(),
+            "film_hash": film_hash(playback.film),
+            "episode_hash": _episode_hash(playback.exposures),
+            "keyframes": len(playback.exposures),
+            **asdict(score.tally()),
+            **_strata(score),
+            "ttfds": tuple(score.delays.tolist()),
+            "sightings": _sightings(score),
+            "tracks": playback.tracks,
+            "explained": playback.explained,
+            **self._difference(config, playback),
+            "wall_s": playback.wall_s,
+            "peak_rss_mb": peak_rss_mb(),
+        }
+
+    def _playback(self, config: PlayConfig) -> Playback:
+        if config != _reference(config):
+            return play(config)
+        if config not in self._references:
+            self._references[config] = play(config)
+        return self._references[config]
+
+    def _difference(self, config: PlayConfig, playback: Playback) -> Row:
+        reference = _reference(config)
+        if config.policy == "full" or config == reference:
+            return {"differing_keyframes": None, "differing_cells": None}
+        moved: AllocationDifference = allocation_difference(playback.fired, self._playback(reference).fired)
+        return {"differing_keyframes": moved.differing, "differing_cells": moved.cells}
+
+
+def play(config: PlayConfig) -> Playback:
+    """Play a policy through a scene. `wall_s` includes the film where this play is the scene's first."""
+    started = time.perf_counter()
+    with config.make_env() as env:
+        policy = config.make_policy(env)
+        observation, _ = env.reset(seed=config.scene.seed)
+        policy.reset()
+        loop = env.unwrapped.loop  # type: ignore[attr-defined]
+        counts = []
+        while not loop.over:
+            belief = loop.belief
+            counts.append((len(belief.tracks), int(explained(belief.detections, belief.tracks, loop.rig).sum())))
+            observation, *_ = env.step(policy(observation))
+        score, exposures = env.unwrapped.score, env.unwrapped.exposures  # type: ignore[attr-defined]
+    tracks, explanations = np.mean(counts, axis=0).tolist()
+    return Playback(loop.film, score, exposures, tracks, explanations, time.perf_counter() - started)
+
+
+def without_events(row: Row) -> Row:
+    """The row without what only its events need."""
+    return {name: value for name, value in row.items() if name != "sightings"}
+
+
+def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
+    """The events of all plays as columns of one table: the play's names, then what was seen where, and when found."""
+    counts = [len(row["ttfds"]) for row in rows]
+    names = {name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts) for name in _NAMES}
+    seen = {name: [value for row in rows for value in row["sightings"][name]] for name in EVENT_COLUMNS}
+    delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
+    return {**names, **seen, "detected": delays == 0, "ttfd": delays}
+
+
+@lru_cache(maxsize=1)
+def film_hash(film: Film) -> str:
+    """A hash over everything that a film shows."""
+    content = hashlib.sha256(repr((film.name, film.cameras, film.sensor_height_m, film.keyframe_s)).encode())
+    for shot in film.shots:
+        seen, sights, cloud = shot.annotations, shot.sights, shot.cloud
+        content.update(repr((shot.time_s, shot.token, shot.ego)).encode())
+        arrays = (seen.objects, seen.classes, seen.boxes, sights.detections.rows(), sights.objects)
+        for array in (*arrays, cloud.cells, cloud.points, cloud.objects):
+            content.update(np.ascontiguousarray(array).tobytes())
+    return content.hexdigest()[:16]
+
+
+def _reference(config: PlayConfig) -> PlayConfig:
+    """The play of the reference policy under the same conditions."""
+    return config.changed(policy=REFERENCE, policy_parameters=())
+
+
+def _strata(score: Score) -> Row:
+    return {
+        f"{kind}/{label}/{name}": value
+        for kind, masks in strata(score.sightings.frames).items()
+        for label, mask in masks.items()
+        for name, value in asdict(score.tally(mask)).items()
+    }
+
+
+def _sightings(score: Score) -> dict[str, list[Any]]:
+    """What is known of the events, as columns; metres and radians to three decimals."""
+    rows = score.event_rows()
+    columns = {name: [row[name] for row in rows] for name in EVENT_COLUMNS}
+    return {name: [round(v, 3) if isinstance(v, float) else v for v in column] for name, column in columns.items()}
+
+
+def _episode_hash(exposures: Sequence[Exposure]) -> str:
+    content = hashlib.sha256()
+    for exposure in exposures:
+        for array in (exposure.fired, exposure.detections.classes, exposure.detections.boxes):
+            content.update(np.ascontiguousarray(array).tobytes())
+    return content.hexdigest()[:16]

@@ -1,0 +1,44 @@
+"""What is said after the protocol's tables: how much was played, and whether the paper's gate is met."""
+
+from collections.abc import Sequence
+
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
+from care_sim.study.contrasts import GATE_POINTS
+from care_sim.study.entries import percent
+from care_sim.study.gaps import Pair
+from care_sim.study.protocol_entries import whole
+from care_sim.study.protocol_notes import counts
+from care_sim.study.protocol_paper import GATE
+from care_sim.study.protocol_rows import REFERENCE, Plays, plays_of
+from care_sim.study.task import Row
+
+
+def protocol_closing(rows: Sequence[Row]) -> list[str]:
+    """Size of the study, and CARE over history against the gate of five points in every plain setting."""
+    gates = [gate for plays in plays_of(rows) if not plays.setting.conditions if (gate := _gate(plays))]
+    return [_size(rows), *gates]
+
+
+def _size(rows: Sequence[Row]) -> str:
+    scenes = {(row["source"], row["scene"]): row for row in rows}
+    total, keyframes = counts(scenes.values()), sum(row["keyframes"] for row in scenes.values())
+    return (
+        f"Scenes: {len(scenes):,}, with {total.events:,.0f} first sightings and {total.frames:,.0f} object frames in "
+        f"{keyframes:,} keyframes; plays: {len(rows):,}."
+    )
+
+
+def _gate(plays: Plays) -> str:
+    pair = Pair(REFERENCE, "history", FIRST_SIGHTING)
+    gaps = {budget: gap for budget in plays.budgets if (gap := pair.gap(plays, budget))}
+    if not gaps:
+        return ""
+    measured = (
+        f"{whole(gap)} at {percent(budget)} ({'met' if _is_met(gap.mean, gap.sign) else 'not met'})"
+        for budget, gap in gaps.items()
+    )
+    return f'Paper: "{GATE}" Here, {plays.setting.label}: {", ".join(measured)}.'
+
+
+def _is_met(mean: float, sign: int) -> bool:
+    return sign > 0 and mean >= GATE_POINTS

@@ -1,0 +1,63 @@
+"""What stands under the protocol's tables: how much was played, what is missing, where the paper's numbers stand."""
+
+from collections.abc import Iterable, Iterator
+
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.recall import Tally
+from care_sim.study.entries import percent
+from care_sim.study.protocol_rows import FULL, Plays
+from care_sim.study.task import Row
+
+UNITS = "Recall in points; TTFD in keyframes, where less is better."
+FEW_SCENES = (
+    f"Fewer than {FEWEST_PAIRS} scenes allow no interval over scenes. Those shown come from resampling events, paired "
+    "and averaged over floor seeds; events of one scene are not independent, so these intervals are too narrow. "
+    "Overall recall and equal scene weights have none."
+)
+
+
+def played(plays: Plays) -> str:
+    """Scenes, events, object frames and floor seeds."""
+    total = counts(plays.scenes.values())
+    seeds = {len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets}
+    return (
+        f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} object frames; "
+        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene."
+    )
+
+
+def counts(scenes: Iterable[Row]) -> Tally:
+    """Events and object frames, given one row of every scene."""
+    return sum((Tally(events=row["events"], frames=row["frames"]) for row in scenes), Tally())
+
+
+def few_scenes(plays: Plays) -> tuple[str, ...]:
+    """What to know of the intervals where scenes are few."""
+    return (FEW_SCENES,) if len(plays.scenes) < FEWEST_PAIRS else ()
+
+
+def left_out(plays: Plays) -> tuple[str, ...]:
+    """How many scenes lack a play of a policy, which are therefore out of its levels and contrasts."""
+    missing = list(_missing(plays))
+    if not missing:
+        return ()
+    return (f"Left out where a play is missing, of {_several(len(plays.scenes), 'scene')}: {'; '.join(missing)}.",)
+
+
+def papers(sources: Iterable[str]) -> tuple[str, ...]:
+    """The paper's sentences, each once."""
+    return tuple(f'Paper: "{source}"' for source in dict.fromkeys(sources))
+
+
+def _missing(plays: Plays) -> Iterator[str]:
+    for policy in plays.policies:
+        lacking = {budget: len(plays.scenes) - len(plays.tallies(policy, budget)) for budget in plays.budgets}
+        listed = [f"{count} at {percent(budget)}" for budget, count in lacking.items() if count]
+        if listed:
+            yield f"{policy} {', '.join(listed)}"
+    if plays.full and (count := len(plays.scenes) - len(plays.tallies(FULL, 1.0))):
+        yield f"{FULL} {count}"
+
+
+def _several(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"

@@ -1,0 +1,123 @@
+"""Where CARE gains and what the residual filter changes: strata, thirds of scenes, and differing allocations."""
+
+from collections.abc import Iterator
+
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
+from care_sim.evaluation.strata import THIRDS
+from care_sim.study.entries import marked, percent, tag_notes
+from care_sim.study.gaps import GAP, RANKINGS, Pair, Third
+from care_sim.study.protocol_entries import PAPER, whole, written
+from care_sim.study.protocol_notes import UNITS, papers
+from care_sim.study.protocol_paper import ALLOCATIONS, statements_about
+from care_sim.study.protocol_rows import REFERENCE, Plays
+from care_sim.study.table import Table
+
+BASES = ("history", "all-camera")
+"""The policies that strata compare CARE with."""
+
+
+def strata_tables(plays: Plays) -> list[Table]:
+    """Recall by range, azimuth and class: levels, and CARE less the others; none without CARE."""
+    bases = [policy for policy in BASES if policy in plays.others]
+    if not bases:
+        return []
+    columns = ("stratum", "budget", REFERENCE, *bases, *(f"{REFERENCE} minus {base}" for base in bases))
+    note = "Intervals over scenes that have anything in the stratum, none of fewer than 5; levels in %."
+    return [
+        Table(
+            f"{plays.setting.label}: {ratio.name} by stratum",
+            (*columns[:2], "events" if ratio is FIRST_SIGHTING else "object frames", *columns[2:]),
+            tuple(_strata_lines(plays, ratio, bases)),
+            (note,),
+            terminal=False,
+        )
+        for ratio in (FIRST_SIGHTING, OVERALL)
+    ]
+
+
+def _strata_lines(plays: Plays, ratio: Ratio, bases: list[str]) -> Iterator[tuple[str, ...]]:
+    for kind, labels in plays.strata().items():
+        yield (kind,)
+        for label in labels:
+            for budget in plays.budgets:
+                yield _stratum_line(plays, ratio, bases, (f"{kind}/{label}", budget))
+
+
+def _stratum_line(plays: Plays, ratio: Ratio, bases: list[str], place: tuple[str, float]) -> tuple[str, ...]:
+    within, budget = place
+    found = plays.tallies(REFERENCE, budget, within)
+    levels = (plays.level(ratio, policy, budget, within).by_event for policy in (REFERENCE, *bases))
+    return (
+        within.partition("/")[2],
+        percent(budget),
+        f"{sum(map(ratio.denominator, found.values())):,.0f}",
+        *(written(ratio, value) for value in levels),
+        *(whole(Pair(REFERENCE, base, ratio, within).gap(plays, budget)) for base in bases),
+    )
+
+
+def thirds_tables(plays: Plays) -> list[Table]:
+    """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every budget."""
+    third = Third(GAP, "tracks", OVERALL)
+    if not {*third.policies} <= {*plays.policies} or not all(third.gap(plays, budget) for budget in plays.budgets):
+        return []
+    said = statements_about(plays.setting)
+    return [
+        Table(
+            f"{plays.setting.label}: care minus all-camera in thirds of the scenes",
+            ("third", *map(percent, plays.budgets)),
+            tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
+            (f"{UNITS} Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds.",),
+            papers(text.source for each, text in said.items() if isinstance(each, Third)),
+            terminal=False,
+        )
+    ]
+
+
+def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
+    yield (f"{RANKINGS[column]} a keyframe",)
+    for name in reversed(THIRDS):
+        yield (f"{name} third", *(_mean_count(plays, column, name, budget) for budget in plays.budgets))
+    for ratio in (OVERALL, FIRST_SIGHTING):
+        thirds = [Third(which, column, ratio) for which in (*reversed(THIRDS), GAP)]
+        yield (thirds[0].heading,)
+        for third in thirds:
+            yield from _third_lines(plays, third)
+
+
+def _third_lines(plays: Plays, third: Third) -> Iterator[tuple[str, ...]]:
+    yield (third.label, *(whole(third.gap(plays, budget)) for budget in plays.budgets))
+    if said := statements_about(plays.setting).get(third):
+        yield (PAPER, *(said.at(budget) for budget in plays.budgets))
+
+
+def _mean_count(plays: Plays, column: str, third: str, budget: float) -> str:
+    counts = plays.means(column, budget)
+    held = [counts[scene] for scene in plays.thirds(column, budget)[third]]
+    return f"{sum(held) / len(held):.1f}"
+
+
+def allocation_tables(plays: Plays) -> list[Table]:
+    """How often every policy fires other cells than CARE, and how many; none without CARE."""
+    if not plays.others:
+        return []
+    said = {} if plays.setting.conditions else {name: ALLOCATIONS[name] for name in plays.others if name in ALLOCATIONS}
+    lines: list[tuple[str, ...]] = []
+    for policy in plays.others:
+        lines.append((marked(policy, plays.tags[policy]), *(_differing(plays, policy, b) for b in plays.budgets)))
+        if policy in said:
+            lines.append((PAPER, *(said[policy].at(budget) for budget in plays.budgets)))
+    return [
+        Table(
+            f"{plays.setting.label}: keyframes on which the allocation differs from that of {REFERENCE}",
+            ("policy", *map(percent, plays.budgets)),
+            tuple(lines),
+            ("Share of the keyframes, and mean number of cells where they differ.", *tag_notes(plays.tags.values())),
+            papers(each.source for each in said.values()),
+        )
+    ]
+
+
+def _differing(plays: Plays, policy: str, budget: float) -> str:
+    found = plays.difference(policy, budget)
+    return f"{100 * found.share:.0f}%, {found.cells_where_differing:.0f} cells" if found.keyframes else ""

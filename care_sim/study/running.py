@@ -1,0 +1,79 @@
+"""How a command plays a study: over workers, into a folder, with what is left out named."""
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from care_sim.errors import InvalidInput
+from care_sim.study.options import USUAL
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from care_sim.study.task import Task
+
+DONE, FAILED = 0, 1
+PIPE_WIDTH = 180
+"""Columns of a table that is not printed on a terminal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Running:
+    """What commands have in common that play a study."""
+
+    workers: int = os.cpu_count() or 1
+    """Processes that play at the same time on this machine; a cluster plays as many as it has threads."""
+    cluster: str | None = None
+    """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
+
+    def conduct(self, study: str, configs: "Sequence[Task]", out: Path, left_out: Sequence[str] = ()) -> int:
+        """Play the tasks, print their tables, name those that failed and the policies that were left out."""
+        from care_sim.study import executors
+        from care_sim.study.report import conduct, print_report, reported, summary
+        from care_sim.study.studies import STUDIES
+
+        make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
+        failures = conduct(configs, out, self.workers, make_executor, STUDIES[study])
+        if len(failures) < len(configs):
+            rows, _, missing = reported(out)
+            print_report(rows, console(), STUDIES[study], missing)
+            print(f"Results are in {out}")
+        _name([*(f"failed: {line}" for line in summary(failures, STUDIES[study].kind.unit)), *left_out])
+        return FAILED if failures or left_out else DONE
+
+
+def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[str], list[str]]:
+    """The policies whose tasks `make` can make, and a line for each that cannot be made, which is printed too.
+
+    Raises InvalidInput where something else is wrong.
+    """
+    from care_sim.policies import policy_names
+    from care_sim.study.selection import expanded, made
+
+    policies, broken = made(expanded(names, policy_names()), make)
+    left_out = [f"left out: {reason}" for reason in broken.values()]
+    _name(left_out)
+    return policies, left_out
+
+
+def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
+    """The values of a condition that a sweep plays in turn; takes the one value out of `common`."""
+    one = common.pop(name)
+    if several and one != getattr(USUAL, name):
+        raise InvalidInput(f"give {name} one value or several, not both")
+    return several or (one,)
+
+
+def _name(problems: Sequence[str]) -> None:
+    for problem in problems:
+        print(f"care-sim: {problem}", file=sys.stderr)
+
+
+def console() -> "Console":
+    """Where tables are printed: a terminal as wide as it is, a pipe as wide as a table needs."""
+    from rich.console import Console
+
+    return Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=PIPE_WIDTH)

@@ -1,0 +1,141 @@
+"""What a study hands to its workers: a policy, and the world that it meets, named by a digest."""
+
+import hashlib
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Sequence
+from copy import copy
+from dataclasses import fields
+from functools import cached_property
+from typing import Any, Self
+
+import gymnasium
+import numpy as np
+
+import care_sim
+from care_sim.conditions import Conditions
+from care_sim.errors import check_whole
+from care_sim.policies import make_policy
+from care_sim.policies.base import Policy
+from care_sim.study.provenance import SESSION, code_digest, policy_digest
+
+Parameters = tuple[tuple[str, Any], ...]
+"""Names and values, of a scenario's physics, a policy or a detector."""
+
+Row = dict[str, Any]
+
+Likeness = tuple[object, ...]
+"""What tasks have in common."""
+
+LARGEST_SEED = 2**63 - 1
+"""What a column of a results file holds."""
+
+CONDITIONS = [field.name for field in fields(Conditions)]
+
+
+class Task(ABC):
+    """Everything that decides a row of a study. Subclasses are frozen dataclasses."""
+
+    policy: str
+    budget: float
+    policy_parameters: Parameters
+
+    @abstractmethod
+    def make_env(self) -> gymnasium.Env[Any, Any]:
+        """The environment, not yet reset."""
+
+    @abstractmethod
+    def row(self) -> Row:
+        """Every parameter flat; those that have parameters of their own as `WHAT.NAME`."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """A short name for people."""
+
+    @property
+    @abstractmethod
+    def order(self) -> int:
+        """Tasks with lower numbers are played first."""
+
+    @property
+    @abstractmethod
+    def batch(self) -> Hashable:
+        """Tasks with equal ones are handed to one worker together."""
+
+    @property
+    @abstractmethod
+    def likenesses(self) -> tuple[Likeness, ...]:
+        """What it shares with tasks that take as long, the closest likeness first."""
+
+    def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
+        """The policy for the environment."""
+        return make_policy(self.policy, env, **dict(self.policy_parameters))
+
+    def digest(self) -> str:
+        """Hash of the effective configuration; package version, code and an installed policy's code included.
+
+        It never repeats in another run when an installed policy has no source to read.
+        """
+        installed = policy_digest(self.policy)
+        code = [code_digest(), self._session if installed is None else installed]
+        effective = [sorted(self.row().items()), care_sim.__version__, *code]
+        return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
+
+    @cached_property
+    def _session(self) -> str:
+        """The run that first asked for the digest, which the workers keep."""
+        return SESSION
+
+    def changed(self, **values: object) -> Self:
+        """The same with other values of fields that need no check."""
+        other = copy(self)
+        for name, value in values.items():
+            object.__setattr__(other, name, value)
+        return other
+
+    def settle(self, *names: str) -> None:
+        """Make the parameters of these names what files can hold."""
+        for name in names:
+            object.__setattr__(self, name, tuple((key, _plain(value)) for key, value in getattr(self, name)))
+
+
+def departures(task: Task, without: Sequence[str]) -> list[str]:
+    """What of a task's row departs from the default conditions, as NAME=VALUE."""
+    usual = {field.name: field.default for field in fields(Conditions)}
+    return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != usual.get(n)]
+
+
+def flat(prefix: str, parameters: Parameters) -> Row:
+    """Parameters as columns."""
+    return {f"{prefix}.{name}": value for name, value in parameters}
+
+
+def check_seed(seed: object) -> None:
+    """Raise InvalidInput for a seed that no column holds."""
+    check_whole("seed", seed, 0, LARGEST_SEED)
+
+
+def batches(tasks: Sequence[Task]) -> list[list[Task]]:
+    """The tasks in the order in which they are played, those of a batch together."""
+    together: dict[Hashable, list[Task]] = {}
+    for task in sorted(tasks, key=lambda task: task.order):
+        together.setdefault(task.batch, []).append(task)
+    return list(together.values())
+
+
+def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[dict[str, Any]]:
+    """Configurations as plain data, each once, with the list of all values of an axis under its plural."""
+    values: dict[str, list[Any]] = {}
+    kept: dict[str, dict[str, Any]] = {}
+    for one in plain:
+        rest = {name: value for name, value in one.items() if name != axis}
+        key = json.dumps(rest)
+        kept[key] = rest
+        values.setdefault(key, []).append(one[axis])
+    return [{**rest, plural: values[key]} for key, rest in kept.items()]
+
+
+def _plain(value: Any) -> Any:
+    """A parameter's value as Python's own type, which files can hold."""
+    return value.item() if isinstance(value, np.generic) else tuple(value) if isinstance(value, list) else value

@@ -1,0 +1,212 @@
+"""The environments of the open loop: what Gymnasium asks, what the film decides, and what nothing may leak."""
+
+import pickle
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import care_sim
+from care_sim.envs import OPEN_LOOP
+from care_sim.errors import InvalidInput
+from care_sim.evaluation.recall import score
+from care_sim.evaluation.sightings import Sightings
+from care_sim.streets.recording import street_film
+
+EXPLAINED = ("symmetric and normalized Box action space", "unconventional shape")
+NOTHING = np.zeros((32, 512), np.float32)
+
+
+@pytest.fixture(params=OPEN_LOOP)
+def make(request, drive):
+    """Makes an environment of the open loop."""
+    place = {"source": f"argoverse2:{drive}"} if request.param == "CARE-Replay-v0" else {}
+    return lambda **arguments: gymnasium.make(request.param, disable_env_checker=True, **place, **arguments)
+
+
+@pytest.fixture
+def replay(drive):
+    """Makes the environment of the hand-built drive."""
+
+    def make(**arguments):
+        return gymnasium.make("CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{drive}", **arguments)
+
+    return make
+
+
+def played(env, policy, seed=0, **parameters):
+    """The infos and rewards of an episode."""
+    chooses = care_sim.make_policy(policy, env, **parameters)
+    observation, _ = env.reset(seed=seed)
+    chooses.reset()
+    infos, rewards, over = [], [], False
+    while not over:
+        assert env.observation_space.contains(observation)
+        observation, reward, terminated, over, info = env.step(chooses(observation))
+        assert not terminated
+        infos.append(info)
+        rewards.append(reward)
+    assert env.observation_space.contains(observation)
+    return infos, rewards
+
+
+def complaints(check, env):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check(env.unwrapped)
+    messages = [str(warning.message) for warning in caught]
+    return [message for message in messages if not any(known in message for known in EXPLAINED)]
+
+
+@pytest.mark.slow
+def test_gymnasium_finds_nothing_to_complain_about(make):
+    assert complaints(check_env, make()) == []
+
+
+def test_stable_baselines3_finds_nothing_to_complain_about(replay):
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    assert complaints(checker.check_env, replay()) == []
+
+
+def test_it_documents_itself_and_travels(make):
+    env = make(budget=0.2)
+    for heading in (env.spec.id, "### Action", "### Observation", "### Reward", "### Episode end", "### Arguments"):
+        assert heading in type(env.unwrapped).__doc__
+    again = gymnasium.make(pickle.loads(pickle.dumps(env.spec)), disable_env_checker=True)
+    assert again.unwrapped.rig.budget == env.unwrapped.rig.budget == 3277
+
+
+def test_an_episode_shows_every_keyframe_once_and_ends_with_the_tally(make):
+    env = make(budget=0.1)
+    infos, rewards = played(env, "care")
+    film = env.unwrapped.loop.film
+    assert [info["time_s"] for info in infos] == [shot.time_s for shot in film.shots]
+    assert all(len(set(info["fired"].tolist())) == 1638 for info in infos)
+    outcome = infos[-1]["outcome"]
+    assert outcome["frames"] == sum(info["objects"] for info in infos)
+    assert outcome["found"] == sum(info["found"] for info in infos)
+    assert rewards == [info["found"] / info["objects"] - 1 if info["objects"] else 0.0 for info in infos]
+    assert 0 < outcome["sighted"] <= outcome["events"]
+    with pytest.raises(gymnasium.error.ResetNeeded, match="over"):
+        env.step(NOTHING)
+
+
+def test_the_score_is_that_of_what_the_detector_reported(make):
+    env = make(budget=0.2)
+    played(env, "history")
+    film, exposures = env.unwrapped.loop.film, env.unwrapped.exposures
+    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots])
+    again = score(sightings, [exposure.detections for exposure in exposures])
+    assert again.tally() == env.unwrapped.score.tally()
+    assert again.event_rows() == env.unwrapped.score.event_rows()
+
+
+def test_the_person_at_the_house_is_the_one_event_and_the_camera_finds_it(replay):
+    outcomes = {}
+    for policy, budget in (("history", 0.05), ("care", 0.05), ("full", 1.0)):
+        infos, _ = played(replay(budget=budget), policy)
+        outcomes[policy] = infos[-1]["outcome"]
+    assert {outcome["events"] for outcome in outcomes.values()} == {1.0}
+    assert [outcomes[policy]["sighted"] for policy in ("history", "care", "full")] == [0.0, 1.0, 1.0]
+    assert outcomes["history"]["delay"] > outcomes["care"]["delay"] == 0
+
+
+def test_only_fired_cells_return(replay):
+    env = replay(budget=0.02)
+    env.reset(seed=0)
+    full = env.unwrapped.film.shots[0].cloud
+    observation, *_, info = env.step(NOTHING)
+    silent = np.ones(observation["ranges"].size, bool)
+    silent[info["fired"]] = False
+    assert not observation["ranges"].ravel()[silent].any()
+    returned = np.isin(info["fired"], full.cells)
+    assert (observation["ranges"].ravel()[info["fired"][returned]] < 50).all()
+    assert (observation["ranges"].ravel()[info["fired"][~returned]] == 50).all()
+
+
+def test_the_seed_draws_floor_and_faults_and_the_same_seed_the_same_episode(make):
+    def fired(seed, **conditions):
+        infos, _ = played(make(budget=0.02, **conditions), "random", seed)
+        return [info["fired"].tolist() for info in infos[:3]]
+
+    assert fired(3) == fired(3)
+    assert fired(3) != fired(4)
+    assert fired(3, floor_seed=1) != fired(3)
+
+
+def test_policies_meet_the_same_floor_and_misses(replay):
+    seen = []
+    for policy in ("random", "history"):
+        env = replay(false_negative_rate=0.5)
+        chooses = care_sim.make_policy(policy, env)
+        observation, _ = env.reset(seed=2)
+        for _ in range(4):
+            seen.append(observation["detections"])
+            observation, *_ = env.step(chooses(observation))
+    np.testing.assert_array_equal(seen[:4], seen[4:])
+    unimpaired, _ = replay().reset(seed=2)
+    assert not np.array_equal(seen[0], unimpaired["detections"])
+
+
+def test_a_camera_one_keyframe_old_shows_the_keyframe_before(replay):
+    fresh, late = replay(), replay(camera_latency=1)
+    before, _ = fresh.reset(seed=0)
+    late.reset(seed=0)
+    delayed, *_ = late.step(NOTHING)
+    np.testing.assert_array_equal(delayed["detections"][:, :6], before["detections"][:, :6])
+    assert set(delayed["detections"][delayed["detections"][:, 0] >= 0, 7]) == {0.5}
+
+
+def test_a_street_is_drawn_by_the_seed_and_filmed_once():
+    env = gymnasium.make("CARE-Street-v0", disable_env_checker=True)
+    _, info = env.reset(seed=7)
+    assert (info["seed"], info["scene"]) == (7, env.unwrapped.loop.film.name)
+    assert len(env.unwrapped.loop.film.shots) == 40
+    assert env.unwrapped.loop.film is street_film(7)
+
+
+def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):
+    env = replay(budget=1.0)
+    observation, _ = env.reset(seed=0)
+    for _ in range(2):
+        observation, *_ = env.step(np.ones_like(NOTHING))
+    belief, shot = care_sim.Belief.from_observation(observation), env.unwrapped.loop.shot
+    truth = env.unwrapped.truth.boxes(belief.tracks)
+    present = shot.annotations.boxes[:, :2]
+    nearest = np.linalg.norm(truth[:, None, :2] - present, axis=-1).min(axis=1)
+    assert len(truth) == len(present) == 3
+    np.testing.assert_allclose(nearest, 0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ({"engine": "bullet"}, "engine is no argument of the open loop"),
+        ({"camera_rotation_sigma_deg": 1.0}, "camera_rotation_sigma_deg is no argument of the open loop"),
+        ({"duration_s": 3.0}, "duration_s is no argument"),
+        ({"detector": "yolo"}, "unknown detector 'yolo'"),
+        ({"detector_parameters": {"size": 3}}, "unknown parameter of detector returns 'size'"),
+        ({"render_mode": "rgb_array"}, "render_mode must be None"),
+        ({"budget": 0.0}, "budget"),
+    ],
+)
+def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
+    with pytest.raises(InvalidInput, match=complaint):
+        make(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ({"source": "waymo:."}, "source must be argoverse2:FOLDER or nuscenes:FOLDER, got 'waymo:.'"),
+        ({"source": "argoverse2:nowhere"}, "source argoverse2:nowhere: nowhere is no folder"),
+        ({"source": "argoverse2:{drive}", "scene": "other"}, "unknown log in .* 'other'; known: drive"),
+        ({"source": "argoverse2:{drive}", "split": "val"}, "split says nothing to argoverse2 recordings"),
+    ],
+)
+def test_recordings_that_are_not_there_are_named(drive, arguments, complaint):
+    arguments = arguments | {"source": arguments["source"].format(drive=drive)}
+    with pytest.raises(InvalidInput, match=complaint):
+        gymnasium.make("CARE-Replay-v0", disable_env_checker=True, **arguments)

@@ -1,0 +1,29 @@
+import numpy as np
+import pytest
+
+from care_sim.odometry import Odometry
+from care_sim.types import Ego
+
+MOTION = Ego(8.0, 0.1, -1.0)
+
+
+def odometry(sigma, seed=0):
+    return Odometry(sigma, np.random.SeedSequence(seed))
+
+
+def test_without_noise_it_reads_what_is():
+    assert odometry(0.0).reading(MOTION) == MOTION
+
+
+def test_noise_is_on_the_speed_alone_and_seeded():
+    one, again, other = odometry(0.5), odometry(0.5), odometry(0.5, seed=1)
+    readings = [one.reading(MOTION) for _ in range(2000)]
+    assert {(reading.yaw_rate, reading.acceleration) for reading in readings} == {(0.1, -1.0)}
+    speeds = np.array([reading.speed for reading in readings])
+    assert (speeds.mean(), speeds.std()) == pytest.approx((8.0, 0.5), rel=0.05)
+    assert again.reading(MOTION) == readings[0] != other.reading(MOTION)
+
+
+def test_no_speed_is_read_below_zero():
+    noisy = odometry(0.5)
+    assert min(noisy.reading(Ego(0.1)).speed for _ in range(200)) == 0.0
