@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ class Frame:
         """(3,) world position."""
         return np.array([self.x, self.y, self.z])
 
-    @property
+    @cached_property
     def rotation(self) -> Rotation:
         """From the axes of this frame to those of the world."""
         return Rotation.from_euler("ZYX", [self.yaw, self.pitch, self.roll])

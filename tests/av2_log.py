@@ -41,3 +41,16 @@ def write(folder, sweeps, poses, name="annotations.feather"):
 def rewrite(path, change):
     """Change the table of a Feather file."""
     feather.write_feather(change(feather.read_table(path, memory_map=False)), path)
+
+
+def replaced(table, name, values):
+    return table.set_column(table.column_names.index(name), name, pa.array(values))
+
+
+CAR_AHEAD = box("REGULAR_VEHICLE", (15.0, 0.0, 0.42), track="a")
+"""Stands on the road: its bottom 0.33 m under the rear axle."""
+HERE = at()
+
+
+def parked(folder, *boxes, pose=HERE, sweeps=1):
+    return write(folder, [boxes] * sweeps, [pose] * sweeps)

@@ -13,7 +13,7 @@ from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
-from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.world.bullet import NOTHING, BulletWorld, Integers
 
 
 def _camera(yaw: float, position: tuple[float, float, float], width: float = 70.0) -> PinholeCamera:
@@ -47,18 +47,34 @@ def look_around(
     return sights_of([Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views], labels)
 
 
-def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame) -> Cloud:
-    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids."""
-    ranges, bodies = world.cast(sensor.origin, sensor.vectors_to_world(grid.directions), grid.range_m)
-    return cloud_of(grid, ranges, bodies)
+def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float) -> Cloud:
+    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids, of the road NOTHING or
+    the world's ground.
 
-
-def cloud_of(grid: AngularGrid, ranges: Floats, objects: Cells) -> Cloud:
-    """Returns from the range (N,) of every cell, inf without one, and the object (N,) behind it."""
+    `boxes` (n, 7) in the sensor frame hold all bodies. Rays are cast where these are; all others can only meet the
+    road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world without ground it hides
+    nothing.
+    """
+    covered = np.zeros(grid.size, dtype=bool)
+    for hull in grid.hulls(boxes):
+        covered[hull] = True
+    ranges, bodies = road_ranges(grid, height_m), np.full(grid.size, NOTHING)
+    directions = sensor.vectors_to_world(grid.directions[covered])
+    cast, hit = world.cast(sensor.origin, directions, grid.range_m)
+    ranges[covered] = np.where(hit == NOTHING, ranges[covered], cast)
+    bodies[covered] = hit
     (cells,) = np.nonzero(np.isfinite(ranges))
-    return Cloud(cells, grid.directions[cells] * ranges[cells, None], objects[cells])
+    return Cloud(cells, grid.directions[cells] * ranges[cells, None], bodies[cells])
+
+
+def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
+    """(N,) the distance along every ray to a plane `height_m` below the sensor, inf beyond the reach of a ray."""
+    fall = -grid.directions[:, 2]
+    ranges = np.divide(height_m, fall, out=np.full(grid.size, np.inf), where=fall > 0)
+    return np.where(ranges <= grid.range_m, ranges, np.inf)
 
 
 def numbers_of(bodies: Integers, numbers: Mapping[int, int]) -> Cells:
     """(n,) the number of the annotated object behind each body, NOBODY where there is none."""
-    return np.array([numbers.get(body, NOBODY) for body in bodies.tolist()], dtype=np.int64)
+    found, rows = np.unique(bodies, return_inverse=True)
+    return np.array([numbers.get(body, NOBODY) for body in found.tolist()], dtype=np.int64)[rows]

@@ -11,6 +11,7 @@ those objects there. Static surroundings are not annotated, so only what is anno
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from care_sim.errors import InvalidInput, unknown
@@ -28,9 +29,10 @@ CAR_FRAME_HEIGHT_M = 0.33
 """The origin of the car's frame, the middle of its rear axle, stands this far above the road: the wheels' radius, and
 where the returns of a recorded sweep lie within 10 m."""
 SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
-SWEEPS_A_KEYFRAME = 5
-"""Every fifth annotated sweep, from the first, is a keyframe: the annotations come at 10 Hz, keyframes at 2 Hz."""
 KEYFRAME_S = 0.5
+NANOSECONDS = 10**9
+HALF_SWEEP_NS = NANOSECONDS // 20
+"""Annotations come at 10 Hz: the nearest is this far from a moment at most, unless a sweep holds none."""
 
 CATEGORIES: dict[str, str | None] = {
     "REGULAR_VEHICLE": "car",
@@ -98,20 +100,23 @@ def film(log: Path, grid: AngularGrid | None = None) -> Film:
     """The film of a log, every cell of `grid` (the paper's, unless given) fired in every keyframe.
 
     Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a pose, an unknown
-    category.
+    category, an object annotated twice at once.
     """
-    boxes_file = _annotation_file(log)
-    boxes = _read_boxes(boxes_file)
-    sweeps = np.unique(boxes["timestamp_ns"])
-    cars = _car_frames(log / POSE_FILE, sweeps, boxes_file)
-    times = (sweeps - sweeps[0]) * 1e-9
+    boxes_file, pose_file = _annotation_file(log), log / POSE_FILE
+    sweeps, boxes = _read_boxes(boxes_file)
+    poses = _read_poses(pose_file)
+    for stamp in np.setdiff1d(sweeps, poses["timestamp_ns"])[:1]:
+        raise InvalidInput(f"{pose_file}: no pose for the timestamp {stamp} of {boxes_file.name}")
+    keyframes = _keyframes(sweeps, poses["timestamp_ns"])
+    moments = np.union1d(sweeps, keyframes)
+    cars = _car_frames(poses, moments)
+    times = (moments - moments[0]) / NANOSECONDS
     egos = motions(times, cars)
-    grid = grid or AngularGrid()
-    shots = []
-    for row in range(0, len(sweeps), SWEEPS_A_KEYFRAME):
+    grid, shots = grid or AngularGrid(), []
+    for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
-        seen = shoot(_props(boxes, sweeps[row]), sensor, SENSOR_HEIGHT_M, grid)
-        shots.append(Shot(float(times[row]), str(sweeps[row]), sensor, egos[row], *seen))
+        seen = shoot(_props(boxes, moments[row]), sensor, SENSOR_HEIGHT_M, grid)
+        shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
     return Film(log.name, SURROUND_CAMERAS, SENSOR_HEIGHT_M, KEYFRAME_S, tuple(shots))
 
 
@@ -126,41 +131,73 @@ def _annotation_file(log: Path) -> Path:
     return found[0]
 
 
-def _read_boxes(path: Path) -> Columns:
-    """The checked annotations, without the recording car, each with the `number` of its track in the film."""
+def _read_boxes(path: Path) -> tuple[Cells, Columns]:
+    """The annotated timestamps (n,), ascending, and the checked annotations, without the recording car, each with the
+    `number` of its track in the film.
+    """
     boxes = read_columns(path, _BOX_TYPES)
-    kept = boxes["category"] != RECORDING_CAR
+    sweeps, kept = np.unique(boxes["timestamp_ns"]), boxes["category"] != RECORDING_CAR
     boxes = {name: column[kept] for name, column in boxes.items()}
-    if not len(boxes["category"]):
+    if not kept.any():
         raise InvalidInput(f"{path}: no annotations")
     for category in np.unique(boxes["category"]).tolist():
         if category not in CATEGORIES:
             raise InvalidInput(f"{path}: {unknown('category', category, CATEGORIES)}")
-    flat = (_table(boxes, _SIZE) <= 0).any(axis=1)
-    if flat.any():
-        raise InvalidInput(f"{path}: track {boxes['track_uuid'][flat][0]} has a box without length, width or height")
-    _turns(path, boxes)
-    return boxes | {"number": np.unique(boxes["track_uuid"], return_inverse=True)[1]}
+    numbers = np.unique(boxes["track_uuid"], return_inverse=True)[1]
+    for wrong, message in (
+        ((_table(boxes, _SIZE) <= 0).any(axis=1), "has a box without length, width or height"),
+        (~_table(boxes, _TURN).any(axis=1), "has a quaternion qw, qx, qy, qz of length zero"),
+        (_repeated(np.column_stack([boxes["timestamp_ns"], numbers])), "is annotated twice"),
+    ):
+        if wrong.any():
+            row = wrong.argmax()
+            raise InvalidInput(f"{path}: track {boxes['track_uuid'][row]} {message} at {boxes['timestamp_ns'][row]}")
+    return sweeps, boxes | {"number": numbers}
 
 
-def _car_frames(path: Path, sweeps: Cells, annotated_in: Path) -> list[Frame]:
-    """The car's frame at every sweep. The world is the city's frame, moved to the first."""
+def _read_poses(path: Path) -> Columns:
+    """The checked poses of the car, in order of time."""
     poses = read_columns(path, _POSE_TYPES)
-    rows = {stamp: row for row, stamp in enumerate(poses["timestamp_ns"].tolist())}
-    for stamp in sweeps.tolist():
-        if stamp not in rows:
-            raise InvalidInput(f"{path}: no pose for the timestamp {stamp} of {annotated_in.name}")
-    chosen = [rows[stamp] for stamp in sweeps.tolist()]
-    places = _table(poses, _PLACE)[chosen]
-    turns = _turns(path, poses)[chosen]
+    stamps = poses["timestamp_ns"]
+    for wrong, message in (
+        (~_table(poses, _TURN).any(axis=1), "a quaternion qw, qx, qy, qz of length zero"),
+        (_repeated(stamps[:, None]), "two poses"),
+    ):
+        if wrong.any():
+            raise InvalidInput(f"{path}: {message} at {stamps[wrong.argmax()]}")
+    order = np.argsort(stamps)
+    return {name: column[order] for name, column in poses.items()}
+
+
+def _repeated(rows: Cells) -> NDArray[np.bool_]:
+    """(n,) which rows (n, k) stand further up as well."""
+    repeated = np.ones(len(rows), dtype=bool)
+    repeated[np.unique(rows, axis=0, return_index=True)[1]] = False
+    return repeated
+
+
+def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
+    """Timestamps every half second from the first annotated sweep to the last: of the annotated sweep that is
+    nearest, or, where the sweep holds no annotation, of the nearest pose. Both ascend.
+    """
+    moments = np.arange(sweeps[0], sweeps[-1] + HALF_SWEEP_NS, round(KEYFRAME_S * NANOSECONDS))
+    annotated = _nearest(sweeps, moments)
+    chosen = np.where(np.abs(annotated - moments) <= HALF_SWEEP_NS, annotated, _nearest(posed, moments))
+    return np.unique(chosen)
+
+
+def _nearest(stamps: Cells, moments: Cells) -> Cells:
+    """(m,) the nearest of ascending `stamps` (n,) to every one of `moments` (m,)."""
+    after = np.clip(np.searchsorted(stamps, moments), 1, max(len(stamps) - 1, 1))
+    before, after = stamps[after - 1], stamps[np.minimum(after, len(stamps) - 1)]
+    return np.where(moments - before <= after - moments, before, after)
+
+
+def _car_frames(poses: Columns, moments: Cells) -> list[Frame]:
+    """The car's frame at every moment, each of which has a pose. The world is the city's, moved to the first."""
+    rows = np.searchsorted(poses["timestamp_ns"], moments)
+    places, turns = _table(poses, _PLACE)[rows], Rotation.from_quat(_table(poses, _TURN)[rows])
     return [Frame.turned_by(turn, place) for turn, place in zip(turns, places - places[0], strict=True)]
-
-
-def _turns(path: Path, columns: Columns) -> Rotation:
-    quaternions = _table(columns, _TURN)
-    if not np.linalg.norm(quaternions, axis=1).all():
-        raise InvalidInput(f"{path}: a quaternion qw, qx, qy, qz of length zero")
-    return Rotation.from_quat(quaternions)
 
 
 def _props(boxes: Columns, sweep: int) -> list[Prop]:

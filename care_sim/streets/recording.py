@@ -1,5 +1,6 @@
 """The film of a street: at every keyframe the whole grid is cast once, and six cameras are rendered."""
 
+from contextlib import closing
 from functools import lru_cache
 
 import numpy as np
@@ -29,12 +30,10 @@ def record(
     An object is annotated at a keyframe where a return of the full sweep lies on it or a camera shows it: nuScenes
     annotates what has at least one LiDAR or radar point, and nobody could have seen what is wholly hidden.
     """
-    world = BulletWorld()
-    try:
+    grid = grid or AngularGrid()
+    with closing(BulletWorld()) as world:
         stage = _Stage(street, world)
-        shots = tuple(stage.shot(k, grid or AngularGrid(), cameras) for k in range(len(street.ego)))
-    finally:
-        world.close()
+        shots = tuple(stage.shot(k, grid, cameras) for k in range(len(street.ego)))
     return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots)
 
 
@@ -49,7 +48,7 @@ class _Stage:
 
     def __init__(self, street: Street, world: BulletWorld):
         self._street, self._world = street, world
-        self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds])
+        self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
         self._classes = np.array([NOBODY if label is None else CLASSES.index(label) for label in labels])
         self._bodies: dict[int, int] = {}
@@ -60,12 +59,13 @@ class _Stage:
         x, y, yaw = street.ego[keyframe].tolist()
         sensor = Frame.mounted((x, y, yaw), LIDAR_POSITION)
         near = self._set_up(keyframe, sensor)
-        labelled = near[self._classes[near] != NOBODY]
-        boxes = sensor.boxes_to_local(self._boxes(keyframe, labelled))
+        everything = sensor.boxes_to_local(self._boxes(keyframe, near))
+        reported = self._classes[near] != NOBODY
+        labelled, boxes = near[reported], everything[reported]
         numbers = {self._bodies[number]: number for number in labelled.tolist()}
         labels = {body: int(self._classes[number]) for body, number in numbers.items()}
         seen = look_around(self._world, cameras, sensor, labels, boxes)
-        swept = full_sweep(self._world, grid, sensor)
+        swept = full_sweep(self._world, grid, sensor, everything, LIDAR_POSITION[2])
         sights = Sights(seen.detections, numbers_of(seen.objects, numbers))
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
         shown = np.isin(labelled, np.concatenate([cloud.objects, sights.objects]))

@@ -81,8 +81,8 @@ class BulletWorld:
             hits += pybullet.rayTestBatch(sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client)
         if len(hits) != len(targets):
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
-        columns = list(zip(*hits, strict=True)) if hits else [(), (), ()]
-        ids, shares = np.array(columns[0], np.int64), np.array(columns[2], np.float64)
+        ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
+        shares = np.fromiter((hit[2] for hit in hits), np.float64, len(hits))
         return np.where(ids == NOTHING, np.inf, shares * reach), ids
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window | None = None) -> Integers:

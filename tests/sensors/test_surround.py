@@ -1,3 +1,5 @@
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from care_sim.film import NOBODY
 from care_sim.frames import Frame
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.bullet import NOTHING, BulletWorld
 
 SENSOR = Frame(3.0, -2.0, 1.84, 0.6, roll=0.03, pitch=-0.02)
 
@@ -22,16 +25,42 @@ def test_the_ring_is_as_wide_as_nuscenes_says():
     assert degrees == [(0, 70), (55, 70), (-55, 70), (110, 70), (-110, 70), (180, 110)]
 
 
-def test_a_full_sweep_holds_every_return_at_its_place(bullet, grid):
-    body = bullet.add(CATALOGUE["bus"], (15.0, 4.0, 0.3))
-    cloud = full_sweep(bullet, grid, SENSOR)
-    ranges, bodies = bullet.cast(SENSOR.origin, SENSOR.vectors_to_world(grid.directions), grid.range_m)
+@pytest.fixture
+def bare():
+    """A world without ground."""
+    with closing(BulletWorld(ground=False)) as world:
+        yield world
+
+
+def test_a_full_sweep_holds_every_return_at_its_place(bare, grid):
+    """Casting at every cell finds the same, also from a sensor that leans."""
+    poses = {
+        "bus": (15.0, 4.0, 0.3),
+        "car": (4.5, -4.0, 1.2),
+        "building": (0.0, -30.0, 0.0),
+        "pedestrian": (-9.0, 3.0, 0),
+    }
+    for name, pose in poses.items():
+        bare.add(CATALOGUE[name], pose)
+    boxes = np.array([[x, y, CATALOGUE[n].size[2] / 2, *CATALOGUE[n].size, yaw] for n, (x, y, yaw) in poses.items()])
+    for sensor in (SENSOR, Frame(3.0, -2.0, 1.84, 0.6)):
+        cloud = full_sweep(bare, grid, sensor, sensor.boxes_to_local(boxes), 1.84)
+        ranges, bodies = bare.cast(sensor.origin, sensor.vectors_to_world(grid.directions), grid.range_m)
+        hit = cloud.objects != NOTHING
+        assert np.array_equal(cloud.cells[hit], np.flatnonzero(np.isfinite(ranges)))
+        assert np.array_equal(cloud.objects[hit], bodies[cloud.cells[hit]])
+        assert np.linalg.norm(cloud.points[hit], axis=1) == pytest.approx(ranges[cloud.cells[hit]])
+        assert set(bodies.tolist()) == {NOTHING, *range(len(poses))}
+
+
+def test_the_road_is_where_a_ground_plane_would_be_hit(bullet, grid):
+    upright = Frame(3.0, -2.0, 1.84, 0.6)
+    with closing(BulletWorld(ground=False)) as bare:
+        cloud = full_sweep(bare, grid, upright, np.empty((0, 7)), 1.84)
+    ranges, _ = bullet.cast(upright.origin, upright.vectors_to_world(grid.directions), grid.range_m)
     assert np.array_equal(cloud.cells, np.flatnonzero(np.isfinite(ranges)))
-    assert np.linalg.norm(cloud.points, axis=1) == pytest.approx(ranges[cloud.cells])
-    assert np.array_equal(cloud.objects, bodies[cloud.cells])
-    ground = SENSOR.origin + SENSOR.vectors_to_world(cloud.points[cloud.objects == bullet.ground])
-    assert ground[:, 2] == pytest.approx(0.0, abs=1e-6)
-    assert body in cloud.objects
+    assert np.linalg.norm(cloud.points, axis=1) == pytest.approx(ranges[cloud.cells], abs=1e-9)
+    assert set(cloud.objects.tolist()) == {NOTHING}
 
 
 def test_cameras_report_labelled_bodies_alone(bullet):

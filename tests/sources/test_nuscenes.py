@@ -3,33 +3,20 @@ import json
 import numpy as np
 import pytest
 from nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
+from nuscenes_scene import CAR, SCENE, WORLD, database, first
 from scipy.spatial.transform import Rotation
 
 from care_sim.errors import InvalidInput
 from care_sim.film import NOBODY, Annotations
+from care_sim.frames import Frame
 from care_sim.grid import AngularGrid
-from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.films import film
+from care_sim.sources.nuscenes.categories import CATEGORIES, DETECTION_NAMES
 from care_sim.sources.nuscenes.splits import VAL, scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
 from care_sim.types import CLASSES
 
-SCENE = "scene-0103"
-CAR = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a")
-WORLD = np.array([[18.0, 2.0, 0.8], [18.1, 1.9, 0.5], [18.0, 2.0, 0.3], [30.0, -5.0, 0.1], [0.95, 0.2, 1.4]])
-"""Points in the world, the car at its origin: three on the rear of CAR, one on the road, one on our own roof."""
-
-
-def database(folder, samples=None):
-    samples = samples or [([CAR], pose(), as_recorded(WORLD))]
-    return write(folder / "nuscenes", {SCENE: samples})
-
-
-def first(root, **options):
-    tables = Database(root)
-    (scene,) = scenes(tables)
-    return film(tables, scene, **options)
+UPRIGHT = Frame(0.0, 0.0, 1.8, 0.0)
 
 
 def test_a_scene_becomes_a_film(tmp_path):
@@ -61,21 +48,34 @@ def test_a_point_belongs_to_the_box_it_lies_in_as_the_box_is_turned():
     boxes = np.array([[10.0, 0.0, 0.0, 8.0, 1.0, 2.0, np.pi / 4]])
     on_the_diagonal, across_it = [12.0, 2.0, 0.0], [12.0, -2.0, 0.0]
     annotations = Annotations(np.array([5]), np.array([0]), boxes)
-    assert owners(np.array([on_the_diagonal, across_it]), annotations).tolist() == [5, NOBODY]
+    assert owners(np.array([on_the_diagonal, across_it]), annotations, UPRIGHT).tolist() == [5, NOBODY]
+
+
+def test_boxes_stand_upright_however_the_sensor_leans():
+    """The sensor's front is 3 degrees down: 6 m off a bus's middle that makes 0.3 m."""
+    sensor = Frame(3.0, 1.0, 1.8, 0.4, pitch=np.deg2rad(3.0))
+    bus = np.array([[20.0, 2.0, 1.7, 12.0, 2.9, 3.4, 0.4]])
+    ends = bus[0, :3] + [[5.9 * np.cos(0.4), 5.9 * np.sin(0.4), h] for h in (1.6, -1.6, 1.8, -1.8)]
+    annotations = Annotations(np.array([7]), np.array([2]), sensor.boxes_to_local(bus))
+    found = owners(sensor.vectors_to_local(ends - sensor.origin), annotations, sensor)
+    assert found.tolist() == [7, 7, NOBODY, NOBODY]
 
 
 def test_a_point_in_two_boxes_belongs_to_the_smaller():
     boxes = np.array([[10.0, 0, 0, 2, 2, 2, 0], [10.0, 0, 0, 9, 9, 9, 0], [10.0, 0, 0, 4, 4, 4, 0]])
     annotations = Annotations(np.array([3, 4, 5]), np.zeros(3, np.int64), boxes)
     points = np.array([[10.5, 0.0, 0.0], [11.5, 0.0, 0.0], [13.0, 0.0, 0.0]])
-    assert owners(points, annotations).tolist() == [3, 5, 4]
+    assert owners(points, annotations, UPRIGHT).tolist() == [3, 5, 4]
 
 
 def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
     root = database(tmp_path)
     between = {"token": "between", "is_key_frame": False, "filename": "sweeps/gone.pcd.bin"}
     change(root, "sample_data", lambda rows: rows.append(rows[0] | between))
+    change(root, "ego_pose", lambda rows: rows.append(rows[0] | {"token": "between"}))
     assert len(first(root).shots[0].cloud) == 4
+    tables = Database(root)
+    assert "between" not in {*tables.rows("sample_data"), *tables.rows("ego_pose")}, "they would fill the memory"
 
 
 def test_a_keyframe_without_annotations_plays(tmp_path):
@@ -133,74 +133,10 @@ def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
     assert shown - (np.array([800.0, 450.0]) - (u, v)) == pytest.approx(pixels, abs=0.1)
 
 
-def picture(channel):
-    return f"{SCENE}-0-{channel}"
-
-
-def whole_box(root):
-    """The projected box of CAR in the front picture, in recorded pixels, and its film."""
-    shot = first(root).shots[0]
-    _, _, (_, u, v) = SENSORS["CAM_FRONT"]
-    shift = np.tile(np.array([800.0, 450.0]) - (u, v), 2)
-    return (shot.sights.detections.boxes[0] - shift).tolist(), shot
-
-
-def forms(box):
-    left, top, right, bottom = box
-    token, file = picture("CAM_FRONT"), f"samples/CAM_FRONT/{SCENE}-0.jpg"
-    coco = {"bbox": [left, top, right - left, bottom - top], "category_id": 3, "score": 0.6}
-    own = {"bbox_corners": box, "category_name": "vehicle.car", "score": 0.6}
-    named = {"bbox_corners": box, "detection_name": "car", "detection_score": 0.6}
-    return {
-        "rows": [own | {"sample_data_token": token}],
-        "results": {"meta": {}, "results": {token: [named]}},
-        "coco": [coco | {"image_id": token}, coco | {"image_id": token, "category_id": 4}],
-        "coco by file": [coco | {"image_id": file}],
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize("form", ["rows", "results", "coco", "coco by file"])
-def test_detections_come_from_a_file_in_either_form(tmp_path, form):
-    root = database(tmp_path)
-    box, shot = whole_box(root)
-    path = tmp_path / "found.json"
-    path.write_text(json.dumps(forms(box)[form]))
-    (detected,) = first(root, detections=DetectionFile(path)).shots
-    found = detected.sights.detections
-    assert found.confidences.tolist() == [0.6]
-    assert found.boxes[0] == pytest.approx(shot.sights.detections.boxes[0])
-    assert detected.sights.objects.tolist() == [0]
-
-
-def test_a_detection_elsewhere_or_of_another_class_lies_on_nobody(tmp_path):
-    root = database(tmp_path)
-    (left, top, right, bottom), _ = whole_box(root)
-    token = picture("CAM_FRONT")
-    beside, here = [left + 300, top, right + 300, bottom], [left, top, right, bottom]
-    rows = [
-        {"sample_data_token": token, "bbox_corners": box, "category_name": name, "score": 1}
-        for box, name in [(beside, "car"), (here, "truck")]
-    ]
-    path = tmp_path / "found.json"
-    path.write_text(json.dumps(rows))
-    (shot,) = first(root, detections=DetectionFile(path)).shots
-    assert shot.sights.objects.tolist() == [NOBODY, NOBODY]
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        [{"sample_data_token": "t"}],
-        [{"image_id": "t", "bbox": [0, 0, 1], "category_id": 3, "score": 1}],
-        [{"image_id": "t", "bbox": [0, 0, -5, 5], "category_id": 3, "score": 1}],
-        {"annotations": 3},
-    ],
-)
-def test_a_detection_that_cannot_be_read_is_named(tmp_path, rows):
-    path = tmp_path / "found.json"
-    path.write_text(json.dumps(rows))
-    with pytest.raises(InvalidInput, match=r"found.json: detection 0 cannot be read"):
-        DetectionFile(path)
+def test_every_category_of_the_taxonomy_has_its_place():
+    assert len(CATEGORIES) == 23 + 9, "the 23 of the annotations, and 9 more of the lidarseg extension"
+    assert {*CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
+    assert len(DETECTION_NAMES) == 10
 
 
 def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
@@ -228,92 +164,6 @@ def test_splits_choose_scenes(tmp_path):
         scenes(tables, "gone")
     with pytest.raises(InvalidInput, match="unknown split 'x'; known: all, gone, mine, val"):
         scenes(tables, "x")
-
-
-def dangling(field, table, value="nowhere"):
-    return lambda root: change(root, table, lambda rows: rows[0].update({field: value}))
-
-
-def without(table):
-    return lambda root: (root / "v1.0-trainval" / f"{table}.json").unlink()
-
-
-def drop(table):
-    return lambda root: change(root, table, lambda rows: rows.clear())
-
-
-BREAKS = {
-    "no table": (without("ego_pose"), "ego_pose.json: no such file"),
-    "truncated table": (
-        lambda root: (root / "v1.0-trainval" / "sample_data.json").write_text('[{"token": "a", '),
-        "sample_data.json: no readable JSON file",
-    ),
-    "no list": (
-        lambda root: (root / "v1.0-trainval" / "sensor.json").write_text("{}"), "sensor.json: must hold a list"
-    ),
-    "no field": (
-        lambda root: change(root, "instance", lambda rows: rows[0].pop("category_token")),
-        "instance.json: row scene-0103-a lacks 'category_token'",
-    ),
-    "no pose": (drop("ego_pose"), f"ego_pose.json: no row with the token 'pose-{SCENE}-0-LIDAR_TOP'"),
-    "no instance": (dangling("instance_token", "sample_annotation"), "instance.json: no row with the token 'nowhere'"),
-    "no category": (dangling("category_token", "instance"), "category.json: no row with the token 'nowhere'"),
-    "no sample": (dangling("first_sample_token", "scene"), "sample.json: no row with the token 'nowhere'"),
-    "no sensor": (dangling("sensor_token", "calibrated_sensor"), "sensor.json: no row with the token 'nowhere'"),
-    "no calibration": (
-        dangling("calibrated_sensor_token", "sample_data"), "calibrated_sensor.json: no row with the token 'nowhere'"
-    ),
-    "no visibility": (dangling("visibility_token", "sample_annotation"), "visibility.json: no row with the token"),
-    "odd visibility": (dangling("level", "visibility", "v9"), r"visibility.json: '4' has the unknown level 'v9'"),
-    "no recording": (
-        lambda root: change(root, "sample_data", lambda rows: rows.pop(0)),
-        f"sample_data.json: no LIDAR_TOP of the sample '{SCENE}-0'",
-    ),
-    "no sweep": (dangling("filename", "sample_data", "samples/gone.bin"), "samples/gone.bin: no such file"),
-    "short sweep": (
-        lambda root: next(root.glob("samples/LIDAR_TOP/*")).write_bytes(b"0" * 47),
-        "47 bytes are no whole number of points of 20 bytes",
-    ),
-    "no rotation": (
-        dangling("rotation", "ego_pose", [0, 0, 0, 0]), f"ego_pose.json: 'pose-{SCENE}-0-LIDAR_TOP' has no"
-    ),
-    "no size": (dangling("size", "sample_annotation", [1, 2]), "sample_annotation.json: 'scene-0103-0-0' has no size"),
-    "a circle": (dangling("next", "sample", f"{SCENE}-0"), "is no later than the sample before it"),
-    "no intrinsics": (
-        lambda root: change(root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=[])),
-        "calibrated_sensor.json: 'calibrated-CAM_FRONT' has no 3 x 3 camera_intrinsic",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", BREAKS)
-def test_what_is_wrong_with_a_database_is_said_in_one_line(tmp_path, name):
-    breaks, message = BREAKS[name]
-    root = database(tmp_path)
-    if name == "odd visibility":
-        change(root, "visibility", lambda rows: rows.reverse())
-    breaks(root)
-    with pytest.raises(InvalidInput, match=message) as caught:
-        first(root)
-    assert "\n" not in str(caught.value)
-    assert str(root) in str(caught.value)
-
-
-def test_samples_run_forward_in_time(tmp_path):
-    root = database(tmp_path, [([CAR], pose(), as_recorded(WORLD))] * 2)
-    change(root, "sample", lambda rows: rows[1].update(timestamp=rows[0]["timestamp"]))
-    with pytest.raises(InvalidInput, match=rf"sample.json: '{SCENE}-1' is no later than the sample before it"):
-        first(root)
-
-
-def test_the_version_must_be_clear(tmp_path):
-    with pytest.raises(InvalidInput, match=r"must hold one folder v1\.0-\*, .* found: none"):
-        Database(tmp_path)
-    database(tmp_path)
-    (tmp_path / "nuscenes" / "v1.0-mini").mkdir()
-    with pytest.raises(InvalidInput, match=r"found: v1\.0-mini, v1\.0-trainval"):
-        Database(tmp_path / "nuscenes")
-    assert len(scenes(Database(tmp_path / "nuscenes", "v1.0-trainval"))) == 1
 
 
 @pytest.fixture

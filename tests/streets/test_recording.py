@@ -162,6 +162,12 @@ def test_a_body_that_comes_near_later_is_where_it_then_is():
     assert shots[2].annotations.boxes[0, 0] == pytest.approx(30.0 - LIDAR_POSITION[0])
 
 
+def test_an_empty_street_shows_its_road():
+    shot = shot_of()
+    assert (len(shot.annotations), len(shot.sights.objects)) == (0, 0)
+    assert shot.cloud.points[:, 2] == pytest.approx(-LIDAR_POSITION[2])
+
+
 def test_a_body_that_left_and_returned_is_where_it_then_is():
     street = standing_street(("car", 20.0, 0.0), keyframes=4)
     street.poses[1:, 0, 0] = (200.0, 200.0, 25.0)

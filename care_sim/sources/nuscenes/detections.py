@@ -3,26 +3,29 @@
 Two forms. nuScenes: rows with `sample_data_token`, `bbox_corners` (left, top, right, bottom), `category_name` or
 `detection_name`, and `score` or `detection_score`, as a list or as a map `results` from tokens to lists. COCO results:
 rows with `image_id`, `bbox` (left, top, width, height), `category_id` and `score`; `image_id` is the token of the
-picture or its file name. Categories outside the five classes are left out.
+picture or its file name. Known categories outside the five classes are left out.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_number, check_whole
 from care_sim.film import NOBODY, Annotations, Sights
 from care_sim.frames import Floats
 from care_sim.grid import Cells
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
-from care_sim.sources.nuscenes.tables import Row, read_json
+from care_sim.sources.nuscenes.tables import Database, Row, read_json
 from care_sim.types import CLASSES, ImageDetections
 
 COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
 """The categories of COCO that the five classes hold."""
+COCO_LAST = 90
+"""The categories of COCO are numbered from 1 to this."""
 SAME_OBJECT_IOU = 0.5
 """A detection lies on the object of its class whose projected box overlaps it at least this much (PASCAL VOC)."""
 
@@ -34,14 +37,24 @@ class DetectionFile:
     """The detections of a file, by the token or the file name of their picture."""
 
     def __init__(self, path: Path):
+        self.path = path
         self._found: dict[str, list[Found]] = defaultdict(list)
-        for number, row in enumerate(_rows(read_json(path))):
+        for number, row in enumerate(_rows(path)):
             try:
                 picture, detection = _read(row)
-            except (KeyError, TypeError, ValueError) as error:
-                raise InvalidInput(f"{path}: detection {number} cannot be read ({error!r})") from error
+            except KeyError as error:
+                raise InvalidInput(f"{path}: detection {number} cannot be read (it lacks {error})") from error
+            except (TypeError, ValueError) as error:
+                raise InvalidInput(f"{path}: detection {number} cannot be read ({error})") from error
             if detection is not None:
                 self._found[picture].append(detection)
+
+    def check(self, database: Database) -> None:
+        """Raise InvalidInput for a detection on what is no picture of a keyframe of the database."""
+        for picture in self._found:
+            if picture not in database.pictures:
+                table = database.path("sample_data")
+                raise InvalidInput(f"{self.path}: a detection on {picture!r}, which is no keyframe of {table}")
 
     def sights(self, cameras: Sequence[RecordedCamera], pictures: Sequence[Row], annotations: Annotations) -> Sights:
         """The detections on the pictures of a keyframe, one a camera, each with the object that it lies on."""
@@ -56,26 +69,48 @@ class DetectionFile:
         return Sights(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
 
 
-def _rows(content: object) -> list[Row]:
-    if isinstance(content, Mapping) and "results" in content:
-        results: Mapping[str, list[Row]] = content["results"]
-        return [{"sample_data_token": token, **row} for token, rows in results.items() for row in rows]
-    return list(content) if isinstance(content, list) else [{}]
+def _rows(path: Path) -> list[Row]:
+    """The rows of either form, which may be none."""
+    content = read_json(path)
+    results = content.get("results") if isinstance(content, dict) else None
+    if isinstance(results, dict) and all(isinstance(rows, list) for rows in results.values()):
+        pairs = [(token, row) for token, rows in results.items() for row in rows]
+        return [{"sample_data_token": token, **row} if isinstance(row, dict) else row for token, row in pairs]
+    if not isinstance(content, list):
+        raise InvalidInput(f"{path}: must hold a list of detections, or a map `results` from tokens to such lists")
+    return content
 
 
 def _read(row: Row) -> tuple[str, Found | None]:
+    """The picture and the detection on it, None outside the five classes."""
+    if not isinstance(row, dict):
+        raise TypeError(f"no map of fields: {row!r}")
     if "image_id" in row:
-        left, top, width, height = row["bbox"]
-        label, box = COCO.get(row["category_id"]), [left, top, left + width, top + height]
+        left, top, width, height = _box(row["bbox"])
+        label, corners = _coco_class(row["category_id"]), np.array([left, top, left + width, top + height])
         picture, score = str(row["image_id"]), row["score"]
     else:
-        picture, box = row["sample_data_token"], row["bbox_corners"]
+        picture, corners = row["sample_data_token"], _box(row["bbox_corners"])
         label = class_of(row["category_name"] if "category_name" in row else row["detection_name"])
         score = row["score"] if "score" in row else row["detection_score"]
-    corners = np.array(box, dtype=float)
-    if corners.shape != (4,) or not np.isfinite([*corners, float(score)]).all() or (corners[2:] <= corners[:2]).any():
-        raise ValueError(f"no box: {box}")
+    if not isinstance(picture, str):
+        raise TypeError(f"no token of a picture: {picture!r}")
+    if (corners[2:] <= corners[:2]).any():
+        raise ValueError(f"a box without width or height: {corners.tolist()}")
+    check_number("score", score, 0, 1)
     return picture, None if label is None else (CLASSES.index(label), float(score), corners)
+
+
+def _box(numbers: object) -> Floats:
+    box = np.array(numbers)
+    if box.shape != (4,) or box.dtype.kind not in "if" or not np.isfinite(box).all():
+        raise ValueError(f"no box of four numbers: {numbers!r}")
+    return box.astype(float)
+
+
+def _coco_class(number: object) -> str | None:
+    check_whole("category_id", number, 1, COCO_LAST)
+    return COCO.get(cast(int, number))
 
 
 def _behind(boxes: Floats, classes: Cells, shown: Floats, annotations: Annotations) -> Cells:

@@ -22,7 +22,7 @@ from care_sim.sources.nuscenes.cameras import (
     projected_sights,
     recorded_camera,
 )
-from care_sim.sources.nuscenes.categories import class_of
+from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.tables import Database, Row
@@ -41,8 +41,11 @@ def film(
     """The film of a scene, in the cells of `grid` (the paper's, unless given). The cameras' boxes come from
     `detections`, else from projected annotations.
 
-    Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated sweep.
+    Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated sweep, a detection
+    on what is no picture of a keyframe.
     """
+    if detections is not None:
+        detections.check(database)
     samples = database.samples(scene)
     data = [_recordings(database, sample) for sample in samples]
     stage = _stage(database, samples, data[0], grid or AngularGrid(), detections)
@@ -69,7 +72,7 @@ class _Stage:
         boxes = [box for box in self.database.annotations(sample["token"]) if _counts(self.database, box)]
         annotations = _annotations(self.database, boxes, self.numbers, sensor)
         points = read_points(self.database.root / recordings[LIDAR]["filename"])
-        cloud = recorded_cloud(points, self.grid, annotations)
+        cloud = recorded_cloud(points, self.grid, annotations, sensor)
         sights = self._sights(recordings, boxes, annotations)
         return Shot(time_s, sample["token"], sensor, ego, annotations, sights, cloud)
 
@@ -100,12 +103,10 @@ def _recordings(database: Database, sample: Row) -> dict[str, Row]:
 
 
 def _frame(database: Database, table: str, token: str) -> Frame:
-    row = database.row(table, token)
-    try:
-        w, x, y, z = map(float, row["rotation"])
-        return Frame.turned_by(Rotation.from_quat([x, y, z, w]), np.array(row["translation"], dtype=float).reshape(3))
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{database.path(table)}: {token!r} has no translation and rotation ({error})") from error
+    w, x, y, z = database.numbers(table, token, "rotation", 4).tolist()
+    if not any((w, x, y, z)):
+        raise InvalidInput(f"{database.path(table)}: {token!r} has a rotation of length zero")
+    return Frame.turned_by(Rotation.from_quat([x, y, z, w]), database.numbers(table, token, "translation", 3))
 
 
 def _lidar_mount(database: Database, data: Row) -> Frame:
@@ -116,15 +117,20 @@ def _lidar_mount(database: Database, data: Row) -> Frame:
 
 def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
     token = data["calibrated_sensor_token"]
-    intrinsic = np.array(database.row("calibrated_sensor", token)["camera_intrinsic"], dtype=float)
-    if intrinsic.shape != (3, 3):
-        raise InvalidInput(f"{database.path('calibrated_sensor')}: {token!r} has no 3 x 3 camera_intrinsic")
+    intrinsic = database.numbers("calibrated_sensor", token, "camera_intrinsic", 3, 3)
+    if intrinsic[0, 0] <= 0:
+        raise InvalidInput(
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic without focal length"
+        )
     return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
 
 
 def _class_name(database: Database, box: Row) -> str | None:
-    category = database.row("instance", box["instance_token"])["category_token"]
-    return class_of(database.row("category", category)["name"])
+    token = database.row("instance", box["instance_token"])["category_token"]
+    try:
+        return class_of(database.row("category", token)["name"])
+    except UnknownCategory as error:
+        raise InvalidInput(f"{database.path('category')}: {token!r}: {error}") from None
 
 
 def _counts(database: Database, box: Row) -> bool:
@@ -148,11 +154,10 @@ def _annotations(database: Database, boxes: list[Row], numbers: dict[str, int], 
 def _world_box(database: Database, box: Row) -> tuple[float, ...]:
     """Sizes are width, length, height in the table."""
     frame = _frame(database, "sample_annotation", box["token"])
-    try:
-        width, length, height = map(float, box["size"])
-    except (TypeError, ValueError) as error:
+    width, length, height = database.numbers("sample_annotation", box["token"], "size", 3).tolist()
+    if min(width, length, height) <= 0:
         path = database.path("sample_annotation")
-        raise InvalidInput(f"{path}: {box['token']!r} has no size of width, length and height") from error
+        raise InvalidInput(f"{path}: {box['token']!r} has a size without width, length or height")
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 
 

@@ -1,5 +1,7 @@
 """Which scenes a split holds: the official validation split, and those of `splits.json`."""
 
+from pathlib import Path
+
 from care_sim.errors import InvalidInput, unknown
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
 
@@ -20,14 +22,31 @@ def scenes(database: Database, split: str = "val") -> list[Row]:
     Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and an empty split.
     """
     by_name = {row["name"]: row for row in database.rows("scene").values()}
-    path = database.folder / "splits.json"
-    custom = read_json(path) if path.exists() else {}
-    known = {"all": sorted(by_name), "val": [name for name in VAL if name in by_name], **custom}
+    own = _own_splits(database)
+    known = {"all": sorted(by_name), "val": [name for name in VAL if name in by_name], **own}
     if split not in known:
         raise unknown("split", split, known)
     for name in known[split]:
         if name not in by_name:
-            raise InvalidInput(f"{path}: the split {split!r} names {name!r}, which {database.path('scene')} lacks")
+            where, table = _own_file(database), database.path("scene")
+            raise InvalidInput(f"{where}: the split {split!r} names {name!r}, which {table} lacks")
     if not known[split]:
         raise InvalidInput(f"{database.path('scene')}: holds no scene of the split {split!r}")
     return [by_name[name] for name in known[split]]
+
+
+def _own_file(database: Database) -> Path:
+    return database.folder / "splits.json"
+
+
+def _own_splits(database: Database) -> dict[str, list[str]]:
+    path = _own_file(database)
+    splits = read_json(path) if path.exists() else {}
+    if not isinstance(splits, dict):
+        raise InvalidInput(f"{path}: must map names of splits to lists of names of scenes")
+    for split, names in splits.items():
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise InvalidInput(f"{path}: the split {split!r} must be a list of names of scenes")
+        if len(set(names)) < len(names):
+            raise InvalidInput(f"{path}: the split {split!r} names a scene twice")
+    return splits

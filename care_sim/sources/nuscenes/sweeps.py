@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from care_sim.errors import InvalidInput
 from care_sim.film import NOBODY, Annotations, Cloud
-from care_sim.frames import Floats, turned
+from care_sim.frames import Floats, Frame, turned
 from care_sim.grid import AngularGrid, Cells
 
 VALUES_A_POINT = 5
@@ -18,32 +19,43 @@ OWN_CAR_M = 1.0
 def read_points(path: Path) -> Floats:
     """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is right, y forward.
 
-    Raises InvalidInput for a missing or truncated file.
+    Raises InvalidInput for a missing or truncated file, and for a place that is not finite.
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such file")
-    values = np.fromfile(path, np.uint8)
+    try:
+        values = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot be read ({error})") from error
     if values.size % (4 * VALUES_A_POINT) or not values.size:
         raise InvalidInput(f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} bytes")
     points = values.view("<f4").reshape(-1, VALUES_A_POINT).astype(float)
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    if not finite.all():
+        raise InvalidInput(f"{path}: point {finite.argmin()} has a place that is not finite")
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
 
 
-def recorded_cloud(points: Floats, grid: AngularGrid, annotations: Annotations) -> Cloud:
+def recorded_cloud(points: Floats, grid: AngularGrid, annotations: Annotations, sensor: Frame) -> Cloud:
     """The points (n, 3) that a ray of `grid` could have returned, each with the annotated box that it lies in."""
     ranges = np.linalg.norm(points, axis=1)
     cells = grid.cells_of(points)
     (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & (ranges <= grid.range_m))
     order = kept[np.argsort(cells[kept], kind="stable")]
-    return Cloud(cells[order], points[order], owners(points[order], annotations))
+    return Cloud(cells[order], points[order], owners(points[order], annotations, sensor))
 
 
-def owners(points: Floats, annotations: Annotations) -> Cells:
-    """(n,) the annotated object whose box holds each point, the smallest of several, NOBODY where there is none."""
+def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Cells:
+    """(n,) the annotated object whose box holds each point (n, 3), the smallest of several, NOBODY where there is none.
+
+    Boxes stand upright in the world, however the frame `sensor` of points and annotations leans.
+    """
     found = np.full(len(points), NOBODY, np.int64)
-    volumes = annotations.boxes[:, 3:6].prod(axis=1)
-    for row in np.argsort(-volumes, kind="stable").tolist():
-        box = annotations.boxes[row]
-        inside = np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1)
-        found[inside] = annotations.objects[row]
+    boxes = sensor.boxes_to_world(annotations.boxes)
+    places = KDTree(sensor.origin + sensor.vectors_to_world(points))
+    near = places.query_ball_point(boxes[:, :3], np.linalg.norm(boxes[:, 3:6], axis=1) / 2)
+    for row in np.argsort(-boxes[:, 3:6].prod(axis=1), kind="stable").tolist():
+        box, rows = boxes[row], np.array(near[row], dtype=np.int64)
+        inside = np.all(np.abs(turned(places.data[rows] - box[:3], -box[6])) <= box[3:6] / 2, axis=1)
+        found[rows[inside]] = annotations.objects[row]
     return found

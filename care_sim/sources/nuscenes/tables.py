@@ -1,38 +1,54 @@
 """The JSON tables of a nuScenes v1.0 database; a token that points nowhere is named with its file."""
 
 import json
-from collections import defaultdict
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from care_sim.errors import InvalidInput
+from care_sim.frames import Floats
 
 Row = dict[str, Any]
 
-FIELDS = {
-    "scene": ("name", "first_sample_token"),
-    "sample": ("timestamp", "next"),
-    "sample_data": ("sample_token", "ego_pose_token", "calibrated_sensor_token", "filename", "is_key_frame"),
-    "calibrated_sensor": ("sensor_token", "translation", "rotation", "camera_intrinsic"),
-    "sensor": ("channel", "modality"),
-    "ego_pose": ("translation", "rotation"),
-    "sample_annotation": (
-        "sample_token", "instance_token", "visibility_token", "translation", "size", "rotation",
-        "num_lidar_pts", "num_radar_pts",
-    ),
-    "instance": ("category_token",),
-    "category": ("name",),
-    "visibility": ("level",),
-}  # fmt: skip
+FIELDS: dict[str, dict[str, type]] = {
+    "scene": {"name": str, "first_sample_token": str, "last_sample_token": str},
+    "sample": {"timestamp": int, "next": str},
+    "sample_data": {
+        "sample_token": str,
+        "ego_pose_token": str,
+        "calibrated_sensor_token": str,
+        "filename": str,
+        "is_key_frame": bool,
+    },
+    "calibrated_sensor": {"sensor_token": str, "translation": list, "rotation": list, "camera_intrinsic": list},
+    "sensor": {"channel": str},
+    "ego_pose": {"translation": list, "rotation": list},
+    "sample_annotation": {
+        "sample_token": str,
+        "instance_token": str,
+        "visibility_token": str,
+        "translation": list,
+        "size": list,
+        "rotation": list,
+        "num_lidar_pts": int,
+        "num_radar_pts": int,
+    },
+    "instance": {"category_token": str},
+    "category": {"name": str},
+    "visibility": {"level": str},
+}
 """What is read of each table, beside its token."""
 
 
 class Database:
     """The tables of `<root>/<version>`. Without a version, the only folder `v1.0-*` in the root is taken.
 
-    Raises InvalidInput for a missing or truncated table, a row without a field, a token that points nowhere.
+    Raises InvalidInput for a missing or truncated table, a row without a field or with another kind of value in it, a
+    token that points nowhere.
     """
 
     def __init__(self, root: Path, version: str | None = None):
@@ -45,9 +61,9 @@ class Database:
         return self.folder / f"{table}.json"
 
     def rows(self, table: str) -> dict[str, Row]:
-        """All rows of a table by token."""
+        """The rows of a table by token. Of recordings and car poses only those of keyframes: one in six."""
         if table not in self._tables:
-            self._tables[table] = _indexed(self.path(table), FIELDS[table])
+            self._tables[table] = self._read(table)
         return self._tables[table]
 
     def row(self, table: str, token: str) -> Row:
@@ -56,6 +72,18 @@ class Database:
         if token not in rows:
             raise InvalidInput(f"{self.path(table)}: no row with the token {token!r}")
         return rows[token]
+
+    def numbers(self, table: str, token: str, field: str, *shape: int) -> Floats:
+        """A field of finite numbers as an array of `shape`."""
+        found = self.row(table, token)[field]
+        try:
+            values = np.array(found)
+        except ValueError:
+            values = np.empty(0)
+        if values.shape != shape or values.dtype.kind not in "if" or not np.isfinite(values).all():
+            wanted = " x ".join(map(str, shape))
+            raise InvalidInput(f"{self.path(table)}: {token!r} has no {field} of {wanted} finite numbers")
+        return values.astype(float)
 
     def keyframe_data(self, sample: str) -> dict[str, Row]:
         """The keyframe recordings of a sample by channel."""
@@ -66,35 +94,71 @@ class Database:
         return self.row("sensor", self.row("calibrated_sensor", data["calibrated_sensor_token"])["sensor_token"])
 
     def annotations(self, sample: str) -> Sequence[Row]:
-        """The annotated boxes of a sample."""
-        return self._boxes_of_samples[sample]
+        """The annotated boxes of a sample, one an instance."""
+        boxes = self._boxes_of_samples[sample]
+        for token, count in Counter(box["instance_token"] for box in boxes).items():
+            if count > 1:
+                table = self.path("sample_annotation")
+                raise InvalidInput(f"{table}: the sample {sample!r} holds the instance {token!r} {count} times")
+        return boxes
 
     def samples(self, scene: Row) -> list[Row]:
         """The samples of a scene in order of time."""
         found: list[Row] = []
         token = scene["first_sample_token"]
-        while token:
+        while token or not found:
             row = self.row("sample", token)
             if found and row["timestamp"] <= found[-1]["timestamp"]:
                 raise InvalidInput(f"{self.path('sample')}: {token!r} is no later than the sample before it")
             found.append(row)
             token = row["next"]
+        if found[-1]["token"] != scene["last_sample_token"]:
+            end, wanted = found[-1]["token"], scene["last_sample_token"]
+            raise InvalidInput(f"{self.path('sample')}: {scene['name']} ends with {end!r}, and should with {wanted!r}")
         return found
+
+    def _read(self, table: str) -> dict[str, Row]:
+        """The rows and fields that are needed; whatever else a table holds is dropped while it is parsed."""
+        kinds = {"token": str, **FIELDS[table]}
+
+        def taken(row: Row) -> object:
+            return {name: row[name] for name in kinds if name in row} if self._is_needed(table, row) else _DROPPED
+
+        return _indexed(self.path(table), read_json(self.path(table), taken), kinds)
+
+    def _is_needed(self, table: str, row: Row) -> bool:
+        if table == "sample_data":
+            return row.get("is_key_frame") is not False
+        return table != "ego_pose" or "token" not in row or str(row["token"]) in self._poses_read
+
+    @cached_property
+    def _poses_read(self) -> frozenset[str]:
+        return frozenset(row["ego_pose_token"] for row in self.rows("sample_data").values())
+
+    @cached_property
+    def pictures(self) -> frozenset[str]:
+        """The tokens and the file names of all recordings of keyframes."""
+        return frozenset(name for token, row in self.rows("sample_data").items() for name in (token, row["filename"]))
 
     @cached_property
     def _data_of_samples(self) -> dict[str, list[Row]]:
-        keyframes = (row for row in self.rows("sample_data").values() if row["is_key_frame"])
-        return _grouped(keyframes)
+        return _grouped(self.rows("sample_data").values())
 
     @cached_property
     def _boxes_of_samples(self) -> dict[str, list[Row]]:
-        return _grouped(self.rows("sample_annotation").values())
+        boxes = self.rows("sample_annotation").values()
+        for box in boxes:
+            self.row("sample", box["sample_token"])
+        return _grouped(boxes)
 
 
-def read_json(path: Path) -> Any:
-    """The content of a JSON file. Raises InvalidInput for one that is missing or truncated."""
+def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
+    """The content of a JSON file, every map in it replaced by what is `taken` of it.
+
+    Raises InvalidInput for a file that is missing or truncated.
+    """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"), object_hook=taken)
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
@@ -109,19 +173,42 @@ def _only_version(root: Path) -> Path:
     return versions[0]
 
 
-def _indexed(path: Path, fields: Sequence[str]) -> dict[str, Row]:
-    rows = read_json(path)
-    if not isinstance(rows, list):
+_DROPPED = object()
+
+
+def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str, Row]:
+    """The rows by token, once every field is of its kind."""
+    if not isinstance(content, list):
         raise InvalidInput(f"{path}: must hold a list of rows")
-    for number, row in enumerate(rows):
-        for name in ("token", *fields):
-            if not isinstance(row, dict) or name not in row:
-                token = row.get("token") if isinstance(row, dict) else None
-                raise InvalidInput(f"{path}: row {token or number} lacks {name!r}")
-    return {row["token"]: row for row in rows}
+    for number, row in enumerate(content):
+        if row is _DROPPED:
+            continue
+        if not isinstance(row, dict):
+            raise InvalidInput(f"{path}: row {number} must be a map of fields")
+        for name, kind in kinds.items():
+            if type(row.get(name)) is not kind:
+                raise InvalidInput(f"{path}: {_what_is_wrong(row, number, name, kind)}")
+    return _by_token(path, [row for row in content if row is not _DROPPED])
 
 
-def _grouped(rows: Any) -> dict[str, list[Row]]:
+def _what_is_wrong(row: Row, number: int, name: str, kind: type) -> str:
+    which = f"row {row.get('token') or number}"
+    return f"{which}: {name} must be {KINDS[kind]}, got {row[name]!r}" if name in row else f"{which} lacks {name!r}"
+
+
+KINDS = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}
+"""What the kinds of values are called."""
+
+
+def _by_token(path: Path, rows: list[Row]) -> dict[str, Row]:
+    indexed = {row["token"]: row for row in rows}
+    if len(indexed) < len(rows):
+        (token, count), *_ = Counter(row["token"] for row in rows).most_common(1)
+        raise InvalidInput(f"{path}: {count} rows with the token {token!r}")
+    return indexed
+
+
+def _grouped(rows: Iterable[Row]) -> dict[str, list[Row]]:
     groups: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         groups[row["sample_token"]].append(row)
