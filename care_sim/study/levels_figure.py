@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.study.entries import marked, percent, tag_notes
+from care_sim.study.protocol_paper import published_level
 from care_sim.study.protocol_rows import FULL, REFERENCE, Plays
 from care_sim.study.styles import FULL as FULL_STYLE
 from care_sim.study.styles import styles
@@ -14,11 +15,15 @@ DODGE = 0.025
 
 
 def levels_figure(plays: Plays) -> Figure:
-    """Recalls in % of all policies at all budgets; the full scan as a dashed line."""
+    """Recalls in % of all policies at all budgets; the full scan as a dashed line; what the paper gives of both, hollow
+    and dotted.
+    """
     figure = Figure(figsize=(8.4, 4.0), layout="constrained")
     panels = figure.subplots(1, 2)
     for axes, ratio in zip(panels, (FIRST_SIGHTING, OVERALL), strict=True):
         _draw(axes, plays, ratio)
+        if not plays.setting.conditions:
+            _draw_published(axes, plays, ratio)
         axes.set_xscale("log")
         axes.set_xticks(plays.budgets, [percent(budget) for budget in plays.budgets])
         axes.minorticks_off()
@@ -45,3 +50,16 @@ def _draw(axes: Axes, plays: Plays, ratio: Ratio) -> None:
         line = axes.plot(list(known), list(known.values()), look.line, color=look.colour, zorder=order, linewidth=1.4)
         line[0].set(marker=look.marker, markersize=6, markeredgecolor="white", markeredgewidth=0.5)
         line[0].set_label(marked(policy, plays.tags[policy]))
+
+
+def _draw_published(axes: Axes, plays: Plays, ratio: Ratio) -> None:
+    """The levels that the paper gives, of nuScenes and its own detectors."""
+    ceiling = published_level(ratio, FULL, 1.0)
+    if ceiling is not None:
+        axes.axhline(ceiling, color=FULL_STYLE.colour, linestyle=":", linewidth=1.2, label="paper: full scan")
+    for policy, look in styles(plays.tags.items()).items():
+        levels = {budget: published_level(ratio, policy, budget) for budget in plays.budgets}
+        known = {budget: value for budget, value in levels.items() if value is not None}
+        if known:
+            (marks,) = axes.plot(list(known), list(known.values()), look.marker, color=look.colour, zorder=5)
+            marks.set(markersize=7, markerfacecolor="white", markeredgewidth=1.4, label=f"paper: {policy}")

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
 from care_sim.study.gaps import GAP, Compared, Pair, Third
 from care_sim.study.protocol_rows import Setting
 
@@ -167,6 +167,20 @@ LEVELS = {
 }
 LEVELS_SAID = (_CEILING, _TTFD, _PRIORITY)
 ALLOCATIONS = {"all-camera": Said(("17%", "", "68%"), _MECHANICAL)}
+
+
+def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
+    """A recall in % that the paper gives of a policy, itself or as a share of the full scan's; None without."""
+    said, full = LEVELS.get((policy, budget), Level()), LEVELS["full", 1.0]
+    if ratio is FIRST_SIGHTING:
+        own, share, ceiling = said.first, said.first_of_full, full.first
+    elif ratio is OVERALL:
+        own, share, ceiling = said.overall, said.overall_of_full, full.overall
+    else:
+        return None
+    if own:
+        return float(own)
+    return float(share) * float(ceiling) / 100 if share else None
 
 
 def statements_about(setting: Setting) -> Mapping[Compared, Said]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.conditions import UNFELT_BY_FULL, Conditions
+from care_sim.errors import InvalidInput
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged, level
@@ -142,7 +143,11 @@ class Plays:
 
 
 def plays_of(rows: Sequence[Row]) -> list[Plays]:
-    """The plays of every setting in the order of their first rows; the full scan alone makes none where others do."""
+    """The plays of every setting in the order of their first rows; the full scan alone makes none where others do.
+
+    Raises InvalidInput where the plays of a scene are of two films.
+    """
+    _check_films(rows)
     groups: dict[Setting, list[Row]] = {}
     for row in rows:
         groups.setdefault(setting_of(row), []).append(row)
@@ -153,8 +158,20 @@ def plays_of(rows: Sequence[Row]) -> list[Plays]:
 
 def setting_of(row: Row) -> Setting:
     """The setting that a row belongs to; a condition that it has no column for is the usual one."""
-    changed = tuple((name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None))
+    usual = _USUAL | {"camera_detections": None}
+    changed = tuple((name, row[name]) for name, value in usual.items() if row.get(name) not in (value, None))
     return Setting(row["source"], with_parameters(row, "detector"), changed)
+
+
+def _check_films(rows: Sequence[Row]) -> None:
+    """The data of a source may have changed between two runs into one folder."""
+    films: dict[tuple[str, ...], str] = {}
+    for row in rows:
+        scene = (row["source"], row["scene"], row.get("camera_detections") or "")
+        if films.setdefault(scene, row["film_hash"]) != row["film_hash"]:
+            raise InvalidInput(
+                f"the plays of scene {row['scene']} are of two films: its data changed between runs; play into a new --out"
+            )
 
 
 def _strata_of(row: Row) -> list[tuple[str, str]]:

@@ -29,6 +29,7 @@ def play(scene, policy, delays, frames_found, *, budget=0.1, source="streets", d
         **asdict(conditions),
         "tags": TAGS.get(policy, "causal"),
         "keyframes": 40,
+        "film_hash": f"film of {scene}",
         **_tallies(delays, frames_found),
         "ttfds": tuple(delays),
         "tracks": 5.0,

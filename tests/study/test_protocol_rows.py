@@ -105,3 +105,13 @@ def test_seeds_that_count_other_events_are_refused():
     (plays,) = plays_of(rows)
     with pytest.raises(InvalidInput, match=r"scene a: .* must be of one film"):
         plays.tallies("care", 0.1)
+
+
+def test_plays_of_two_films_of_a_scene_are_refused_and_two_camera_detectors_are_two_settings():
+    rows = study({"care": (5, 5), "history": (4, 5)}, scenes=2)
+    with pytest.raises(InvalidInput, match="scene scene 001 are of two films"):
+        plays_of([*rows[:-1], rows[-1] | {"film_hash": "another"}])
+    seen = [row | {"camera_detections": "1f", "film_hash": "another"} for row in rows]
+    plain, detected = plays_of([*rows, *seen])
+    assert detected.setting.label == "generated streets, detector returns, camera detections 1f"
+    assert len(plain.scenes) == len(detected.scenes) == 2
