@@ -30,6 +30,12 @@ def test_without_points_the_road_is_level():
     assert road_plane(np.empty((0, 3)), HEIGHT).tolist() == [0, 0, -HEIGHT]
 
 
+def test_two_points_make_no_road():
+    """A kerb stone, 0.1 m high, would tilt it."""
+    stone = np.array([[8.0, 1.0, 0.1 - HEIGHT], [8.0, 1.5, 0.1 - HEIGHT]])
+    assert road_plane(stone, HEIGHT).tolist() == [0, 0, -HEIGHT]
+
+
 @pytest.mark.parametrize(("range_m", "radius"), [(3, NEAR_RADIUS_M), (12, NEAR_RADIUS_M), (40, 0.982)])
 def test_the_radius_grows_with_the_range_once_columns_are_far_apart(grid, range_m, radius):
     assert cluster_radius(grid, range_m) == pytest.approx(radius, abs=1e-3)
