@@ -64,6 +64,16 @@ def test_the_corner_of_a_rectangle_is_fitted(degrees):
     assert min(turns, 90 - turns) <= 1.0
 
 
+@pytest.mark.parametrize("end", [1, -1])
+@pytest.mark.parametrize("degrees", [20, 40, 60])
+def test_the_long_side_decides_whichever_end_is_shown_beside_it(degrees, end):
+    """Forty points on one side, three off a ragged end that leads to its left or right."""
+    side = np.column_stack([np.linspace(0, 4.6, 40), np.zeros(40)])
+    ragged = np.array([[0.0, 0.3], [-0.05, 0.6], [0.05, 0.9]]) * [1, end]
+    sides = fit_sides(turned(np.concatenate([side, ragged]), np.deg2rad(degrees)) + np.array([12.0, 4.0]))
+    assert np.rad2deg(np.arctan2(*sides.axes[0][::-1])) == pytest.approx(degrees, abs=1.0)
+
+
 def test_one_point_is_a_rectangle_without_extent():
     sides = fit_sides(np.array([[5.0, 2.0]]))
     assert sides.spans == pytest.approx([0, 0])
