@@ -39,7 +39,7 @@ class PointsOnly:
     """Makes a `PointDetector` a `care_sim.perception.detectors.Detector`.
 
     The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be reached from it. What
-    it returns is checked; only then the objects are named.
+    it returns is copied and checked; only then the objects are named.
     """
 
     def __init__(self, name: str, detector: PointDetector, sensor_height_m: float):
@@ -98,7 +98,7 @@ def _objects_behind(boxes: Floats, cloud: Cloud) -> Cells:
 
 def _numbers(name: str, column: str, values: Any) -> Floats:
     try:
-        numbers = np.atleast_1d(np.asarray(values, dtype=np.float64))
+        numbers = np.array(values, dtype=np.float64, ndmin=1)
     except (TypeError, ValueError) as error:
         raise BrokenDetector(f"detector {name}: {column} must be an array of numbers, got {values!r:.80}") from error
     if not (np.abs(numbers) <= np.finfo(np.float32).max).all():

@@ -33,6 +33,9 @@ def test_two_sides_of_a_car_give_its_class_and_box(detector, yaw):
     assert np.hypot(*(found.boxes[0, :2] - [8, 6])) < 0.3
     assert found.boxes[0, 3:6] == pytest.approx(CAR, abs=0.3)
     assert np.sin(found.boxes[0, 6] - yaw) == pytest.approx(0, abs=0.05)
+    assert np.cos(found.boxes[0, 6]) * 8 + np.sin(found.boxes[0, 6]) * 6 > 0, (
+        "known but for half a turn: away from here"
+    )
     assert found.boxes[0, 2] - found.boxes[0, 5] / 2 == pytest.approx(-HEIGHT, abs=0.1)
 
 

@@ -30,6 +30,12 @@ def test_without_points_the_road_is_level():
     assert road_plane(np.empty((0, 3)), HEIGHT).tolist() == [0, 0, -HEIGHT]
 
 
+def test_two_points_make_no_road():
+    """A kerb stone, 0.1 m high, would tilt it."""
+    stone = np.array([[8.0, 1.0, 0.1 - HEIGHT], [8.0, 1.5, 0.1 - HEIGHT]])
+    assert road_plane(stone, HEIGHT).tolist() == [0, 0, -HEIGHT]
+
+
 @pytest.mark.parametrize(("range_m", "radius"), [(3, NEAR_RADIUS_M), (12, NEAR_RADIUS_M), (40, 0.982)])
 def test_the_radius_grows_with_the_range_once_columns_are_far_apart(grid, range_m, radius):
     assert cluster_radius(grid, range_m) == pytest.approx(radius, abs=1e-3)
@@ -56,6 +62,16 @@ def test_the_corner_of_a_rectangle_is_fitted(degrees):
     assert sides.middle @ sides.axes == pytest.approx([12, 4], abs=0.12)
     turns = (np.rad2deg(np.arctan2(*sides.axes[0][::-1])) - degrees) % 90
     assert min(turns, 90 - turns) <= 1.0
+
+
+@pytest.mark.parametrize("end", [1, -1])
+@pytest.mark.parametrize("degrees", [20, 40, 60])
+def test_the_long_side_decides_whichever_end_is_shown_beside_it(degrees, end):
+    """Forty points on one side, three off a ragged end that leads to its left or right."""
+    side = np.column_stack([np.linspace(0, 4.6, 40), np.zeros(40)])
+    ragged = np.array([[0.0, 0.3], [-0.05, 0.6], [0.05, 0.9]]) * [1, end]
+    sides = fit_sides(turned(np.concatenate([side, ragged]), np.deg2rad(degrees)) + np.array([12.0, 4.0]))
+    assert np.rad2deg(np.arctan2(*sides.axes[0][::-1])) == pytest.approx(degrees, abs=1.0)
 
 
 def test_one_point_is_a_rectangle_without_extent():

@@ -66,6 +66,18 @@ def test_its_points_are_its_own_to_change_and_lead_nowhere():
     assert np.array_equal(SCENE.points, before)
 
 
+def test_what_it_returned_is_kept_though_it_writes_there_again():
+    """As a network does whose outputs lie in the same place at every keyframe."""
+    said = detections(classes=np.array([0.0]), boxes=CAR[None].copy(), returns=np.array([9.0]))
+    detector = PointsOnly("mine", Says(said), HEIGHT)
+    before, _ = detector.detect(SCENE, OBJECTS)
+    for column in (said.classes, said.boxes, said.returns, said.scores):
+        column *= 0.0
+        column += 1.0
+    kept = [values.tolist() for values in (before.classes, before.boxes, before.returns, before.scores)]
+    assert kept == [[0], [CAR.tolist()], [9], [0.5]]
+
+
 def test_truth_does_not_change_what_it_finds():
     strangers = Cloud(SCENE.cells, SCENE.points, np.full(len(SCENE), NOBODY))
     nobody = Annotations(np.array([], np.int64), np.array([], np.int64), np.empty((0, 7)))
