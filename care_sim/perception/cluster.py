@@ -40,6 +40,9 @@ class ClusterDetector:
     Measured with every cell fired on one body of the catalogue alone, 12 headings a range, found within 2 m in its
     class: cars, trucks and buses 99% to 25 m and 97% from 30 to 45 m; pedestrians 98% to 20 m, 58% at 25 and 30 m
     (3 returns), none beyond; bicycles 93% to 20 m, 25% at 25 and 30 m (most are taken for pedestrians), none beyond.
+    Amid the bodies of six generated streets, of objects with three returns or more: 93% to 15 m, 59% from there to
+    30 m, 44% from there to 50 m (what is seen of a car in a parked row is taken for a pedestrian or bicycle); of 29
+    detections a keyframe 16 match no such object.
     """
 
     def __init__(self, grid: AngularGrid = _GRID):

@@ -20,12 +20,12 @@ PROXY = "returns"
 Maker = Callable[..., PointDetector]
 
 _REAL: dict[str, Maker] = {"cluster": ClusterDetector, "torchscript": TorchScriptDetector}
+BUILT_IN = (PROXY, *_REAL)
 
 
 def detector_names() -> list[str]:
     """Names that `make_detector` knows: the proxy, the built-in real ones, then those of installed packages."""
-    built_in = [PROXY, *_REAL]
-    return [*built_in, *sorted(set(_entries()) - set(built_in))]
+    return [*BUILT_IN, *sorted(set(entries()) - set(BUILT_IN))]
 
 
 def make_detector(name: str, sensor_height_m: float, **parameters: object) -> Detector:
@@ -54,10 +54,10 @@ def make_detector(name: str, sensor_height_m: float, **parameters: object) -> De
 def _maker(name: str) -> Maker:
     if name in _REAL:
         return _REAL[name]
-    entries = _entries()
-    if name not in entries:
+    installed = entries()
+    if name not in installed:
         raise unknown("detector", name, detector_names())
-    return _load(name, entries[name])
+    return _load(name, installed[name])
 
 
 def _load(name: str, entry: EntryPoint) -> Maker:
@@ -70,7 +70,8 @@ def _load(name: str, entry: EntryPoint) -> Maker:
     return make  # type: ignore[no-any-return]
 
 
-def _entries() -> dict[str, EntryPoint]:
+def entries() -> dict[str, EntryPoint]:
+    """The detectors of installed packages by name."""
     return {entry.name: entry for entry in reversed(tuple(entry_points(group=ENTRY_POINTS)))}
 
 

@@ -11,6 +11,7 @@ from care_sim.conditions import UNFELT_BY_FULL, Conditions
 from care_sim.envs.open_loop import UNFILMED
 from care_sim.errors import InvalidInput
 from care_sim.perception.registry import PROXY
+from care_sim.study.provenance import detector_digest, file_digest
 from care_sim.study.scenes import Scene, Source
 from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, collected, departures, flat
 
@@ -57,6 +58,11 @@ class PlayConfig(Conditions, Task):
         plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
         own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
         return self.source.row() | {"scene": self.scene.name} | plain | own
+
+    def installed(self) -> list[str | None]:
+        """Of the detector too, and of the files that it is given."""
+        files = [file_digest(value) for _, value in self.detector_parameters if isinstance(value, str)]
+        return [*super().installed(), detector_digest(self.detector), *files]
 
     @property
     def label(self) -> str:

@@ -36,7 +36,7 @@ def verdict(gap: Gap, claimed: int) -> str:
         return UNDECIDED
     if gap.sign == claimed:
         return MET
-    return UNDECIDED if claimed and not gap.sign else NOT_MET
+    return NOT_MET if gap.sign else UNDECIDED
 
 
 def judged(gap: Gap | None, claimed: int | None, paper: str) -> str:

@@ -5,11 +5,14 @@ import os
 import platform
 from functools import cache
 from importlib import metadata
+from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from pathlib import Path
 from uuid import uuid4
 
 import care_sim
+from care_sim.perception.registry import BUILT_IN as BUILT_IN_DETECTORS
+from care_sim.perception.registry import entries as detector_entries
 from care_sim.policies import BUILT_IN
 from care_sim.policies.installed import entries
 
@@ -29,9 +32,20 @@ def policy_digest(policy: str) -> str | None:
     """Hash of the files of the package that an installed policy comes from, or of its module when it lies in
     no package; empty for a built-in policy, None where there are no files to read.
     """
-    if policy in BUILT_IN:
-        return ""
-    entry = entries()[policy]
+    return "" if policy in BUILT_IN else _package_digest(entries()[policy])
+
+
+def detector_digest(detector: str) -> str | None:
+    """The same of a detector."""
+    return "" if detector in BUILT_IN_DETECTORS else _package_digest(detector_entries()[detector])
+
+
+def file_digest(path: str) -> str:
+    """Hash of a file's content; empty where there is none."""
+    return _content_digest(Path(path)) if Path(path).is_file() else ""
+
+
+def _package_digest(entry: EntryPoint) -> str | None:
     spec = find_spec(entry.module.partition(".")[0])
     if spec is None:
         return None

@@ -73,14 +73,17 @@ class Task(ABC):
         return make_policy(self.policy, env, **dict(self.policy_parameters))
 
     def digest(self) -> str:
-        """Hash of the effective configuration; package version, code and an installed policy's code included.
+        """Hash of the effective configuration; package version, code and what is installed beside it included.
 
         It never repeats in another run when an installed policy has no source to read.
         """
-        installed = policy_digest(self.policy)
-        code = [code_digest(), self._session if installed is None else installed]
+        code = [code_digest(), *(self._session if digest is None else digest for digest in self.installed())]
         effective = [sorted(self.row().items()), care_sim.__version__, *code]
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
+
+    def installed(self) -> list[str | None]:
+        """Hashes of the code beside the package that decides the row; None of what has no source to read."""
+        return [policy_digest(self.policy)]
 
     @cached_property
     def _session(self) -> str:

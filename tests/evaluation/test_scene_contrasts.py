@@ -17,10 +17,10 @@ def tallies(*scenes):
 
 
 def test_levels_by_event_and_by_scene():
-    """4 of 10 and 1 of 2: 5 of 12 events, or 45% of an average scene; the scene without an event is in neither."""
-    found = level(FIRST_SIGHTING, tallies((10, 4), (2, 1), (0, 0)))
-    assert found.by_event == pytest.approx(100 * 5 / 12)
-    assert found.by_scene == pytest.approx(45.0)
+    """4 of 10, 1 of 2 and 0 of 8: 5 of 20 events, or 30% of an average scene; one without events is in neither."""
+    found = level(FIRST_SIGHTING, tallies((10, 4), (2, 1), (8, 0), (0, 0)))
+    assert found.by_event == pytest.approx(100 * 5 / 20)
+    assert found.by_scene == pytest.approx(30.0)
     assert level(TTFD, tallies((10, 4), (2, 1))).by_event == pytest.approx(6 * 7 / 12)
     assert level(OVERALL, tallies((10, 4), (2, 1))).by_event == pytest.approx(100 * 10 / 120)
 
@@ -46,6 +46,25 @@ def test_a_contrast_turned_round_changes_its_sign():
     ours, theirs = (tallies(*[(20, int(rng.integers(3, 9))) for _ in range(30)]) for _ in range(2))
     there, back = contrast(FIRST_SIGHTING, ours, theirs), contrast(FIRST_SIGHTING, theirs, ours)
     assert there.by_event == pytest.approx([-back.by_event.mean, -back.by_event.high, -back.by_event.low])
+
+
+def test_less_excludes_zero_as_more_does():
+    more, less = tallies(*[(10, 5), (10, 7)] * 4), tallies(*[(10, 4)] * 8)
+    assert contrast(FIRST_SIGHTING, more, less).excludes_zero
+    assert contrast(FIRST_SIGHTING, less, more).excludes_zero
+
+
+def test_the_draws_of_a_contrast_are_seeded():
+    rng = np.random.default_rng(3)
+    ours, theirs = (tallies(*[(int(rng.integers(5, 40)), int(rng.integers(0, 5))) for _ in range(20)]) for _ in "ab")
+    theirs = {s: Tally(ours[s].events, t.sighted, 0, ours[s].frames, t.found) for s, t in theirs.items()}
+    one, same, other = (contrast(FIRST_SIGHTING, ours, theirs, seed=seed) for seed in (1, 1, 2))
+    assert one == same
+    assert one.by_event.low != other.by_event.low
+    assert one.by_scene.low != other.by_scene.low
+    halves = sorted(ours)[:10], sorted(ours)[10:]
+    gaps = [contrast_gap(FIRST_SIGHTING, ours, theirs, *halves, seed=seed) for seed in (1, 1, 2)]
+    assert gaps[0] == gaps[1] != gaps[2]
 
 
 def test_a_policy_against_itself_is_certainly_equal():

@@ -41,9 +41,15 @@ def test_equal_scene_weights_count_scenes():
 
 
 def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds():
-    """Of 30 events CARE finds 12 and 6 with its two floors, history none."""
+    """Of 30 events CARE finds 12 and 6 with its two floors, three more a keyframe late, and history none."""
     rows = [
-        play(f"{n}", policy, found(10, sighted[seed] if policy == "care" else 0), [1] * 10, floor_seed=seed)
+        play(
+            f"{n}",
+            policy,
+            found(10, sighted[seed], late=1) if policy == "care" else found(10, 0),
+            [1] * 10,
+            floor_seed=seed,
+        )
         for n in range(3)
         for policy in ("care", "history")
         for seed, sighted in ((0, (4, 2)), (1, (4, 2)))
@@ -54,7 +60,7 @@ def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds(
         FIRST_SIGHTING, pytest.approx(30.0), pytest.approx(paired_difference(of_events, np.zeros(30)))
     )
     late = Pair("care", "history", TTFD).gap(few, 0.1)
-    assert (late.mean, late.sign) == (pytest.approx(-0.3 * 6), -1)
+    assert (late.mean, late.sign) == (pytest.approx(-0.3 * 6 - 0.1 * 5), -1)
     assert late.interval.mean == pytest.approx(late.mean)
     for none in (Pair("care", "history", OVERALL), Pair("care", "history", FIRST_SIGHTING, alike=True)):
         assert none.gap(few, 0.1).interval is None

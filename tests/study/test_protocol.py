@@ -13,7 +13,7 @@ from care_sim.cli import main
 from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
-from care_sim.study import plays
+from care_sim.study import plays, provenance
 from care_sim.study.journal import Journal
 from care_sim.study.kinds import PLAYS
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, play_grid, without_scenes
@@ -231,3 +231,14 @@ def test_conditions_of_a_play_are_those_of_the_environment(source):
     with config.make_env() as env:
         assert env.unwrapped.conditions == Conditions(min_returns=5, reserve_fraction=0.5)
     assert isinstance(config, PlayConfig)
+
+
+def test_a_play_is_named_by_the_file_that_its_detector_is_given(source, tmp_path):
+    (plain,) = small(source, ["care"])
+    model = tmp_path / "model.pt"
+    digests = set()
+    for content in (b"one", b"two"):
+        model.write_bytes(content)
+        provenance._content_digest.cache_clear()
+        digests.add(plain.changed(detector="torchscript", detector_parameters=(("file", str(model)),)).digest())
+    assert len(digests | {plain.digest()}) == 3

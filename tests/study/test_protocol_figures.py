@@ -45,6 +45,7 @@ def test_a_panel_a_budget_and_a_staircase_over_what_a_car_can_have():
         "history-oracle †": (70.0, 35.0),
     }
     stairs = axes.lines[-1]
+    assert stairs.get_drawstyle() == "steps-pre"
     left, low = axes.get_xlim()[0], axes.get_ylim()[0]
     assert np.array_equal(stairs.get_xydata(), [(left, 30.0), (50.0, 30.0), (60.0, 20.0), (60.0, low)])
     assert "full scan: 40.0% of first sightings, 80.0% overall" in figure.get_supxlabel()

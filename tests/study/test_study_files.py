@@ -7,6 +7,7 @@ from care_sim.cli import main
 from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.journal import Journal
+from care_sim.study.kinds import EPISODES
 from care_sim.study.rows import read_rows, write_rows
 from care_sim.types import Outcome
 
@@ -44,7 +45,7 @@ def test_a_truncated_file_is_named(tmp_path):
 def test_a_file_of_something_else_is_named(tmp_path):
     write_rows([{"apples": 3}], tmp_path / "episodes.parquet")
     with pytest.raises(InvalidInput, match=r"it lacks .*policy"):
-        read_rows(tmp_path / "episodes.parquet")
+        read_rows(tmp_path / "episodes.parquet", EPISODES.required)
 
 
 def test_the_journal_passes_over_a_torn_line_and_goes_on_behind_it(tmp_path):
