@@ -11,15 +11,26 @@ those objects there. Static surroundings are not annotated, so only what is anno
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput
 from care_sim.film import Film, Shot
-from care_sim.frames import Floats, Frame
+from care_sim.frames import Frame
 from care_sim.grid import AngularGrid, Cells
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.feather import Columns, read_columns
+from care_sim.sources.argoverse2_tables import (
+    ANNOTATION_FILES,
+    CATEGORIES,
+    PLACE,
+    POSE_FILE,
+    SIZE,
+    TURN,
+    annotation_file,
+    read_boxes,
+    read_poses,
+    table,
+)
+from care_sim.sources.feather import Columns
 from care_sim.sources.motion import motions
 from care_sim.sources.staging import Prop, shoot
 
@@ -33,56 +44,6 @@ KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
 HALF_SWEEP_NS = NANOSECONDS // 20
 """Annotations come at 10 Hz: the nearest is this far from a moment at most, unless a sweep holds none."""
-
-CATEGORIES: dict[str, str | None] = {
-    "REGULAR_VEHICLE": "car",
-    "BOX_TRUCK": "truck",
-    "LARGE_VEHICLE": "truck",
-    "TRUCK": "truck",
-    "TRUCK_CAB": "truck",
-    "ARTICULATED_BUS": "bus",
-    "BUS": "bus",
-    "SCHOOL_BUS": "bus",
-    "BICYCLE": "bicycle",
-    "OFFICIAL_SIGNALER": "pedestrian",
-    "PEDESTRIAN": "pedestrian",
-    # Outside the five classes: bodies that occlude, and that nobody reports. Riders have boxes of their own; as in
-    # nuScenes the bicycle counts, once, and its rider does not.
-    "ANIMAL": None,
-    "BICYCLIST": None,
-    "BOLLARD": None,
-    "CONSTRUCTION_BARREL": None,
-    "CONSTRUCTION_CONE": None,
-    "DOG": None,
-    "MESSAGE_BOARD_TRAILER": None,
-    "MOBILE_PEDESTRIAN_CROSSING_SIGN": None,
-    "MOBILE_PEDESTRIAN_SIGN": None,
-    "MOTORCYCLE": None,
-    "MOTORCYCLIST": None,
-    "RAILED_VEHICLE": None,
-    "SIGN": None,
-    "STOP_SIGN": None,
-    "STROLLER": None,
-    "TRAFFIC_LIGHT_TRAILER": None,
-    "VEHICULAR_TRAILER": None,
-    "WHEELCHAIR": None,
-    "WHEELED_DEVICE": None,
-    "WHEELED_RIDER": None,
-}
-"""The class of every category of the taxonomy, None outside the five classes."""
-RECORDING_CAR = "EGO_VEHICLE"
-"""The category of the recording car itself, which is no object of its own film."""
-
-POSE_FILE, ANNOTATION_FILES = "city_SE3_egovehicle.feather", "annotations*.feather"
-_PLACE, _TURN, _SIZE = ("tx_m", "ty_m", "tz_m"), ("qx", "qy", "qz", "qw"), ("length_m", "width_m", "height_m")
-_POSE_TYPES = {"timestamp_ns": int, **dict.fromkeys((*_PLACE, *_TURN), float)}
-_BOX_TYPES = {
-    **_POSE_TYPES,
-    **dict.fromkeys(_SIZE, float),
-    "track_uuid": str,
-    "category": str,
-    "num_interior_pts": int,
-}
 
 
 def logs(folder: Path) -> list[Path]:
@@ -102,11 +63,12 @@ def film(log: Path, grid: AngularGrid | None = None) -> Film:
     Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a pose, an unknown
     category, an object annotated twice at once.
     """
-    boxes_file, pose_file = _annotation_file(log), log / POSE_FILE
-    sweeps, boxes = _read_boxes(boxes_file)
-    poses = _read_poses(pose_file)
-    for stamp in np.setdiff1d(sweeps, poses["timestamp_ns"])[:1]:
-        raise InvalidInput(f"{pose_file}: no pose for the timestamp {stamp} of {boxes_file.name}")
+    boxes_file, pose_file = annotation_file(log), log / POSE_FILE
+    sweeps, boxes = read_boxes(boxes_file)
+    poses = read_poses(pose_file)
+    without_pose = np.setdiff1d(sweeps, poses["timestamp_ns"])
+    if len(without_pose):
+        raise InvalidInput(f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}")
     keyframes = _keyframes(sweeps, poses["timestamp_ns"])
     moments = np.union1d(sweeps, keyframes)
     cars = _car_frames(poses, moments)
@@ -122,58 +84,6 @@ def film(log: Path, grid: AngularGrid | None = None) -> Film:
 
 def _is_log(path: Path) -> bool:
     return (path / POSE_FILE).is_file() or any(path.glob(ANNOTATION_FILES))
-
-
-def _annotation_file(log: Path) -> Path:
-    found = sorted(log.glob(ANNOTATION_FILES))
-    if not found:
-        raise InvalidInput(f"{log / ANNOTATION_FILES}: no such file")
-    return found[0]
-
-
-def _read_boxes(path: Path) -> tuple[Cells, Columns]:
-    """The annotated timestamps (n,), ascending, and the checked annotations, without the recording car, each with the
-    `number` of its track in the film.
-    """
-    boxes = read_columns(path, _BOX_TYPES)
-    sweeps, kept = np.unique(boxes["timestamp_ns"]), boxes["category"] != RECORDING_CAR
-    boxes = {name: column[kept] for name, column in boxes.items()}
-    if not kept.any():
-        raise InvalidInput(f"{path}: no annotations")
-    for category in np.unique(boxes["category"]).tolist():
-        if category not in CATEGORIES:
-            raise InvalidInput(f"{path}: {unknown('category', category, CATEGORIES)}")
-    numbers = np.unique(boxes["track_uuid"], return_inverse=True)[1]
-    for wrong, message in (
-        ((_table(boxes, _SIZE) <= 0).any(axis=1), "has a box without length, width or height"),
-        (~_table(boxes, _TURN).any(axis=1), "has a quaternion qw, qx, qy, qz of length zero"),
-        (_repeated(np.column_stack([boxes["timestamp_ns"], numbers])), "is annotated twice"),
-    ):
-        if wrong.any():
-            row = wrong.argmax()
-            raise InvalidInput(f"{path}: track {boxes['track_uuid'][row]} {message} at {boxes['timestamp_ns'][row]}")
-    return sweeps, boxes | {"number": numbers}
-
-
-def _read_poses(path: Path) -> Columns:
-    """The checked poses of the car, in order of time."""
-    poses = read_columns(path, _POSE_TYPES)
-    stamps = poses["timestamp_ns"]
-    for wrong, message in (
-        (~_table(poses, _TURN).any(axis=1), "a quaternion qw, qx, qy, qz of length zero"),
-        (_repeated(stamps[:, None]), "two poses"),
-    ):
-        if wrong.any():
-            raise InvalidInput(f"{path}: {message} at {stamps[wrong.argmax()]}")
-    order = np.argsort(stamps)
-    return {name: column[order] for name, column in poses.items()}
-
-
-def _repeated(rows: Cells) -> NDArray[np.bool_]:
-    """(n,) which rows (n, k) stand further up as well."""
-    repeated = np.ones(len(rows), dtype=bool)
-    repeated[np.unique(rows, axis=0, return_index=True)[1]] = False
-    return repeated
 
 
 def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
@@ -196,7 +106,7 @@ def _nearest(stamps: Cells, moments: Cells) -> Cells:
 def _car_frames(poses: Columns, moments: Cells) -> list[Frame]:
     """The car's frame at every moment, each of which has a pose. The world is the city's, moved to the first."""
     rows = np.searchsorted(poses["timestamp_ns"], moments)
-    places, turns = _table(poses, _PLACE)[rows], Rotation.from_quat(_table(poses, _TURN)[rows])
+    places, turns = table(poses, PLACE)[rows], Rotation.from_quat(table(poses, TURN)[rows])
     return [Frame.turned_by(turn, place) for turn, place in zip(turns, places - places[0], strict=True)]
 
 
@@ -204,11 +114,7 @@ def _props(boxes: Columns, sweep: int) -> list[Prop]:
     """What was seen in a sweep; the sensor's axes are the car's."""
     seen = (boxes["timestamp_ns"] == sweep) & (boxes["num_interior_pts"] > 0)
     numbers, labels = boxes["number"][seen].tolist(), [CATEGORIES[name] for name in boxes["category"][seen].tolist()]
-    sizes = [tuple(size) for size in _table(boxes, _SIZE)[seen].tolist()]
-    places, turns = _table(boxes, _PLACE)[seen] - UP_LIDAR, _table(boxes, _TURN)[seen]
+    sizes = [tuple(size) for size in table(boxes, SIZE)[seen].tolist()]
+    places, turns = table(boxes, PLACE)[seen] - UP_LIDAR, table(boxes, TURN)[seen]
     frames = [Frame.turned_by(Rotation.from_quat(turn), place) for turn, place in zip(turns, places, strict=True)]
     return [Prop(*values) for values in zip(numbers, labels, sizes, frames, strict=True)]
-
-
-def _table(columns: Columns, names: tuple[str, ...]) -> Floats:
-    return np.column_stack([columns[name] for name in names]).astype(float)
