@@ -18,7 +18,7 @@ MIN_RETURNS = 3
 CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
 MOST_GHOSTS = 64
-"""False detections a picture, on average: as many as a policy is shown at most."""
+"""False detections a picture, on average: half as many as a policy is shown at most."""
 
 
 @dataclass(frozen=True, kw_only=True)

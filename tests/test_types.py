@@ -77,13 +77,13 @@ def test_nothing_known_is_nothing_read():
 
 
 def test_more_than_the_table_holds_keeps_the_first_rows_and_the_shape():
-    tracks = [[n, 0, n, *[0] * 10] for n in range(70)]
-    detections = [[0, 1, n, *[0] * 6] for n in range(70)]
+    tracks = [[n, 0, n, *[0] * 10] for n in range(MAX_DETECTIONS + 6)]
+    detections = [[0, 1, n, *[0] * 6] for n in range(MAX_DETECTIONS + 6)]
     observation = belief(tracks, detections).to_observation()
     read = Belief.from_observation(observation)
-    assert observation["tracks"].shape == (64, 13)
-    assert read.tracks.ids.tolist() == list(range(64))
-    assert read.detections.boxes[:, 0].tolist() == list(range(64))
+    assert observation["tracks"].shape == (MAX_TRACKS, 13)
+    assert read.tracks.ids.tolist() == list(range(MAX_TRACKS))
+    assert read.detections.boxes[:, 0].tolist() == list(range(MAX_DETECTIONS))
 
 
 def test_take_by_index_and_by_mask():

@@ -35,7 +35,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     |---|---|---|
     | `ego` | (3,) | speed m/s, yaw rate rad/s, acceleration m/s^2 |
     | `budget` | (1,) | B / N, the share of cells that may fire |
-    | `detections` | (64, 9) | camera detections, columns `ImageDetections.COLUMNS`; class -1 pads |
+    | `detections` | (128, 9) | camera detections, columns `ImageDetections.COLUMNS`; class -1 pads |
     | `tracks` | (64, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 

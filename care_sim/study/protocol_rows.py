@@ -170,7 +170,7 @@ def _check_films(rows: Sequence[Row]) -> None:
         scene = (row["source"], row["scene"], row.get("camera_detections") or "")
         if films.setdefault(scene, row["film_hash"]) != row["film_hash"]:
             raise InvalidInput(
-                f"the plays of scene {row['scene']} are of two films: its data changed between runs; play into a new --out"
+                f"the plays of scene {row['scene']} are of two films, its data changed between runs: take a new --out"
             )
 
 

@@ -55,10 +55,17 @@ def test_levels_have_a_line_a_policy_and_the_full_scan():
     first, overall = protocol_figures(ROWS)["levels-streets"].axes
     (legend,) = protocol_figures(ROWS)["levels-streets"].legends
     names = [text.get_text() for text in legend.get_texts()]
-    assert names == ["full scan", "history", "care", "beam-reduce", "history-oracle †"]
+    measured = ["full scan", "history", "care", "beam-reduce", "history-oracle †"]
+    assert names == [*measured, "paper: full scan", "paper: history", "paper: care"]
     care = next(line for line in first.lines if line.get_label() == "care")
     assert list(care.get_ydata()) == [30.0] * 3
     assert list(overall.lines[0].get_ydata()) == [80.0, 80.0]
+    said = {line.get_label(): list(line.get_ydata()) for line in overall.lines if "paper" in line.get_label()}
+    assert said["paper: full scan"] == [49.4, 49.4]
+    assert said["paper: care"] == [pytest.approx(0.94 * 49.4)]
+    strict = [row | {"camera_latency": 1} for row in ROWS]
+    (panel, _) = protocol_figures(strict)["levels-streets-camera-latency-1"].axes
+    assert not [line for line in panel.lines if "paper" in line.get_label()]
 
 
 POINTS = st.dictionaries(st.text("abcdefgh", min_size=1), st.tuples(*[st.integers(0, 9)] * 2), min_size=1)
