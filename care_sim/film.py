@@ -45,10 +45,6 @@ class Cloud:
     def __len__(self) -> int:
         return len(self.cells)
 
-    def within(self, fired: Cells) -> "Cloud":
-        """The returns of the fired cells (k,), and no others."""
-        return self.take(np.isin(self.cells, fired))
-
     def take(self, kept: NDArray[np.bool_]) -> "Cloud":
         """Some of the returns, by mask (P,)."""
         return Cloud(self.cells[kept], self.points[kept], self.objects[kept])

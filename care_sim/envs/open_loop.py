@@ -16,7 +16,6 @@ from care_sim.evaluation.recall import Score
 from care_sim.evaluation.sightings import Sightings
 from care_sim.film import Film
 from care_sim.openloop import Exposure, OpenLoop
-from care_sim.perception.detectors import Detector
 from care_sim.perception.registry import PROXY, make_detector
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import LIDAR_POSITION
@@ -78,8 +77,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
         super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s)
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
-        self._detector = detector, own | dict(detector_parameters or {})
-        self._made_detector()
+        self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
         self.exposures: list[Exposure] = []
         self._masks: list[matching.Mask] = []
 
@@ -96,7 +94,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(4)
         self._sightings = _sightings(film)
         self.exposures, self._masks = [], []
-        loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._made_detector())
+        loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._detector)
         return self.begin(loop, floor), {"seed": seed, "scene": film.name}
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
@@ -115,10 +113,6 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             info["outcome"] = asdict(self.score.tally())
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
         return loop.belief.to_observation(), reward, False, self._over, info
-
-    def _made_detector(self) -> Detector:
-        name, parameters = self._detector
-        return make_detector(name, self.rig.sensor_height_m, **parameters)
 
 
 @lru_cache(maxsize=1)
