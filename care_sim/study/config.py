@@ -118,6 +118,6 @@ def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) ->
     return EpisodeConfig(scenario, policy, budget, **given)
 
 
-def without_seeds(configs: Sequence[EpisodeConfig]) -> list[dict[str, Any]]:
+def listed(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:
     """The configurations as plain data, each once, with the list of its seeds."""
-    return collected([asdict(config) for config in configs], "seed", "seeds")
+    return {"configurations": collected([asdict(config) for config in configs], "seed", "seeds")}

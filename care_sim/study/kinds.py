@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.study import episode, plays
+from care_sim.study import config, episode, play_config, plays
 from care_sim.study.annotation import annotated, tagged
-from care_sim.study.config import PLAIN_FIELDS, without_seeds
-from care_sim.study.play_config import PLAY_FIELDS, without_scenes
 from care_sim.study.runner import Attempt
 from care_sim.study.task import Row
 from care_sim.types import Outcome
@@ -26,7 +24,7 @@ class Kind:
     finish: Callable[[Sequence[Row]], list[Row]]
     file: str
     required: frozenset[str]
-    listed: Callable[[Any], list[dict[str, Any]]]
+    listed: Callable[[Any], dict[str, Any]]
     aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
 
 
@@ -35,16 +33,16 @@ EPISODES = Kind(
     episode.attempt,
     annotated,
     "episodes.parquet",
-    frozenset({*PLAIN_FIELDS, *Outcome.__dataclass_fields__}),
-    without_seeds,
+    frozenset({*config.PLAIN_FIELDS, *Outcome.__dataclass_fields__}),
+    config.listed,
 )
 PLAYS = Kind(
     "plays",
     plays.attempt,
     lambda rows: [plays.without_events(row) for row in tagged(rows)],
     "plays.parquet",
-    frozenset({*PLAY_FIELDS, *plays.SUMS}),
-    without_scenes,
+    frozenset({*play_config.PLAY_FIELDS, *plays.SUMS}),
+    play_config.listed,
     lambda rows: {"events.parquet": plays.event_columns(rows)},
 )
 KINDS = (EPISODES, PLAYS)

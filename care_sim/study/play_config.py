@@ -128,11 +128,15 @@ def _config(source: Source, scene: Scene, policy: str, budget: float, given: dic
     return PlayConfig(source, scene, policy, budget, **given)
 
 
-def without_scenes(configs: Sequence[PlayConfig]) -> list[dict[str, Any]]:
-    """The configurations as plain data, each once, with the list of its scenes."""
-    return collected([_plain(config) for config in configs], "scene", "scenes")
+def listed(configs: Sequence[PlayConfig]) -> dict[str, Any]:
+    """The scenes, and the configurations that were played in all of them, as plain data, each once with the list of
+    its floor seeds.
+    """
+    scenes = list(dict.fromkeys(config.scene for config in configs))
+    plain = [_plain(config) for config in configs if config.scene == scenes[0]]
+    return {"scenes": [scene.name for scene in scenes], "configurations": collected(plain, "floor_seed", "floor_seeds")}
 
 
 def _plain(config: PlayConfig) -> dict[str, Any]:
-    own = {name: value for name, value in asdict(config).items() if name not in UNFILMED}
-    return own | config.source.row() | {"scene": config.scene.name}
+    own = {name: value for name, value in asdict(config).items() if name not in (*UNFILMED, "scene")}
+    return own | config.source.row()

@@ -101,7 +101,7 @@ def _left_out(what: str) -> str:
 
 def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failure]) -> str:
     settings = {"study": study.name, "versions": versions(), "machine": machine(), "failed": [*map(str, failures)]}
-    return json.dumps(settings | {"configurations": study.kind.listed(configs)}, indent=1) + "\n"
+    return json.dumps(settings | study.kind.listed(configs), indent=1) + "\n"
 
 
 def _journal(folder: Path) -> Journal:

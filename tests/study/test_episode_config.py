@@ -8,7 +8,7 @@ import pytest
 
 from care_sim.errors import InvalidInput
 from care_sim.study import provenance
-from care_sim.study.config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, without_seeds
+from care_sim.study.config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, listed
 
 GOOD = EpisodeConfig("dense", "care")
 
@@ -135,4 +135,4 @@ def test_the_row_is_flat_and_the_label_names_what_is_unusual():
 def test_full_runs_once_for_all_budgets():
     configs = grid(["dense"], ["care", "full"], (0.03, 0.1), (0, 1))
     assert [(c.policy, c.budget) for c in configs if c.seed == 0] == [("care", 0.03), ("care", 0.1), ("full", 1.0)]
-    assert [plain["seeds"] for plain in without_seeds(configs)] == [[0, 1]] * 3
+    assert [plain["seeds"] for plain in listed(configs)["configurations"]] == [[0, 1]] * 3

@@ -16,7 +16,7 @@ from care_sim.evaluation.recall import Tally
 from care_sim.study import plays, provenance
 from care_sim.study.journal import Journal
 from care_sim.study.kinds import PLAYS
-from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, play_grid, without_scenes
+from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
 from care_sim.study.report import JOURNAL, conduct, reported
 from care_sim.study.runner import run_all
 from care_sim.study.scenes import Scene, Streets, chosen, source_of
@@ -105,7 +105,8 @@ def test_the_row_names_every_condition_and_the_label_what_departs(source):
     (config,) = small(source, ["care-sbf"], camera_latency=1, policy_parameters=(("k_safe", 1.0),), floors=(2,))
     assert set(config.row()) == {*PLAY_FIELDS, "policy.k_safe"}
     assert config.label == "a care-sbf 0.05 camera_latency=1 floor_seed=2 policy.k_safe=1.0"
-    assert without_scenes([config])[0]["scenes"] == ["a"]
+    assert listed([config])["scenes"] == ["a"]
+    assert listed([config])["configurations"][0]["floor_seeds"] == [2]
     with pytest.raises(InvalidInput, match="engine cannot be changed in the open loop"):
         replace(config, engine="fast")
     with pytest.raises(InvalidInput, match="unknown detector 'yolo'"):
