@@ -57,7 +57,7 @@ class Bench:
     """Measure the speed of the environments beside highway-env."""
 
 
-ABOUT = "Closed-loop benchmark for adaptive LiDAR sensing."
+ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
     "run": Run,
@@ -80,7 +80,7 @@ STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    0 done, 1 an episode failed or a policy was left out, 2 bad input, 130 interrupted.
+    0 done, 1 something failed or a policy was left out, 2 bad input, 130 interrupted.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
-        kept = "; finished episodes are kept, the same command goes on from there"
+        kept = "; what is finished is kept, the same command goes on from there"
         _complain(f"interrupted{kept if arguments[:1] and arguments[0] in STUDIES else ''}", INTERRUPTED)
 
 

@@ -140,6 +140,7 @@ class Conditions(Sensing):
             raise InvalidInput(f"floor must be True or False, got {self.floor!r}")
 
 
+DEFAULTS = {field.name: field.default for field in fields(Conditions)}
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))
 UNFELT_BY_FULL = (
     *CAMERA_FAULTS,

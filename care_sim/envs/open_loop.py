@@ -9,6 +9,7 @@ from zlib import crc32
 
 import numpy as np
 
+from care_sim.conditions import MIN_RETURNS
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
 from care_sim.errors import InvalidInput
 from care_sim.evaluation import matching
@@ -75,6 +76,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         conditions = conditions_of(parameters)
         if parameters:
             raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
+        if detector != PROXY and conditions.min_returns != MIN_RETURNS:
+            raise InvalidInput(f"min_returns is of the detector {PROXY}, {detector} does not know it")
         super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s)
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
         self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
@@ -115,6 +118,21 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         return loop.belief.to_observation(), reward, False, self._over, info
 
 
+class FilmEnv(OpenLoopEnv):
+    """The open loop over a film that is there already; `care_sim.study` plays all policies of a scene so."""
+
+    def __init__(self, film: Film, **parameters: Any):
+        self.film = film
+        super().__init__(film.cameras, film.sensor_height_m, film.keyframe_s, **parameters)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin the scene anew. `info` holds the seed that repeats the episode; there are no `options`."""
+        super().reset(seed=seed)
+        return self.start(self.film, self.entropy(seed))
+
+
 @lru_cache(maxsize=1)
 def _sightings(film: Film) -> Sightings:
     return Sightings.of(film.name, [shot.annotations for shot in film.shots])
@@ -140,7 +158,7 @@ class StreetEnv(OpenLoopEnv):
         return self.start(street_film(entropy), entropy)
 
 
-class ReplayEnv(OpenLoopEnv):
+class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
     `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of their scenes by name;
@@ -163,12 +181,4 @@ class ReplayEnv(OpenLoopEnv):
     ):
         options = {"split": split, "version": version, "camera_detections": camera_detections}
         recorded = recordings(source, options)
-        self.film = film_of(recorded, recorded.scenes()[0] if scene is None else scene)
-        super().__init__(self.film.cameras, self.film.sensor_height_m, self.film.keyframe_s, **parameters)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observed, dict[str, Any]]:
-        """Begin the scene anew. `info` holds the seed that repeats the episode; there are no `options`."""
-        super().reset(seed=seed)
-        return self.start(self.film, self.entropy(seed))
+        super().__init__(film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters)

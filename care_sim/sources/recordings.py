@@ -10,9 +10,10 @@ from typing import ClassVar
 from care_sim.errors import InvalidInput, unknown
 from care_sim.film import Film
 from care_sim.sources import argoverse2
+from care_sim.sources.argoverse2_tables import ANNOTATION_FILES, POSE_FILE
 from care_sim.sources.nuscenes import films, splits
 from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.tables import Database, Row
+from care_sim.sources.nuscenes.tables import FIELDS, Database, Row
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,12 @@ class Recordings(ABC):
     @abstractmethod
     def film(self, scene: str) -> Film:
         """The film of a scene by name."""
+
+    @abstractmethod
+    def files(self, scene: str) -> list[Path]:
+        """The files that say what is in a scene, those that are missing too; the sweeps of nuScenes are not among
+        them.
+        """
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,12 @@ class Argoverse2(Recordings):
         if scene not in logs:
             raise unknown(f"log in {self.folder}", scene, logs)
         return argoverse2.film(logs[scene])
+
+    def files(self, scene: str) -> list[Path]:
+        """Poses and annotations."""
+        own = self.folder / scene
+        log = own if own.is_dir() else self.folder
+        return [log / POSE_FILE, *sorted(log.glob(ANNOTATION_FILES))]
 
 
 @dataclass(frozen=True)
@@ -71,6 +84,10 @@ class NuScenes(Recordings):
             raise unknown(f"scene of the split {self.split} in {self.folder}", scene, rows)
         detections = _detections(self.camera_detections) if self.camera_detections else None
         return films.film(_database(self.folder, self.version), rows[scene], detections=detections)
+
+    def files(self, scene: str) -> list[Path]:
+        """All tables that are read."""
+        return [_database(self.folder, self.version).path(table) for table in FIELDS]
 
     def _rows(self) -> dict[str, Row]:
         return {row["name"]: row for row in splits.scenes(_database(self.folder, self.version), self.split)}

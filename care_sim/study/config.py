@@ -1,16 +1,27 @@
 """What an episode is made of: checked when written down."""
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any, Self
 
 import gymnasium
 
-from care_sim.conditions import UNFELT_BY_FULL, Conditions
+from care_sim.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario
-from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, check_seed, collected, departures, flat
+from care_sim.study.task import (
+    CONDITIONS,
+    Likeness,
+    Parameters,
+    Row,
+    Task,
+    check_seed,
+    collected,
+    departures,
+    felt,
+    flat,
+)
 
 ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 """Environment id of every scenario."""
@@ -87,8 +98,6 @@ class EpisodeConfig(Conditions, Task):
 PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITIONS]
 """Fields that are one value."""
 
-_USUAL = {field.name: field.default for field in fields(Conditions)}
-
 
 def grid(
     scenarios: Iterable[str],
@@ -113,9 +122,7 @@ def grid(
 
 
 def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
-    if policy == "full":
-        budget, given = 1.0, given | {name: _USUAL[name] for name in UNFELT_BY_FULL}
-    return EpisodeConfig(scenario, policy, budget, **given)
+    return EpisodeConfig(scenario, policy, **felt(policy, budget, given))
 
 
 def listed(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:

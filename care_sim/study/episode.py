@@ -5,6 +5,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,13 +17,15 @@ from care_sim.study.task import Row
 from care_sim.types import Keyframe, Observation
 from care_sim.world.world import World
 
+Answer = TypeVar("Answer")
+
 
 def attempt(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
     """What a worker does: play episodes; of each its row, or in one line why there is none."""
     return [answer(run_episode, config) for config in batch]
 
 
-def answer(play: Callable[..., Row], *arguments: object) -> Row | str:
+def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
     """What `play` returns, or in one line why it returns nothing: an exception stays in the worker, which alone may
     know its class.
     """

@@ -28,7 +28,7 @@ class ClusterLost(OSError):
 def processes(workers: int) -> Executor:
     """Worker processes on this machine, forked from a clean server that has imported the simulator."""
     context = get_context("forkserver")
-    context.set_forkserver_preload(["care_sim.study.episode", "care_sim.envs.closed_loop"])
+    context.set_forkserver_preload(["care_sim.study.episode", "care_sim.envs.closed_loop", "care_sim.study.plays"])
     # An interrupt is the main process's to handle.
     return ProcessPoolExecutor(workers, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
 
@@ -93,7 +93,7 @@ class ClusterExecutor(Executor):
     def _lost(self) -> ClusterLost:
         return ClusterLost(
             f"the dask scheduler at {self._address} is gone; "
-            "finished episodes are kept, the same command goes on from there"
+            "what is finished is kept, the same command goes on from there"
         )
 
 

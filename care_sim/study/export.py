@@ -34,11 +34,13 @@ class Export(PlayOptions):
         from rich.console import Console
         from rich.progress import track
 
+        from care_sim.study.files import replacing
+
         configs = self._configs()
-        self.out.parent.mkdir(parents=True, exist_ok=True)
-        shown = track(configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty())
-        results = {token: boxes for config in shown for token, boxes in found(config).items()}
-        self.out.write_text(json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8")
+        with replacing(self.out) as file:
+            shown = track(configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty())
+            results = {token: boxes for config in shown for token, boxes in found(config).items()}
+            file.write_text(json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8")
         count = sum(map(len, results.values()))
         print(f"{count} boxes in {len(results)} samples of {len(configs)} scenes are in {self.out}")
         if not count:
@@ -73,6 +75,6 @@ def found(config: "PlayConfig") -> "dict[str, list[Row]]":
     from care_sim.sources.nuscenes.results_form import boxes
     from care_sim.study.plays import play
 
-    playback = play(config)
-    moments = zip(playback.film.shots, playback.exposures, strict=True)
+    film = config.source.film(config.scene)
+    moments = zip(film.shots, play(config, film).exposures, strict=True)
     return {shot.token: boxes(shot, exposure.detections, exposure.velocities) for shot, exposure in moments}

@@ -1,22 +1,22 @@
 """What a play is made of: a policy in a scene whose film is the same for all."""
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any, Self
 
 import gymnasium
 
-from care_sim.conditions import UNFELT_BY_FULL, Conditions
-from care_sim.envs.open_loop import UNFILMED
+from care_sim.conditions import DEFAULTS, Conditions
+from care_sim.envs.open_loop import UNFILMED, FilmEnv
 from care_sim.errors import InvalidInput
+from care_sim.film import Film
 from care_sim.perception.registry import PROXY
-from care_sim.study.provenance import detector_digest, file_digest
+from care_sim.study.provenance import detector_digest
 from care_sim.study.scenes import Scene, Source
-from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, collected, departures, flat
+from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, collected, departures, felt, files_in, flat
 
 _FILMED = [name for name in CONDITIONS if name not in UNFILMED]
-_USUAL = {field.name: field.default for field in fields(Conditions)}
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class PlayConfig(Conditions, Task):
     def __post_init__(self) -> None:
         self.settle("detector_parameters", "policy_parameters")
         for name in UNFILMED:
-            if getattr(self, name) != _USUAL[name]:
+            if getattr(self, name) != DEFAULTS[name]:
                 raise InvalidInput(f"{name} cannot be changed in the open loop: its films are made without")
         with gymnasium.make("care_sim:CARE-Street-v0", disable_env_checker=True, **self._arguments()) as env:
             self.make_policy(env)
@@ -48,26 +48,30 @@ class PlayConfig(Conditions, Task):
         """The same in another scene with another floor, which need no check."""
         return self.changed(scene=scene, floor_seed=floor_seed)
 
-    def make_env(self) -> gymnasium.Env[Any, Any]:
-        """The environment of this play, not yet reset."""
-        name, place = self.source.environment(self.scene)
-        return gymnasium.make(f"care_sim:{name}", disable_env_checker=True, **place, **self._arguments())
+    def make_env(self, film: Film) -> FilmEnv:
+        """The environment of this play, not yet reset, over the film of its scene."""
+        return FilmEnv(film, **self._arguments())
 
     def row(self) -> Row:
         """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`."""
         plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
         own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
-        return self.source.row() | {"scene": self.scene.name} | plain | own
+        return self.source.row(self.scene) | {"scene": self.scene.name} | plain | own
 
     def installed(self) -> list[str | None]:
         """Of the detector too, and of the files that it is given."""
-        files = [file_digest(value) for _, value in self.detector_parameters if isinstance(value, str)]
-        return [*super().installed(), detector_digest(self.detector), *files]
+        return [*super().installed(), detector_digest(self.detector), *files_in(self.detector_parameters)]
 
     @property
     def label(self) -> str:
         """A short name for people: scene, policy, budget and what departs from the defaults."""
-        main = (*self.source.row(), "scene", "policy", "budget", *(() if self.detector != PROXY else ("detector",)))
+        main = (
+            *self.source.row(self.scene),
+            "scene",
+            "policy",
+            "budget",
+            *(() if self.detector != PROXY else ("detector",)),
+        )
         return " ".join([f"{self.scene.name} {self.policy} {self.budget:.4g}", *departures(self, main)])
 
     @property
@@ -123,9 +127,7 @@ def play_grid(
 
 
 def _config(source: Source, scene: Scene, policy: str, budget: float, given: dict[str, Any]) -> PlayConfig:
-    if policy == "full":
-        budget, given = 1.0, given | {name: _USUAL[name] for name in UNFELT_BY_FULL}
-    return PlayConfig(source, scene, policy, budget, **given)
+    return PlayConfig(source, scene, policy, **felt(policy, budget, given))
 
 
 def listed(configs: Sequence[PlayConfig]) -> dict[str, Any]:
@@ -139,4 +141,4 @@ def listed(configs: Sequence[PlayConfig]) -> dict[str, Any]:
 
 def _plain(config: PlayConfig) -> dict[str, Any]:
     own = {name: value for name, value in asdict(config).items() if name not in (*UNFILMED, "scene")}
-    return own | config.source.row()
+    return own | {"source": config.source.kind}

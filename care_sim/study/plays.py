@@ -4,7 +4,6 @@ import hashlib
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,10 +18,8 @@ from care_sim.openloop import Exposure
 from care_sim.residual import explained
 from care_sim.study.episode import answer, peak_rss_mb
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.task import Row
+from care_sim.study.task import FULL, REFERENCE, Row
 
-REFERENCE = "care"
-"""The policy with whose allocations those of the others are compared."""
 SUMS = tuple(field.name for field in fields(Tally))
 EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
 """What is known of an event before any policy plays."""
@@ -32,8 +29,10 @@ _NAMES = ("source", "scene", "policy", "budget", "detector", "floor_seed", "came
 
 def attempt(batch: Sequence[PlayConfig]) -> list[Row | str]:
     """What a worker does: the plays of one scene; of each its row, or in one line why there is none."""
-    scene = PlayedScene()
-    return [answer(scene.row, config) for config in batch]
+    scene = answer(PlayedScene, batch[0])
+    if isinstance(scene, str):
+        return [scene] * len(batch)
+    return [answer(scene.row, config, len(batch)) for config in batch]
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,6 @@ class Playback:
     that a forecast explains.
     """
 
-    film: Film
     score: Score
     exposures: list[Exposure]
     tracks: float
@@ -56,18 +54,26 @@ class Playback:
 
 
 class PlayedScene:
-    """Plays policies in one scene; those of the reference are kept, since the others are compared with them."""
+    """Plays policies in one scene; those of the reference are kept, since the others are compared with them.
 
-    def __init__(self) -> None:
+    Raises InvalidInput where the film of the scene cannot be made.
+    """
+
+    def __init__(self, config: PlayConfig):
+        started = time.perf_counter()
+        self._film = config.source.film(config.scene)
+        self._film_s = time.perf_counter() - started
+        self._film_hash = film_hash(self._film)
         self._references: dict[PlayConfig, Playback] = {}
 
-    def row(self, config: PlayConfig) -> Row:
+    def row(self, config: PlayConfig, sharers: int = 1) -> Row:
         """The row of a play.
 
         Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the same film was
         played, and `episode_hash`, over what was fired and detected; the fields of `Tally`, those of every stratum as
         `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the events; `tracks` and `explained`;
-        `differing_keyframes` and `differing_cells` against the reference; `keyframes`, `wall_s`, `peak_rss_mb`.
+        `differing_keyframes` and `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s`
+        with the share of the film's that falls to one of so many plays.
         """
         playback = self._playback(config)
         score = playback.score
@@ -75,7 +81,7 @@ class PlayedScene:
             **config.row(),
             "version": care_sim.__version__,
             "digest": config.digest(),
-            "film_hash": film_hash(playback.film),
+            "film_hash": self._film_hash,
             "episode_hash": _episode_hash(playback.exposures),
             "keyframes": len(playback.exposures),
             **asdict(score.tally()),
@@ -85,41 +91,41 @@ class PlayedScene:
             "tracks": playback.tracks,
             "explained": playback.explained,
             **self._difference(config, playback),
-            "wall_s": playback.wall_s,
+            "wall_s": playback.wall_s + self._film_s / sharers,
             "peak_rss_mb": peak_rss_mb(),
         }
 
     def _playback(self, config: PlayConfig) -> Playback:
         if config != _reference(config):
-            return play(config)
+            return play(config, self._film)
         if config not in self._references:
-            self._references[config] = play(config)
+            self._references[config] = play(config, self._film)
         return self._references[config]
 
     def _difference(self, config: PlayConfig, playback: Playback) -> Row:
         reference = _reference(config)
-        if config.policy == "full" or config == reference:
+        if config.policy == FULL or config == reference:
             return {"differing_keyframes": None, "differing_cells": None}
         moved: AllocationDifference = allocation_difference(playback.fired, self._playback(reference).fired)
         return {"differing_keyframes": moved.differing, "differing_cells": moved.cells}
 
 
-def play(config: PlayConfig) -> Playback:
-    """Play a policy through a scene. `wall_s` includes the film where this play is the scene's first."""
+def play(config: PlayConfig, film: Film) -> Playback:
+    """Play a policy through the film of its scene."""
     started = time.perf_counter()
-    with config.make_env() as env:
+    with config.make_env(film) as env:
         policy = config.make_policy(env)
         observation, _ = env.reset(seed=config.scene.seed)
         policy.reset()
-        loop = env.unwrapped.loop  # type: ignore[attr-defined]
+        loop = env.loop
         counts = []
         while not loop.over:
             belief = loop.belief
             counts.append((len(belief.tracks), int(explained(belief.detections, belief.tracks, loop.rig).sum())))
             observation, *_ = env.step(policy(observation))
-        score, exposures = env.unwrapped.score, env.unwrapped.exposures  # type: ignore[attr-defined]
+        score, exposures = env.score, env.exposures
     tracks, explanations = np.mean(counts, axis=0).tolist()
-    return Playback(loop.film, score, exposures, tracks, explanations, time.perf_counter() - started)
+    return Playback(score, exposures, tracks, explanations, time.perf_counter() - started)
 
 
 def without_events(row: Row) -> Row:
@@ -136,7 +142,6 @@ def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
     return {**names, **seen, "detected": delays == 0, "ttfd": delays}
 
 
-@lru_cache(maxsize=1)
 def film_hash(film: Film) -> str:
     """A hash over everything that a film shows."""
     content = hashlib.sha256(repr((film.name, film.cameras, film.sensor_height_m, film.keyframe_s)).encode())

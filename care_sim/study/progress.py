@@ -73,6 +73,10 @@ class Reporter(Audience):
             self._predicted_s = self._end - self._started
         self._tell()
 
+    def interrupted(self) -> None:
+        """Say why it takes a moment."""
+        print("interrupted: what is played now is finished first", file=sys.stderr, flush=True)
+
     def summary(self, unit: str) -> str:
         """How long it took, and how long it should have."""
         took = f"{self._new} {unit} took {_exact(self._clock() - self._started)}"

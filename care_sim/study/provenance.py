@@ -3,7 +3,8 @@
 import hashlib
 import os
 import platform
-from functools import cache
+from collections.abc import Iterable
+from functools import cache, lru_cache
 from importlib import metadata
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
@@ -17,6 +18,8 @@ from care_sim.policies import BUILT_IN
 from care_sim.policies.installed import entries
 
 LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numpy", "pyarrow", "pybullet", "scipy")
+EXTRAS = ("open3d", "open3d-cpu", "torch")
+"""Libraries of detectors and policies that may be there."""
 
 
 SESSION = uuid4().hex
@@ -40,9 +43,27 @@ def detector_digest(detector: str) -> str | None:
     return "" if detector in BUILT_IN_DETECTORS else _package_digest(detector_entries()[detector])
 
 
-def file_digest(path: str) -> str:
-    """Hash of a file's content; empty where there is none."""
-    return _content_digest(Path(path)) if Path(path).is_file() else ""
+def file_digest(path: Path) -> str:
+    """Hash of the content of a file, or of the files below a folder; empty where there is neither."""
+    if path.is_dir():
+        return _combined(file_digest(file) for file in sorted(path.rglob("*")) if file.is_file())
+    return _hashed(path, path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else ""
+
+
+@lru_cache(maxsize=10_000)
+def _hashed(path: Path, _size: int, _changed: int) -> str:
+    """Hash of a file that has not changed since it was last hashed."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
+def _combined(digests: Iterable[str]) -> str:
+    return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
+
+
+def data_digest(paths: Iterable[Path]) -> str:
+    """Hash of the content of several files."""
+    return _combined(map(file_digest, paths))
 
 
 def _package_digest(entry: EntryPoint) -> str | None:
@@ -65,13 +86,17 @@ def _content_digest(root: Path, pattern: str = "*") -> str:
 
 def versions() -> dict[str, str]:
     """Versions of Python, the package, its code and the libraries that decide an episode."""
-    libraries = {name: metadata.version(name) for name in LIBRARIES}
+    libraries = {name: metadata.version(name) for name in (*LIBRARIES, *filter(_is_installed, EXTRAS))}
     return {
         "python": platform.python_version(),
         "care-sim": care_sim.__version__,
         "code": code_digest(),
         **libraries,
     }
+
+
+def _is_installed(library: str) -> bool:
+    return any(metadata.distributions(name=library))
 
 
 def machine() -> dict[str, str | int]:

@@ -11,7 +11,7 @@ from care_sim.errors import InvalidInput
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import remove_others, save
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import kind_in
+from care_sim.study.kinds import KINDS, Kind, kind_in
 from care_sim.study.latex import PREAMBLE, latex, paragraph
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
@@ -39,6 +39,7 @@ def conduct(
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
     kind = study.kind
+    _check_kind(folder, kind)
     if workers < 1:
         raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
     with _journal(folder) as journal:
@@ -102,6 +103,12 @@ def _left_out(what: str) -> str:
 def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failure]) -> str:
     settings = {"study": study.name, "versions": versions(), "machine": machine(), "failed": [*map(str, failures)]}
     return json.dumps(settings | study.kind.listed(configs), indent=1) + "\n"
+
+
+def _check_kind(folder: Path, kind: Kind) -> None:
+    for other in KINDS:
+        if other is not kind and (folder / other.file).exists():
+            raise InvalidInput(f"{folder} holds {other.unit} of another study; {kind.unit} need another --out")
 
 
 def _journal(folder: Path) -> Journal:

@@ -1,7 +1,6 @@
 """Rows of a study in a Parquet file."""
 
 import json
-import os
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from care_sim.errors import InvalidInput
+from care_sim.study.files import replacing
 from care_sim.study.task import Row
 
 STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"
@@ -24,14 +24,13 @@ def write_rows(rows: Sequence[Row], path: Path, study: str = "sweep", left_out: 
 
 
 def write_columns(columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, str] | None = None) -> None:
-    """Write columns to a Parquet file in one move: readers see the old file or the new."""
+    """Write columns to a Parquet file, whole or not at all."""
     arrays = {name: pa.array(column) for name, column in columns.items()}
     measured = {
         name: column.cast(pa.float64()) if column.type == pa.null() else column for name, column in arrays.items()
     }
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    pq.write_table(pa.table(measured).replace_schema_metadata(notes), unfinished)
-    unfinished.replace(path)
+    with replacing(path) as unfinished:
+        pq.write_table(pa.table(measured).replace_schema_metadata(notes), unfinished)
 
 
 def with_tuples(row: Row) -> Row:

@@ -1,7 +1,7 @@
 """Runs tasks over workers; survives the death of a worker and finds the batch that killed it."""
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
@@ -18,6 +18,9 @@ Attempt = Callable[[Any], list[Row | str]]
 Flying = dict[Future[list[Row | str]], Batch]
 """The batches in flight."""
 
+DIED = "the worker process died"
+DEADLY = 3
+"""Workers that a policy may kill before the rest of its tasks is not tried any more."""
 PATIENCE_S = 2.0
 """How long nothing may happen before the audience is told so."""
 
@@ -42,6 +45,9 @@ class Audience:
     def finished(self, config: Task, row: Row | None) -> None:
         """A task has ended; None when it failed."""
 
+    def interrupted(self) -> None:
+        """Somebody wants to stop: what is played now is finished first."""
+
 
 def run_all(
     configs: Sequence[Task],
@@ -53,8 +59,9 @@ def run_all(
 ) -> list[Failure]:
     """Run every task that the journal does not hold yet, in their order; returns those that failed.
 
-    An interrupt leaves every finished batch in the journal. When a worker dies, the batches then in flight are run
-    again one by one, so that only the guilty one fails. Raises ClusterLost when a cluster's scheduler is gone.
+    An interrupt waits for the batches in flight and leaves all that is finished in the journal. When a worker dies,
+    the batches then in flight are run again one by one, and in halves, so that only the guilty task fails; the rest
+    of a policy that has killed DEADLY workers is not tried. Raises ClusterLost when a cluster's scheduler is gone.
     """
     run = _Run(journal, workers, make_executor, audience or Audience(), attempt)
     waiting = deque(batches([config for config in configs if config.digest() not in journal]))
@@ -69,6 +76,7 @@ class _Run:
         self, journal: Journal, workers: int, make_executor: ExecutorFactory, audience: Audience, attempt: Attempt
     ):
         self.failures: list[Failure] = []
+        self._deaths: Counter[str] = Counter()
         self._attempt = attempt
         self._journal = journal
         self._workers = workers
@@ -88,22 +96,44 @@ class _Run:
                     self._land(flying)
             except BrokenExecutor:
                 wait(flying)
+            except KeyboardInterrupt:
+                self._audience.interrupted()
+                wait(flying)
+                for future, batch in flying.items():
+                    self._kept(batch, future)
+                raise
         return [batch for future, batch in flying.items() if not self._kept(batch, future)]
 
     def alone(self, batch: Batch) -> None:
-        """Run one batch in a worker of its own."""
+        """Run one batch in a worker of its own; in halves, when that one dies too."""
+        batch = self._tried(batch)
+        if not batch:
+            return
         with self._make_executor(1) as executor:
             future = self._submit(executor, batch)
             wait([future])
-        if not self._kept(batch, future):
-            self._fail(batch, "the worker process died")
+        if self._kept(batch, future):
+            return
+        if len(batch) == 1:
+            self._deaths[batch[0].policy] += 1
+            self._fail(batch, DIED)
+            return
+        for half in (batch[: len(batch) // 2], batch[len(batch) // 2 :]):
+            self.alone(half)
+
+    def _tried(self, batch: Batch) -> Batch:
+        """The tasks of a batch but for those of deadly policies, which fail."""
+        self._fail([task for task in batch if self._deaths[task.policy] >= DEADLY], f"{DIED} {DEADLY} times before")
+        return [task for task in batch if self._deaths[task.policy] < DEADLY]
 
     def _launch(self, executor: Executor, waiting: "deque[list[Task]]", flying: Flying) -> None:
         """Fill the places; a cluster without any gets one batch, which waits for a worker."""
         workers = places(executor, self._workers)
         self._audience.playing(workers)
         while waiting and len(flying) < max(workers, 1):
-            flying[self._submit(executor, waiting[0])] = waiting[0]
+            batch = self._tried(waiting[0])
+            if batch:
+                flying[self._submit(executor, batch)] = batch
             waiting.popleft()
 
     def _land(self, flying: Flying) -> None:

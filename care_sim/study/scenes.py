@@ -1,14 +1,14 @@
 """The scenes of the protocol by a text: generated streets, or recordings in a folder."""
 
-import hashlib
-from dataclasses import asdict, dataclass
-from functools import lru_cache
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from care_sim.errors import InvalidInput, unknown
+from care_sim.film import Film
 from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
-from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, street_name
+from care_sim.streets.recording import record
+from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street, street_name
+from care_sim.study.provenance import data_digest, file_digest
 
 
 class Scene(NamedTuple):
@@ -25,12 +25,19 @@ class Source(Protocol):
         """All of them, in order. Raises InvalidInput where they cannot be listed."""
         ...
 
-    def environment(self, scene: Scene) -> tuple[str, dict[str, Any]]:
-        """The id of a scene's environment and the arguments that choose the scene."""
+    @property
+    def kind(self) -> str:
+        """What the source is called."""
         ...
 
-    def row(self) -> dict[str, Any]:
-        """Columns that name the source, wherever its files lie."""
+    def film(self, scene: Scene) -> Film:
+        """The film of a scene. Raises InvalidInput where it cannot be made."""
+        ...
+
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """Columns that tell where a scene comes from: the kind of the source, and of recordings a hash of the files
+        that it is read from, wherever they lie.
+        """
         ...
 
 
@@ -38,42 +45,46 @@ class Source(Protocol):
 class Streets:
     """Generated streets: the 150 of the evaluation, or the 20 of the calibration."""
 
+    kind = "streets"
     split: str = "evaluation"
 
     def scenes(self) -> list[Scene]:
         """One a seed."""
         return [Scene(street_name(seed), seed) for seed in SPLITS[self.split]]
 
-    def environment(self, scene: Scene) -> tuple[str, dict[str, Any]]:
-        """The seed chooses the street."""
-        return "CARE-Street-v0", {}
+    def film(self, scene: Scene) -> Film:
+        """The street of the seed."""
+        return record(make_street(scene.seed))
 
-    def row(self) -> dict[str, Any]:
-        """Streets have one source."""
-        return {"source": "streets"}
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """The name of a street says all."""
+        return {"source": self.kind}
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """Scenes of recordings; `text` names them as on the command line."""
+    """Scenes of recordings."""
 
-    text: str
     recordings: Recordings
+
+    @property
+    def kind(self) -> str:
+        """The kind of the recordings."""
+        return self.recordings.kind
 
     def scenes(self) -> list[Scene]:
         """By name; one seed for all, since the name of a scene is part of what draws its faults and floor."""
         return [Scene(name, 0) for name in self.recordings.scenes()]
 
-    def environment(self, scene: Scene) -> tuple[str, dict[str, Any]]:
-        """The name chooses the scene."""
-        options = {name: value for name, value in asdict(self.recordings).items() if name != "folder"}
-        return "CARE-Replay-v0", {"source": self.text, "scene": scene.name, **options}
+    def film(self, scene: Scene) -> Film:
+        """The recorded scene of the name."""
+        return self.recordings.film(scene.name)
 
-    def row(self) -> dict[str, Any]:
-        """The kind of recordings, and a hash of the file of camera detections where there is one."""
-        own = {"source": self.recordings.kind}
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """The kind, the hash of the scene's files, and that of the camera detections where there are some."""
+        own = {"source": self.kind, "recording": data_digest(self.recordings.files(scene.name))}
         if isinstance(self.recordings, NuScenes) and self.recordings.camera_detections:
-            own["camera_detections"] = _content_hash(self.recordings.camera_detections)
+            own["camera_detections"] = file_digest(self.recordings.camera_detections)
         return own
 
 
@@ -90,7 +101,7 @@ def source_of(text: str, **options: object) -> Source:
         if text.partition(":")[0] not in KINDS:
             known = ", ".join(["streets", *(f"{kind}:FOLDER" for kind in KINDS)])
             raise InvalidInput(f"unknown source {text!r}; known: {known}")
-        return Recorded(text, recordings(text, options))
+        return Recorded(recordings(text, options))
     given = {name: value for name, value in options.items() if value is not None}
     split = str(given.pop("split", "evaluation"))
     if given:
@@ -106,7 +117,7 @@ def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     """
     if not names:
         return scenes
-    if len(names) == 1 and names[0].isdigit():
+    if len(names) == 1 and names[0].isdecimal():
         if not 1 <= int(names[0]) <= len(scenes):
             raise InvalidInput(f"scenes must be a number from 1 to {len(scenes)} or names, got {names[0]}")
         return scenes[: int(names[0])]
@@ -115,8 +126,3 @@ def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
         if name not in known:
             raise unknown("scene", name, known)
     return [known[name] for name in dict.fromkeys(names)]
-
-
-@lru_cache(maxsize=1)
-def _content_hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]

@@ -5,19 +5,19 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from copy import copy
-from dataclasses import fields
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Self
 
 import gymnasium
 import numpy as np
 
 import care_sim
-from care_sim.conditions import Conditions
+from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
 from care_sim.errors import check_whole
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
-from care_sim.study.provenance import SESSION, code_digest, policy_digest
+from care_sim.study.provenance import SESSION, code_digest, file_digest, policy_digest
 
 Parameters = tuple[tuple[str, Any], ...]
 """Names and values, of a scenario's physics, a policy or a detector."""
@@ -30,7 +30,9 @@ Likeness = tuple[object, ...]
 LARGEST_SEED = 2**63 - 1
 """What a column of a results file holds."""
 
-CONDITIONS = [field.name for field in fields(Conditions)]
+CONDITIONS = [*DEFAULTS]
+REFERENCE, FULL = "care", "full"
+"""The policy that others are compared with, and the full scan."""
 
 
 class Task(ABC):
@@ -39,10 +41,6 @@ class Task(ABC):
     policy: str
     budget: float
     policy_parameters: Parameters
-
-    @abstractmethod
-    def make_env(self) -> gymnasium.Env[Any, Any]:
-        """The environment, not yet reset."""
 
     @abstractmethod
     def row(self) -> Row:
@@ -82,8 +80,10 @@ class Task(ABC):
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
 
     def installed(self) -> list[str | None]:
-        """Hashes of the code beside the package that decides the row; None of what has no source to read."""
-        return [policy_digest(self.policy)]
+        """Hashes of what decides the row beside the package and the parameters: code of others, and the files that
+        parameters name; None of code that has no source to read.
+        """
+        return [policy_digest(self.policy), *files_in(self.policy_parameters)]
 
     @cached_property
     def _session(self) -> str:
@@ -105,8 +105,22 @@ class Task(ABC):
 
 def departures(task: Task, without: Sequence[str]) -> list[str]:
     """What of a task's row departs from the default conditions, as NAME=VALUE."""
-    usual = {field.name: field.default for field in fields(Conditions)}
-    return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != usual.get(n)]
+    return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != DEFAULTS.get(n)]
+
+
+def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
+    """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither camera nor
+    allocator.
+    """
+    if policy != FULL:
+        return {"budget": budget, **conditions}
+    return conditions | {"budget": 1.0} | {name: DEFAULTS[name] for name in UNFELT_BY_FULL}
+
+
+def files_in(parameters: Parameters) -> list[str]:
+    """Hashes of the files and folders that parameters name."""
+    paths = (Path(value) for _, value in parameters if isinstance(value, str))
+    return [file_digest(path) for path in paths if path.exists()]
 
 
 def flat(prefix: str, parameters: Parameters) -> Row:

@@ -137,15 +137,16 @@ def test_the_seed_draws_floor_and_faults_and_the_same_seed_the_same_episode(make
 
 
 def test_policies_meet_the_same_floor_and_misses(replay):
-    seen = []
-    for policy in ("random", "history"):
+    seen, floors = [], []
+    for action in (NOTHING, np.eye(32, 512, dtype=np.float32)):
         env = replay(false_negative_rate=0.5)
-        chooses = care_sim.make_policy(policy, env)
         observation, _ = env.reset(seed=2)
         for _ in range(4):
             seen.append(observation["detections"])
-            observation, *_ = env.step(chooses(observation))
+            observation, *_, info = env.step(action)
+            floors.append(set(info["fired"].tolist()) - set(np.flatnonzero(action).tolist()))
     np.testing.assert_array_equal(seen[:4], seen[4:])
+    assert all(after < alone for alone, after in zip(floors[:4], floors[4:], strict=True))
     unimpaired, _ = replay().reset(seed=2)
     assert not np.array_equal(seen[0], unimpaired["detections"])
 
@@ -188,6 +189,7 @@ def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):
         ({"duration_s": 3.0}, "duration_s is no argument"),
         ({"detector": "yolo"}, "unknown detector 'yolo'"),
         ({"detector_parameters": {"size": 3}}, "unknown parameter of detector returns 'size'"),
+        ({"detector": "cluster", "min_returns": 5}, "min_returns is of the detector returns"),
         ({"render_mode": "rgb_array"}, "render_mode must be None"),
         ({"budget": 0.0}, "budget"),
     ],

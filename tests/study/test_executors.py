@@ -156,7 +156,7 @@ def test_a_lost_scheduler_is_one_line_and_keeps_what_was_played(dask_cluster, tm
         until(lambda: journal.exists() and journal.read_text().count("\n") >= 2)
         dask_cluster.scheduler.kill()
         _, complaint = sweep.communicate(timeout=40)
-    gone = f"care-sim: the dask scheduler at {dask_cluster.address} is gone; finished episodes are kept, "
+    gone = f"care-sim: the dask scheduler at {dask_cluster.address} is gone; what is finished is kept, "
     assert complaint.splitlines()[-1] == f"{gone}the same command goes on from there"
     assert all(line.startswith("episodes ") for line in complaint.splitlines()[:-1])
     assert sweep.returncode == 2

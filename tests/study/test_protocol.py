@@ -13,7 +13,7 @@ from care_sim.cli import main
 from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
-from care_sim.study import plays, provenance
+from care_sim.study import plays
 from care_sim.study.journal import Journal
 from care_sim.study.kinds import PLAYS
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
@@ -21,6 +21,7 @@ from care_sim.study.report import JOURNAL, conduct, reported
 from care_sim.study.runner import run_all
 from care_sim.study.scenes import Scene, Streets, chosen, source_of
 from care_sim.study.studies import STUDIES
+from care_sim.study.task import batches
 
 MEASURED = {"wall_s", "peak_rss_mb"}
 PROTOCOL = STUDIES["protocol"]
@@ -51,7 +52,7 @@ def steady(row):
 
 
 def attempted(configs):
-    return plays.attempt(configs)
+    return [row for batch in batches(configs) for row in plays.attempt(batch)]
 
 
 def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):
@@ -89,8 +90,8 @@ def test_allocations_are_compared_with_those_of_care_under_the_same_conditions(s
     assert rows["full"]["differing_keyframes"] is None
     assert 0 < rows["history"]["differing_keyframes"] <= 10
     assert rows["history"]["differing_cells"] > 10
-    blind = attempted(small(source, ["history"], false_negative_rate=1.0))[0]
-    assert (blind["differing_keyframes"], blind["differing_cells"]) == (0, 0)
+    for blind in attempted(small(source, ["history"], floors=(0, 1), false_negative_rate=1.0)):
+        assert (blind["differing_keyframes"], blind["differing_cells"]) == (0, 0)
 
 
 def test_full_plays_once_for_all_that_it_does_not_feel(source):
@@ -103,7 +104,7 @@ def test_full_plays_once_for_all_that_it_does_not_feel(source):
 
 def test_the_row_names_every_condition_and_the_label_what_departs(source):
     (config,) = small(source, ["care-sbf"], camera_latency=1, policy_parameters=(("k_safe", 1.0),), floors=(2,))
-    assert set(config.row()) == {*PLAY_FIELDS, "policy.k_safe"}
+    assert set(config.row()) == {*PLAY_FIELDS, "recording", "policy.k_safe"}
     assert config.label == "a care-sbf 0.05 camera_latency=1 floor_seed=2 policy.k_safe=1.0"
     assert listed([config])["scenes"] == ["a"]
     assert listed([config])["configurations"][0]["floor_seeds"] == [2]
@@ -229,8 +230,8 @@ def test_a_scene_without_an_event_has_a_row_too(tmp_path):
 
 def test_conditions_of_a_play_are_those_of_the_environment(source):
     (config,) = small(source, ["care"], min_returns=5, reserve_fraction=0.5)
-    with config.make_env() as env:
-        assert env.unwrapped.conditions == Conditions(min_returns=5, reserve_fraction=0.5)
+    with config.make_env(config.source.film(config.scene)) as env:
+        assert env.conditions == Conditions(min_returns=5, reserve_fraction=0.5)
     assert isinstance(config, PlayConfig)
 
 
@@ -238,8 +239,47 @@ def test_a_play_is_named_by_the_file_that_its_detector_is_given(source, tmp_path
     (plain,) = small(source, ["care"])
     model = tmp_path / "model.pt"
     digests = set()
-    for content in (b"one", b"two"):
+    for content in (b"one", b"another"):
         model.write_bytes(content)
-        provenance._content_digest.cache_clear()
         digests.add(plain.changed(detector="torchscript", detector_parameters=(("file", str(model)),)).digest())
-    assert len(digests | {plain.digest()}) == 3
+        digests.add(plain.changed(policy_parameters=(("weights", str(tmp_path)),)).digest())
+    assert len(digests | {plain.digest()}) == 5
+
+
+def test_what_changed_in_a_recording_is_played_again(source, folder, drive, tmp_path):
+    (config,) = small(source, ["care"])
+    before = config.digest()
+    shutil.copytree(drive, folder / "moved")
+    assert config.digest() == before
+    parked = box("REGULAR_VEHICLE", (15.0, 3.0, 0.42))
+    write(folder / "a", [[parked]] * 10, [at()] * 10)
+    assert config.digest() != before
+
+
+def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
+    """Whole scenes go to a worker; the one that dies takes the others down, which are then played without it."""
+    configs = small(source, ["history", "dies", "care", "raises"], floors=(0, 1), scenes=("a", "b"))
+    with Journal(tmp_path / JOURNAL) as journal:
+        failures = run_all(configs, journal, 2, attempt=PLAYS.attempt)
+        kept = [config.policy for config in configs if config.digest() in journal]
+    assert sorted(kept) == ["care"] * 4 + ["history"] * 4
+    reasons = sorted((failure.config.policy, failure.reason) for failure in failures)
+    assert reasons[4:] == [("raises", "RuntimeError: no idea, at all")] * 4
+    assert reasons[0] == ("dies", "the worker process died")
+    assert reasons[3] == ("dies", "the worker process died 3 times before")
+
+
+def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
+    read = []
+    film = type(source.recordings).film
+    monkeypatch.setattr(type(source.recordings), "film", lambda own, scene: read.append(scene) or film(own, scene))
+    configs = small(source, floors=(0, 1, 2), scenes=("torn",))
+    (reason,) = set(attempted(configs))
+    assert "annotations.feather" in reason
+    assert read == ["torn"]
+
+
+def test_a_folder_of_another_kind_of_study_is_refused(source, tmp_path):
+    (tmp_path / "episodes.parquet").touch()
+    with pytest.raises(InvalidInput, match="holds episodes of another study; plays need another --out"):
+        conduct(small(source), tmp_path, workers=1, study=PROTOCOL)

@@ -23,61 +23,6 @@ from care_sim.types import Outcome
 SHORT = (("duration_s", 0.3),)
 MEASURED = {"wall_s", "peak_rss_mb"}
 
-THIRD_PARTY = """
-import os, signal
-from pathlib import Path
-from care_sim.policies.history import History
-
-class Dies(History):
-    def demand(self, belief):
-        os._exit(3)
-
-class KilledOnce(History):
-    def demand(self, belief):
-        mark = Path(__file__).with_name("killed")
-        if not mark.exists():
-            mark.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().demand(belief)
-
-class Raises(History):
-    def demand(self, belief):
-        raise RuntimeError("no idea," + chr(10) + " at all")
-
-class Odd(Exception):
-    def __init__(self, one, two):
-        super().__init__(f"{one} {two}")
-
-class RaisesOddly(History):
-    def demand(self, belief):
-        raise Odd("hard to", "unpickle")
-
-class Exits(History):
-    def demand(self, belief):
-        raise SystemExit(4)
-"""
-ENTRY_POINTS = """
-[care_sim.policies]
-dies = misbehaving:Dies
-killed-once = misbehaving:KilledOnce
-raises = misbehaving:Raises
-raises-oddly = misbehaving:RaisesOddly
-exits = misbehaving:Exits
-"""
-
-
-@pytest.fixture
-def third_party(tmp_path, monkeypatch):
-    """An installed package whose policies do not behave."""
-    site = tmp_path / "site"
-    info = site / "misbehaving-1.0.dist-info"
-    info.mkdir(parents=True)
-    (site / "misbehaving.py").write_text(THIRD_PARTY)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: misbehaving\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS)
-    monkeypatch.syspath_prepend(site)
-    return site
-
 
 def short(policies, seeds=(0,), budgets=(0.1,)):
     return grid(["dartout"], policies, budgets, seeds, scenario_parameters=SHORT)
