@@ -32,11 +32,15 @@ GAP = "dense minus sparse"
 
 @dataclass(frozen=True)
 class Gap:
-    """A difference in the unit of `ratio`; `interval` is None where too little was played for one."""
+    """A difference in the unit of `ratio`; `interval` is None where too little was played for one.
+
+    The interval comes from resampling scenes, or `over_events` from resampling the events of the scenes played.
+    """
 
     ratio: Ratio
     mean: float
     interval: Interval | None
+    over_events: bool = False
 
     @property
     def sign(self) -> int:
@@ -102,7 +106,7 @@ class Pair:
         if found.scenes >= FEWEST_PAIRS:
             return Gap(self.ratio, by.mean, by)
         by_events = None if self.within or self.alike else _by_events(self, plays, budget)
-        return Gap(self.ratio, by.mean, by_events)
+        return Gap(self.ratio, by.mean, by_events, over_events=by_events is not None)
 
     def _contrast(self, plays: Plays, budget: float) -> SceneContrast | None:
         ours, theirs = (plays.tallies(policy, budget, self.within) for policy in self.policies)
@@ -153,7 +157,8 @@ def _dense_less_sparse(ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Map
     interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
     if interval is None:
         return None
-    enough = min(len(groups["dense"]), len(groups["sparse"])) >= FEWEST_PAIRS
+    ends = [_among(ratio, {name: ours[name] for name in groups[which]}, theirs) for which in ("dense", "sparse")]
+    enough = all(end and end.interval for end in ends)
     return Gap(ratio, interval.mean, interval if enough else None)
 
 

@@ -1,9 +1,11 @@
 """How to read the tables of the first-sighting protocol."""
 
+from care_sim.study.protocol_entries import OVER_EVENTS
+
 READING = (
     "Differences are points of recall (TTFD: keyframes), positive where the first named has more, with 95% intervals "
-    "of 10,000 paired resamples of scenes; bold: the interval excludes zero. (paper): what the paper reports, measured "
-    "on nuScenes with its own detectors."
+    f"of 10,000 paired resamples of scenes, or of events where marked {OVER_EVENTS}; bold: the interval excludes zero. "
+    "(paper): what the paper reports, measured on nuScenes with its own detectors."
 )
 MEASURES = (
     "First-sighting recall: share of the objects that newly enter the 50 m around the car that are detected at their "
@@ -14,4 +16,8 @@ WEIGHTS = (
     "Every event weighs the same, and every object frame; with equal scene weights every scene does. No correction is "
     "made for the number of differences in a table."
 )
-PROTOCOL_CAPTION = " ".join([READING, MEASURES, WEIGHTS])
+COVERAGE = (
+    "On synthetic scenes, 9% of them without events, the intervals over scenes held the truth in 95% of draws with 150 "
+    "scenes, 94% with 50, 92% with 20 and 78% with 5: of fewer than about 20 scenes they are too narrow."
+)
+PROTOCOL_CAPTION = " ".join([READING, MEASURES, WEIGHTS, COVERAGE])

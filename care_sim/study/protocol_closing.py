@@ -1,22 +1,23 @@
 """What is said after the protocol's tables: how much was played, and whether the paper's gate is met."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.study.contrasts import GATE_POINTS
 from care_sim.study.entries import percent
-from care_sim.study.gaps import Pair
+from care_sim.study.gaps import Gap, Pair
 from care_sim.study.protocol_entries import whole
-from care_sim.study.protocol_notes import counts
+from care_sim.study.protocol_notes import counts, on_intervals
 from care_sim.study.protocol_paper import GATE
-from care_sim.study.protocol_rows import REFERENCE, Plays, plays_of
+from care_sim.study.protocol_rows import REFERENCE, Plays, Setting, plays_of
 from care_sim.study.task import Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:
     """Size of the study, and CARE over history against the gate of five points in every plain setting."""
-    gates = [gate for plays in plays_of(rows) if not plays.setting.conditions if (gate := _gate(plays))]
-    return [_size(rows), *gates]
+    gains = {plays.setting: _gains(plays) for plays in plays_of(rows) if not plays.setting.conditions}
+    gates = [_gate(setting, gaps) for setting, gaps in gains.items() if gaps]
+    return [_size(rows), *gates, *on_intervals(gap for gaps in gains.values() for gap in gaps.values())]
 
 
 def _size(rows: Sequence[Row]) -> str:
@@ -28,16 +29,18 @@ def _size(rows: Sequence[Row]) -> str:
     )
 
 
-def _gate(plays: Plays) -> str:
+def _gains(plays: Plays) -> dict[float, Gap]:
+    """CARE over history by budget."""
     pair = Pair(REFERENCE, "history", FIRST_SIGHTING)
-    gaps = {budget: gap for budget in plays.budgets if (gap := pair.gap(plays, budget))}
-    if not gaps:
-        return ""
+    return {budget: gap for budget in plays.budgets if (gap := pair.gap(plays, budget))}
+
+
+def _gate(setting: Setting, gaps: Mapping[float, Gap]) -> str:
     measured = (
         f"{whole(gap)} at {percent(budget)} ({'met' if _is_met(gap.mean, gap.sign) else 'not met'})"
         for budget, gap in gaps.items()
     )
-    return f'Paper: "{GATE}" Here, {plays.setting.label}: {", ".join(measured)}.'
+    return f'Paper: "{GATE}" Here, {setting.label}: {", ".join(measured)}.'
 
 
 def _is_met(mean: float, sign: int) -> bool:

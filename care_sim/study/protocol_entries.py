@@ -8,6 +8,8 @@ from care_sim.study.table import Bold
 PAPER = "(paper)"
 """What the line under a policy begins with that holds the paper's numbers."""
 MET, NOT_MET, UNDECIDED = "met", "not met", "undecided"
+OVER_EVENTS = "°"
+"""Ends what rests on an interval over events."""
 
 
 def written(ratio: Ratio, value: float | None) -> str:
@@ -17,12 +19,12 @@ def written(ratio: Ratio, value: float | None) -> str:
 
 def mean(gap: Gap | None) -> str:
     """A difference without its interval, bold where that excludes zero."""
-    return _weighed(gap, _mean(gap)) if gap else ""
+    return _weighed(gap, f"{_mean(gap)}{_mark(gap)}") if gap else ""
 
 
 def interval(gap: Gap | None) -> str:
     """The interval alone."""
-    return bounds(gap.interval, _decimals(gap.ratio)) if gap and gap.interval else ""
+    return f"{bounds(gap.interval, _decimals(gap.ratio))}{_mark(gap)}" if gap and gap.interval else ""
 
 
 def whole(gap: Gap | None) -> str:
@@ -43,11 +45,17 @@ def judged(gap: Gap | None, claimed: int | None, paper: str) -> str:
     """A difference, whether it bears a claim out, and the claim as the paper has it; bold as `mean` is."""
     if gap is None:
         return ""
-    return mean(gap) if claimed is None else _weighed(gap, f"{_mean(gap)} {verdict(gap, claimed)} ({paper})")
+    if claimed is None:
+        return mean(gap)
+    return _weighed(gap, f"{_mean(gap)} {verdict(gap, claimed)}{_mark(gap)} ({paper})")
 
 
 def _mean(gap: Gap) -> str:
     return f"{gap.mean:+z.{_decimals(gap.ratio)}f}"
+
+
+def _mark(gap: Gap) -> str:
+    return OVER_EVENTS if gap.over_events else ""
 
 
 def _weighed(gap: Gap, text: str) -> str:

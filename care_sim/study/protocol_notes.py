@@ -5,14 +5,20 @@ from collections.abc import Iterable, Iterator
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.study.entries import percent
+from care_sim.study.gaps import Gap
+from care_sim.study.protocol_entries import OVER_EVENTS
 from care_sim.study.protocol_rows import FULL, Plays
 from care_sim.study.task import Row
 
 UNITS = "Recall in points; TTFD in keyframes, where less is better."
-FEW_SCENES = (
-    f"Fewer than {FEWEST_PAIRS} scenes allow no interval over scenes. Those shown come from resampling events, paired "
-    "and averaged over floor seeds; events of one scene are not independent, so these intervals are too narrow. "
-    "Overall recall and equal scene weights have none."
+BY_EVENTS = (
+    f"{OVER_EVENTS}: fewer than {FEWEST_PAIRS} scenes have events and plays of both policies, too few for an interval "
+    "over scenes. This one comes from resampling events, paired and averaged over floor seeds; events of one scene are "
+    "not independent, so it is too narrow, and it speaks for these drives alone."
+)
+NO_INTERVAL = (
+    f"Without an interval: fewer than {FEWEST_PAIRS} scenes, in a measure for which events are not resampled (overall "
+    f"recall, strata, equal scene weights, thirds) or with fewer than {FEWEST_PAIRS} events."
 )
 
 
@@ -31,9 +37,11 @@ def counts(scenes: Iterable[Row]) -> Tally:
     return sum((Tally(events=row["events"], frames=row["frames"]) for row in scenes), Tally())
 
 
-def few_scenes(plays: Plays) -> tuple[str, ...]:
-    """What to know of the intervals where scenes are few."""
-    return (FEW_SCENES,) if len(plays.scenes) < FEWEST_PAIRS else ()
+def on_intervals(gaps: Iterable[Gap | None]) -> tuple[str, ...]:
+    """What to know of the intervals of the differences shown: which are over events, and why some have none."""
+    shown = [gap for gap in gaps if gap]
+    by_events = (BY_EVENTS,) if any(gap.over_events for gap in shown) else ()
+    return (*by_events, NO_INTERVAL) if any(gap.interval is None for gap in shown) else by_events
 
 
 def left_out(plays: Plays) -> tuple[str, ...]:

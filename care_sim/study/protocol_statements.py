@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from care_sim.study.entries import percent
 from care_sim.study.gaps import Compared, Gap, Third
 from care_sim.study.protocol_entries import MET, NOT_MET, UNDECIDED, interval, judged, verdict
-from care_sim.study.protocol_notes import UNITS, few_scenes, papers
+from care_sim.study.protocol_notes import UNITS, on_intervals, papers
 from care_sim.study.protocol_paper import BUDGETS, Said, statements_about
 from care_sim.study.protocol_rows import Plays
 from care_sim.study.table import Table
@@ -41,7 +41,7 @@ def statements_tables(plays: Plays) -> list[Table]:
                 _count(measured, said),
                 f"{UNITS} {RULE}",
                 *_asides(measured),
-                *few_scenes(plays),
+                *on_intervals(gap for gaps in measured.values() for gap in gaps.values()),
                 *_not_played(plays, said),
             ),
             papers(said[each].source for each in measured),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import THIRDS
 from care_sim.study.entries import marked, percent, tag_notes
@@ -14,6 +15,14 @@ from care_sim.study.table import Table
 
 BASES = ("history", "all-camera")
 """The policies that strata compare CARE with."""
+RANKED = (
+    "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. No interval of "
+    f"fewer than {FEWEST_PAIRS} scenes."
+)
+DIFFERING = (
+    "Share of the keyframes, and mean number of cells where they differ. Each policy follows its own tracks, so "
+    "differences accumulate over a scene."
+)
 
 
 def strata_tables(plays: Plays) -> list[Table]:
@@ -22,7 +31,7 @@ def strata_tables(plays: Plays) -> list[Table]:
     if not bases:
         return []
     columns = ("stratum", "budget", REFERENCE, *bases, *(f"{REFERENCE} minus {base}" for base in bases))
-    note = "Intervals over scenes that have anything in the stratum, none of fewer than 5; levels in %."
+    note = f"Intervals over scenes that have anything in the stratum, none of fewer than {FEWEST_PAIRS}; levels in %."
     return [
         Table(
             f"{plays.setting.label}: {ratio.name} by stratum",
@@ -67,7 +76,7 @@ def thirds_tables(plays: Plays) -> list[Table]:
             f"{plays.setting.label}: care minus all-camera in thirds of the scenes",
             ("third", *map(percent, plays.budgets)),
             tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
-            (f"{UNITS} Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds.",),
+            (f"{UNITS} {RANKED}",),
             papers(text.source for each, text in said.items() if isinstance(each, Third)),
             terminal=False,
         )
@@ -112,7 +121,7 @@ def allocation_tables(plays: Plays) -> list[Table]:
             f"{plays.setting.label}: keyframes on which the allocation differs from that of {REFERENCE}",
             ("policy", *map(percent, plays.budgets)),
             tuple(lines),
-            ("Share of the keyframes, and mean number of cells where they differ.", *tag_notes(plays.tags.values())),
+            (DIFFERING, *tag_notes(plays.tags.values())),
             papers(each.source for each in said.values()),
         )
     ]

@@ -57,7 +57,7 @@ def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds(
     few = plays(rows)
     of_events = np.tile([100.0] * 2 + [50.0] * 2 + [0.0] * 6, 3)
     assert FIRST.gap(few, 0.1) == Gap(
-        FIRST_SIGHTING, pytest.approx(30.0), pytest.approx(paired_difference(of_events, np.zeros(30)))
+        FIRST_SIGHTING, pytest.approx(30.0), pytest.approx(paired_difference(of_events, np.zeros(30))), over_events=True
     )
     late = Pair("care", "history", TTFD).gap(few, 0.1)
     assert (late.mean, late.sign) == (pytest.approx(-0.3 * 6 - 0.1 * 5), -1)
@@ -68,9 +68,29 @@ def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds(
     assert (within.interval, within.sign) == (None, 0)
 
 
+def with_events(scenes, played=7):
+    """So many scenes with ten events, of all that were played; CARE finds two events more and two frames more."""
+    return plays(
+        [
+            play(f"{n}", policy, found(events, min(sighted, events)), [sighted] * events)
+            for n, events in enumerate([10] * scenes + [0] * (played - scenes))
+            for policy, sighted in (("care", 6), ("history", 4))
+        ]
+    )
+
+
+@pytest.mark.parametrize(("scenes", "over_events"), [(3, True), (4, True), (5, False), (7, False)])
+def test_scenes_without_events_do_not_count_towards_an_interval_over_scenes(scenes, over_events):
+    gap = FIRST.gap(with_events(scenes), 0.1)
+    assert (gap.mean, gap.over_events) == (pytest.approx(20.0), over_events)
+    assert (gap.interval.low < gap.mean) == over_events
+    assert not Pair("care", "history", OVERALL).gap(with_events(scenes), 0.1).over_events
+
+
 def test_five_scenes_are_enough_and_four_events_are_too_few():
     five = FIRST.gap(plays(study({"care": (6, 5), "history": (4, 6)}, scenes=5, events=7)), 0.1)
     assert five.interval.low == five.interval.high
+    assert not five.over_events
     few = plays([play("a", policy, found(4, n), [0] * 4) for policy, n in (("care", 3), ("history", 1))])
     assert FIRST.gap(few, 0.1) == Gap(FIRST_SIGHTING, 50.0, None)
 
@@ -106,3 +126,15 @@ def test_small_thirds_have_no_interval_and_smaller_ones_no_gap():
     nine = [Third(which, "tracks", OVERALL).gap(thirds(9), 0.1) for which in ("dense", GAP)]
     assert [(gap.mean, gap.interval) for gap in nine] == [(pytest.approx(20.0), None)] * 2
     assert Third(GAP, "tracks", OVERALL).gap(thirds(8), 0.1) is None
+
+
+def test_scenes_without_events_do_not_make_a_third_large_enough():
+    """Of the five scenes with the most tracks two have no events."""
+    rows = [
+        play(f"{n:02d}", policy, found(events, 0), [frames] * events, tracks=float(n))
+        for n, events in enumerate([10] * 13 + [0] * 2)
+        for policy, frames in (("care", 6), ("all-camera", 5))
+    ]
+    dense, sparse, gap = (Third(which, "tracks", OVERALL).gap(plays(rows), 0.1) for which in ("dense", "sparse", GAP))
+    assert (dense.interval, gap.interval) == (None, None)
+    assert sparse.sign == 1

@@ -211,14 +211,6 @@ def test_without_care_there_are_levels_alone():
     assert list(tables(study({"full": (8, 8)}))) == ["levels"]
 
 
-def test_few_scenes_are_spoken_of():
-    shown = tables(study(FOUND, scenes=2))
-    assert block(shown["care minus each policy"], "First sightings")[0][1].startswith("+10.0 [")
-    assert block(shown["care minus each policy"], "Overall recall")[0][1] == "-10.0"
-    for name in ("care minus each policy", "the paper's statements"):
-        assert any("not independent" in note for note in shown[name].notes)
-
-
 def test_the_closing_counts_and_holds_the_gain_against_the_papers_gate():
     size, gate = protocol_closing(ROWS)
     assert size == ("Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 276.")

@@ -1,0 +1,85 @@
+"""What the protocol's tables say of their intervals: over scenes, over events where scenes are few, or none."""
+
+from made_plays import found, play, study
+from rich.console import Console
+
+from care_sim.study.protocol_closing import protocol_closing
+from care_sim.study.protocol_notes import BY_EVENTS, NO_INTERVAL
+from care_sim.study.protocol_tables import protocol_tables
+from care_sim.study.report import print_report, write_report
+from care_sim.study.studies import STUDIES
+from care_sim.study.table import Bold
+
+BOTH = {"care": (6, 5), "history": (4, 6)}
+CONTRASTS, EQUAL = "care minus each policy", "care minus each policy, equal scene weights"
+STATEMENTS = "the paper's statements"
+
+
+def tables(rows):
+    return {table.title.rpartition(": ")[2]: table for table in protocol_tables(rows)}
+
+
+def under(table, heading):
+    """The line under a heading."""
+    return table.rows[table.rows.index((heading,)) + 1]
+
+
+def said_of_intervals(notes):
+    return [note for note in notes if note in (BY_EVENTS, NO_INTERVAL)]
+
+
+def three_with_events():
+    """Of seven scenes three have events."""
+    return [
+        play(f"{n}", policy, found(events, min(sighted, events)), [sighted] * events, budget=0.2)
+        for n, events in enumerate([10] * 3 + [0] * 4)
+        for policy, sighted in (("care", 9), ("history", 1))
+    ]
+
+
+def test_what_rests_on_an_interval_over_events_is_marked_and_explained():
+    shown = tables(three_with_events())
+    sightings = under(shown[CONTRASTS], "First sightings")[1]
+    assert isinstance(sightings, Bold)
+    assert (sightings[:7], sightings[-2:]) == ("+80.0 [", "]°")
+    assert under(shown[CONTRASTS], "Censored TTFD")[1].endswith("]°")
+    assert under(shown[CONTRASTS], "Overall recall")[1] == "+80.0"
+    judgement, interval = under(shown[STATEMENTS], "First sightings")[1:]
+    assert (judgement, interval[-2:]) == ("+80.0 met° (+5.2)", "]°")
+    for name in (CONTRASTS, STATEMENTS):
+        assert said_of_intervals(shown[name].notes) == [BY_EVENTS, NO_INTERVAL]
+    assert said_of_intervals(shown[EQUAL].notes) == [NO_INTERVAL]
+
+
+def test_the_closing_explains_the_mark_that_it_shows():
+    _, gate, note = protocol_closing(three_with_events())
+    assert "]° at 20% (met)" in gate
+    assert note == BY_EVENTS
+    assert note.startswith("°: fewer than 5 scenes")
+    assert note.endswith("these drives alone.")
+
+
+def test_intervals_over_scenes_have_no_mark_and_no_note():
+    shown = tables(study(BOTH, scenes=5))
+    assert "°" not in "".join(entry for table in shown.values() for row in table.rows for entry in row)
+    assert said_of_intervals(note for table in shown.values() for note in table.notes) == []
+    assert len(protocol_closing(study(BOTH, scenes=5))) == 2
+
+
+def test_without_enough_events_either_the_note_says_why_there_is_no_interval():
+    shown = tables(study({"care": (3, 5), "history": (1, 6)}, scenes=1, events=4))
+    assert said_of_intervals(shown[CONTRASTS].notes) == [NO_INTERVAL]
+    assert "°" not in "".join(entry for row in shown[CONTRASTS].rows for entry in row)
+
+
+def test_the_mark_is_in_all_three_forms(tmp_path, capsys):
+    protocol, rows = STUDIES["protocol"], three_with_events()
+    write_report(rows, tmp_path, protocol)
+    print_report(rows, Console(width=80), protocol)
+    printed = capsys.readouterr().out
+    markdown, latex = ((tmp_path / name).read_text() for name in ("tables.md", "tables.tex"))
+    for text in (printed, markdown, latex):
+        assert "met° (+5.2)" in text
+        assert BY_EVENTS in " ".join(text.split())
+    assert "]°** |" in markdown
+    assert r"]°} \\" in latex
