@@ -17,6 +17,8 @@ _SPECIAL = {
     "≥": r"$\ge$",
     "†": r"\textdagger{}",
     "‡": r"\textdaggerdbl{}",
+    "°": r"\textdegree{}",
+    "±": r"$\pm$",
     "<": r"\textless{}",
     ">": r"\textgreater{}",
 }
