@@ -13,13 +13,15 @@ from care_sim.grid import AngularGrid
 from care_sim.policies import make_policy, policy_names
 from care_sim.policies.base import Policy
 from care_sim.policies.privileged import PrivilegedPolicy
-from care_sim.types import Belief, Demand, ImageDetections, Rig, Tracks
+from care_sim.types import CLASSES, Belief, Demand, Detections, ImageDetections, Rig, Tracks
 
 __version__ = version("care-sim")
 __all__ = [
+    "CLASSES",
     "AngularGrid",
     "Belief",
     "Demand",
+    "Detections",
     "ImageDetections",
     "InvalidInput",
     "MissingExtra",

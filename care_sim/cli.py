@@ -32,6 +32,18 @@ class Policies:
 
 
 @dataclass(frozen=True)
+class Detectors:
+    """List the detectors of the open loop."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        from care_sim.perception.registry import listing
+
+        print(*listing(), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
 class Scenarios:
     """List the scenarios and their parameters."""
 
@@ -69,6 +81,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "report": Report,
     "export": Export,
     "policies": Policies,
+    "detectors": Detectors,
     "scenarios": Scenarios,
     "bench": Bench,
 }

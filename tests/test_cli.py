@@ -76,6 +76,24 @@ def test_a_damaged_parquet_file_is_named(capsys, tmp_path):
     assert EPISODES.file in err
 
 
+def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
+    (tmp_path / "journal.jsonl").touch()
+    code, _, err = run(capsys, "report", tmp_path)
+    assert (code, err) == (
+        2,
+        f"care-sim: {tmp_path} holds an unfinished study; the command that began it goes on there\n",
+    )
+    code, _, err = run(capsys, "report", tmp_path / "nowhere")
+    assert "no results at" in err
+
+
+def test_the_detectors_are_listed_with_a_line_each(capsys):
+    code, out, _ = run(capsys, "detectors")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()[:3]] == ["returns", "cluster", "torchscript"]
+    assert all(len(line.split()) > 5 for line in out.splitlines())
+
+
 def test_run_prints_the_timeline_and_the_outcome(capsys):
     code, out, _ = run(capsys, "run", "dense", "--policy", "full", "--budget", "0.2", *SHORT)
     assert code == 0

@@ -141,7 +141,8 @@ def _sightings(film: Film) -> Sightings:
 class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
-    The seed of `reset` draws the street (`care_sim.streets`) and everything else that is random.
+    The seed of `reset` draws the street (`care_sim.streets`) and everything else that is random. Seeds 0 to 149 are the
+    evaluation's, 1000 to 1019 the calibration's: train on others.
     """
 
     __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
@@ -172,7 +173,7 @@ class ReplayEnv(FilmEnv):
     def __init__(
         self,
         *,
-        source: str,
+        source: str = "",
         scene: str | None = None,
         split: str | None = None,
         version: str | None = None,

@@ -51,6 +51,20 @@ def make_detector(name: str, sensor_height_m: float, **parameters: object) -> De
     return PointsOnly(name, detector, sensor_height_m)
 
 
+def listing() -> list[str]:
+    """A line a detector: its name and what it does, or why it cannot be loaded."""
+    return [f"{name:12} {_summary(name)}" for name in detector_names()]
+
+
+def _summary(name: str) -> str:
+    try:
+        make = ReturnsProxy if name == PROXY else _maker(name)
+    except BrokenDetector as error:
+        return f"(broken) {error}"
+    described = inspect.getmodule(make) if name in BUILT_IN else make
+    return (inspect.getdoc(described) or "").partition("\n")[0]
+
+
 def _maker(name: str) -> Maker:
     if name in _REAL:
         return _REAL[name]

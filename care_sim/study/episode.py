@@ -5,6 +5,8 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
+from traceback import extract_tb
 from typing import TypeVar
 
 import numpy as np
@@ -34,7 +36,7 @@ def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
     except InvalidInput as error:
         return _one_line(str(error))
     except (Exception, SystemExit) as error:
-        return _one_line(f"{type(error).__name__}: {error}")
+        return _one_line(f"{type(error).__name__}: {error}") + _place(error)
 
 
 def run_episode(config: EpisodeConfig) -> Row:
@@ -95,6 +97,12 @@ class Seal:
     def hexdigest(self) -> str:
         """The hash so far."""
         return self._content.hexdigest()[:16]
+
+
+def _place(error: BaseException) -> str:
+    """Where it was raised, for whoever has to find it in a file of their own."""
+    frames = extract_tb(error.__traceback__)
+    return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
 
 
 def _one_line(text: str) -> str:

@@ -68,6 +68,8 @@ def summary(failures: Sequence[Failure], unit: str) -> list[str]:
 def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
     """The rows in a folder of results, their study, and what is missing. Raises InvalidInput where there are none."""
     kind = kind_in(folder)
+    if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
+        raise InvalidInput(f"{folder} holds an unfinished study; the command that began it goes on there")
     path = folder / kind.file
     return read_rows(path, kind.required), study_of(path), read_notes(path)[1]
 
@@ -125,5 +127,5 @@ def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, 
     found = sum(config.digest() in journal for config in configs)
     others = len(journal) - found
     if found or others:
-        rest = f"; {others} of other studies stay in its journal" if others else ""
+        rest = f"; {others} of other options or code stay in its journal" if others else ""
         print(f"{found} of {len(configs)} {unit} found in {folder}{rest}", file=sys.stderr)

@@ -202,6 +202,7 @@ def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
+        ({"source": ""}, "source must be argoverse2:FOLDER or nuscenes:FOLDER, got ''"),
         ({"source": "waymo:."}, "source must be argoverse2:FOLDER or nuscenes:FOLDER, got 'waymo:.'"),
         ({"source": "argoverse2:nowhere"}, "source argoverse2:nowhere: nowhere is no folder"),
         ({"source": "argoverse2:{drive}", "scene": "other"}, "unknown log in .* 'other'; known: drive"),

@@ -264,7 +264,7 @@ def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
         kept = [config.policy for config in configs if config.digest() in journal]
     assert sorted(kept) == ["care"] * 4 + ["history"] * 4
     reasons = sorted((failure.config.policy, failure.reason) for failure in failures)
-    assert reasons[4:] == [("raises", "RuntimeError: no idea, at all")] * 4
+    assert reasons[4:] == [("raises", "RuntimeError: no idea, at all (misbehaving.py, line 20)")] * 4
     assert reasons[0] == ("dies", "the worker process died")
     assert reasons[3] == ("dies", "the worker process died 3 times before")
 

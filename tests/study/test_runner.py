@@ -80,7 +80,7 @@ def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys)
     (tmp_path / "dartout-budget.png").touch()
     (tmp_path / "my-budget.png").touch()
     conduct(second, tmp_path, workers=1)
-    line = f"1 of 2 episodes found in {tmp_path}; 1 of other studies stay in its journal\n"
+    line = f"1 of 2 episodes found in {tmp_path}; 1 of other options or code stay in its journal\n"
     assert line in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {"my-budget.png"}
 
@@ -117,9 +117,9 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
         kept = {config for config in configs if config.digest() in journal}
     assert {failure.config.policy: failure.reason for failure in failures} == {
         "dies": "the worker process died",
-        "raises": "RuntimeError: no idea, at all",
-        "raises-oddly": "Odd: hard to unpickle",
-        "exits": "SystemExit: 4",
+        "raises": "RuntimeError: no idea, at all (misbehaving.py, line 20)",
+        "raises-oddly": "Odd: hard to unpickle (misbehaving.py, line 28)",
+        "exits": "SystemExit: 4 (misbehaving.py, line 32)",
     }
     assert str(failures[0]).startswith(f"dartout {failures[0].config.policy} 0.1 seed 0 scenario.duration_s=0.3: ")
     assert {config.policy for config in kept} == {"history", "care", "random"}
