@@ -15,6 +15,18 @@ SPLIT := val
 VERSION := v1.0-trainval
 OUT = $(basename $(RESULTS))-official
 
+ifneq ($(filter official,$(MAKECMDGOALS)),)
+  ifeq ($(and $(RESULTS),$(DATA)),)
+    $(error make official needs RESULTS=FILE and DATA=FOLDER)
+  endif
+  ifneq ($(shell test -f "$(RESULTS)" || echo no),)
+    $(error RESULTS=$(RESULTS) is no file; it must be one of care-sim export)
+  endif
+  ifneq ($(shell test -d "$(DATA)/$(VERSION)" || echo no),)
+    $(error DATA=$(DATA) has no folder $(VERSION); it must be the root of nuScenes, VERSION the folder of its tables)
+  endif
+endif
+
 .PHONY: setup reproduce test check lint official test-official clean
 
 setup: $(VENV)/.installed
@@ -51,7 +63,6 @@ $(OFFICIAL)/.installed: constraints-official.txt
 	touch $@
 
 official: $(OFFICIAL)/.installed
-	$(if $(and $(RESULTS),$(DATA)),,$(error make official needs RESULTS=FILE and DATA=FOLDER))
 	$(OFFICIAL)/bin/python -m nuscenes.eval.detection.evaluate "$(RESULTS)" --dataroot "$(DATA)" \
 	  --eval_set "$(SPLIT)" --version "$(VERSION)" --output_dir "$(OUT)" --plot_examples 0 --render_curves 0
 

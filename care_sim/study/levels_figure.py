@@ -12,6 +12,7 @@ from care_sim.study.styles import styles
 
 DODGE = 0.025
 """Share of a budget by which neighbouring policies are moved apart, so that equal lines stay visible."""
+APART = f"policies are drawn {percent(DODGE)} of a budget apart sideways, so that equal points stay visible"
 
 
 def levels_figure(plays: Plays) -> Figure:
@@ -32,7 +33,8 @@ def levels_figure(plays: Plays) -> Figure:
         axes.grid(axis="y", color="0.93")
         axes.set_axisbelow(True)
     figure.suptitle(f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10)
-    notes = ["budget (share of cells fired)", *tag_notes(plays.tags.values())]
+    apart = [APART] if len(plays.tags) > 1 else []
+    notes = ["budget (share of cells fired)", *apart, *tag_notes(plays.tags.values())]
     figure.supxlabel("\n".join(notes), fontsize=9)
     figure.legend(*panels[1].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
     return figure

@@ -8,8 +8,8 @@ from care_sim.study.entries import percent
 from care_sim.study.gaps import Gap, Pair
 from care_sim.study.protocol_entries import whole
 from care_sim.study.protocol_notes import counts, on_intervals
-from care_sim.study.protocol_paper import GATE
-from care_sim.study.protocol_rows import REFERENCE, Plays, Setting, plays_of
+from care_sim.study.protocol_paper import BUDGETS, GATE
+from care_sim.study.protocol_rows import HISTORY, REFERENCE, Plays, Setting, plays_of
 from care_sim.study.task import Row
 
 
@@ -30,9 +30,9 @@ def _size(rows: Sequence[Row]) -> str:
 
 
 def _gains(plays: Plays) -> dict[float, Gap]:
-    """CARE over history by budget."""
-    pair = Pair(REFERENCE, "history", FIRST_SIGHTING)
-    return {budget: gap for budget in plays.budgets if (gap := pair.gap(plays, budget))}
+    """CARE over history at the paper's budgets."""
+    pair = Pair(REFERENCE, HISTORY, FIRST_SIGHTING)
+    return {budget: gap for budget in plays.budgets if budget in BUDGETS and (gap := pair.gap(plays, budget))}
 
 
 def _gate(setting: Setting, gaps: Mapping[float, Gap]) -> str:

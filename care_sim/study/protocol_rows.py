@@ -20,6 +20,8 @@ from care_sim.study.task import Row
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 REFERENCE = "care"
 """The policy that is compared with every other."""
+HISTORY = "history"
+"""The policy that every other is held against."""
 FULL = "full"
 _USUAL = {field.name: field.default for field in fields(Conditions) if field.name != "floor_seed"}
 _COLUMNS = tuple(field.name for field in fields(Tally))
@@ -86,7 +88,11 @@ class Plays:
     @property
     def others(self) -> tuple[str, ...]:
         """The policies that the reference is compared with; none where it was not played."""
-        return tuple(policy for policy in self.tags if policy != REFERENCE) if REFERENCE in self.tags else ()
+        return self.other_than(REFERENCE)
+
+    def other_than(self, base: str) -> tuple[str, ...]:
+        """All but one and the full scan; none where that one was not played."""
+        return tuple(policy for policy in self.tags if policy != base) if base in self.tags else ()
 
     def rows(self, policy: str, budget: float) -> Sequence[Row]:
         """The plays of a policy; the full scan has one budget."""

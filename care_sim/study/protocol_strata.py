@@ -1,4 +1,4 @@
-"""Where CARE gains and what the residual filter changes: strata, thirds of scenes, and differing allocations."""
+"""Where policies gain and what the residual filter changes: strata, thirds of scenes, and differing allocations."""
 
 from collections.abc import Iterator
 
@@ -6,18 +6,21 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import THIRDS
 from care_sim.study.entries import marked, percent, tag_notes
-from care_sim.study.gaps import GAP, RANKINGS, Pair, Third
+from care_sim.study.gaps import FEWEST_SCENES, GAP, RANKINGS, Pair, Third
 from care_sim.study.protocol_entries import PAPER, whole, written
 from care_sim.study.protocol_notes import UNITS, papers
 from care_sim.study.protocol_paper import ALLOCATIONS, statements_about
-from care_sim.study.protocol_rows import REFERENCE, Plays
+from care_sim.study.protocol_rows import HISTORY, REFERENCE, Plays
 from care_sim.study.table import Table
 
-BASES = ("history", "all-camera")
+BASES = (HISTORY, "all-camera")
 """The policies that strata compare CARE with."""
 RANKED = (
     "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. No interval of "
     f"fewer than {FEWEST_PAIRS} scenes."
+)
+NO_THIRDS = (
+    f"No thirds of the scenes by traffic: they take all-camera and at least {FEWEST_SCENES} scenes at every budget."
 )
 DIFFERING = (
     "Share of the keyframes, and mean number of cells where they differ. Each policy follows its own tracks, so "
@@ -26,49 +29,56 @@ DIFFERING = (
 
 
 def strata_tables(plays: Plays) -> list[Table]:
-    """Recall by range, azimuth and class: levels, and CARE less the others; none without CARE."""
-    bases = [policy for policy in BASES if policy in plays.others]
-    if not bases:
+    """Recall by range, azimuth and class: the level of every policy, and CARE less the others in `BASES`."""
+    if not plays.policies:
         return []
-    columns = ("stratum", "budget", REFERENCE, *bases, *(f"{REFERENCE} minus {base}" for base in bases))
-    note = f"Intervals over scenes that have anything in the stratum, none of fewer than {FEWEST_PAIRS}; levels in %."
+    columns = (*(marked(policy, tags) for policy, tags in plays.tags.items()), *(pair.label for pair in _pairs(plays)))
+    notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
+    without = (NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
     return [
         Table(
             f"{plays.setting.label}: {ratio.name} by stratum",
-            (*columns[:2], "events" if ratio is FIRST_SIGHTING else "object frames", *columns[2:]),
-            tuple(_strata_lines(plays, ratio, bases)),
-            (note,),
+            ("stratum", "budget", counted, *columns),
+            tuple(_strata_lines(plays, ratio)),
+            (*notes, *more),
             terminal=False,
         )
-        for ratio in (FIRST_SIGHTING, OVERALL)
+        for ratio, counted, more in ((FIRST_SIGHTING, "events", ()), (OVERALL, "object frames", without))
     ]
 
 
-def _strata_lines(plays: Plays, ratio: Ratio, bases: list[str]) -> Iterator[tuple[str, ...]]:
+def _pairs(plays: Plays, ratio: Ratio = FIRST_SIGHTING, within: str = "") -> list[Pair]:
+    return [Pair(REFERENCE, base, ratio, within) for base in BASES if base in plays.others]
+
+
+def _on_strata(plays: Plays) -> tuple[str, ...]:
+    intervals = f"Intervals over scenes that have anything in the stratum, none of fewer than {FEWEST_PAIRS}."
+    return ("Levels in %.", *((intervals,) if _pairs(plays) else ()))
+
+
+def _strata_lines(plays: Plays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
     for kind, labels in plays.strata().items():
         yield (kind,)
         for label in labels:
             for budget in plays.budgets:
-                yield _stratum_line(plays, ratio, bases, (f"{kind}/{label}", budget))
+                yield _stratum_line(plays, ratio, f"{kind}/{label}", budget)
 
 
-def _stratum_line(plays: Plays, ratio: Ratio, bases: list[str], place: tuple[str, float]) -> tuple[str, ...]:
-    within, budget = place
-    found = plays.tallies(REFERENCE, budget, within)
-    levels = (plays.level(ratio, policy, budget, within).by_event for policy in (REFERENCE, *bases))
+def _stratum_line(plays: Plays, ratio: Ratio, within: str, budget: float) -> tuple[str, ...]:
+    column = "events" if ratio is FIRST_SIGHTING else "frames"
+    levels = (plays.level(ratio, policy, budget, within).by_event for policy in plays.policies)
     return (
         within.partition("/")[2],
         percent(budget),
-        f"{sum(map(ratio.denominator, found.values())):,.0f}",
+        f"{sum(row[f'{within}/{column}'] for row in plays.scenes.values()):,.0f}",
         *(written(ratio, value) for value in levels),
-        *(whole(Pair(REFERENCE, base, ratio, within).gap(plays, budget)) for base in bases),
+        *(whole(pair.gap(plays, budget)) for pair in _pairs(plays, ratio, within)),
     )
 
 
 def thirds_tables(plays: Plays) -> list[Table]:
     """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every budget."""
-    third = Third(GAP, "tracks", OVERALL)
-    if not {*third.policies} <= {*plays.policies} or not all(third.gap(plays, budget) for budget in plays.budgets):
+    if not _has_thirds(plays):
         return []
     said = statements_about(plays.setting)
     return [
@@ -81,6 +91,12 @@ def thirds_tables(plays: Plays) -> list[Table]:
             terminal=False,
         )
     ]
+
+
+def _has_thirds(plays: Plays) -> bool:
+    third = Third(GAP, "tracks", OVERALL)
+    played = {*third.policies} <= {*plays.policies}
+    return played and all(third.gap(plays, budget) for budget in plays.budgets)
 
 
 def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:

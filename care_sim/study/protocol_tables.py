@@ -1,14 +1,15 @@
-"""Tables of the first-sighting protocol: contrasts and levels, and what the paper says of both."""
+"""Tables of the first-sighting protocol: those of levels, and all others in their order."""
 
 from collections.abc import Callable, Collection, Sequence
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, level
 from care_sim.study.entries import marked, percent, tag_notes
-from care_sim.study.gaps import RATIOS, Gap, Pair
-from care_sim.study.protocol_entries import PAPER, whole, written
-from care_sim.study.protocol_notes import UNITS, left_out, on_intervals, papers, played
-from care_sim.study.protocol_paper import LEVELS, LEVELS_SAID, Level, statements_about
-from care_sim.study.protocol_rows import FULL, REFERENCE, Plays, plays_of
+from care_sim.study.gaps import RATIOS
+from care_sim.study.protocol_contrasts import contrast_tables
+from care_sim.study.protocol_entries import PAPER, written
+from care_sim.study.protocol_notes import left_out, papers
+from care_sim.study.protocol_paper import LEVELS, LEVELS_SAID, Level
+from care_sim.study.protocol_rows import FULL, Plays, plays_of
 from care_sim.study.protocol_statements import statements_tables
 from care_sim.study.protocol_strata import allocation_tables, strata_tables, thirds_tables
 from care_sim.study.table import Table
@@ -44,41 +45,6 @@ def protocol_tables(rows: Sequence[Row]) -> list[Table]:
         allocation_tables,
     ]
     return [table for plays in plays_of(rows) for make in made for table in make(plays)]
-
-
-def contrast_tables(plays: Plays) -> list[Table]:
-    """CARE less every other policy, by events and with equal weight to every scene; none without both."""
-    if not plays.others:
-        return []
-    return [_contrasts(plays, alike) for alike in (False, True)]
-
-
-def _contrasts(plays: Plays, alike: bool) -> Table:
-    pairs = [Pair(REFERENCE, other, ratio, alike=alike) for ratio in RATIOS for other in plays.others]
-    measured = {pair: [pair.gap(plays, budget) for budget in plays.budgets] for pair in pairs}
-    lines: list[tuple[str, ...]] = []
-    for pair, gaps in measured.items():
-        lines += [(pair.heading,)] if (pair.heading,) not in lines else []
-        lines += _lines(plays, pair, gaps)
-    said = [said for pair in pairs if (said := statements_about(plays.setting).get(pair))]
-    intervals = on_intervals(gap for gaps in measured.values() for gap in gaps)
-    weights = ", equal scene weights" if alike else ""
-    return Table(
-        f"{plays.setting.label}: {REFERENCE} minus each policy{weights}",
-        (f"{REFERENCE} minus", *map(percent, plays.budgets)),
-        tuple(lines),
-        (f"{UNITS} {played(plays)}", *intervals, *left_out(plays), *tag_notes(plays.tags.values())),
-        papers(each.source for each in said),
-        terminal=not alike,
-    )
-
-
-def _lines(plays: Plays, pair: Pair, gaps: Sequence[Gap | None]) -> list[tuple[str, ...]]:
-    """The differences at every budget, and under them the paper's."""
-    lines = [(marked(pair.second, plays.tags[pair.second]), *map(whole, gaps))]
-    if said := statements_about(plays.setting).get(pair):
-        lines.append((PAPER, *(said.at(budget) for budget in plays.budgets)))
-    return lines if any(lines[0][1:]) else []
 
 
 def levels_tables(plays: Plays) -> list[Table]:

@@ -165,6 +165,16 @@ def test_splits_choose_scenes(tmp_path):
         scenes(tables, "x")
 
 
+def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
+    root = write(tmp_path, {"scene-0061": [([CAR], pose(), as_recorded(WORLD))]})
+    with pytest.raises(InvalidInput, match=r"scene.json: holds no scene of the split 'val'; splits it holds: all$"):
+        scenes(Database(root))
+    own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
+    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
+    with pytest.raises(InvalidInput, match=r"the split 'val'; splits it holds: all, mine$"):
+        scenes(Database(root))
+
+
 @pytest.fixture
 def sweep(recorded):
     (path,) = (recorded / "nuscenes").glob("*.pcd.bin")

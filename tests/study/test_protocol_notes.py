@@ -3,6 +3,7 @@
 from made_plays import found, play, study
 from rich.console import Console
 
+from care_sim.study.latex import escaped
 from care_sim.study.protocol_closing import protocol_closing
 from care_sim.study.protocol_notes import BY_EVENTS, NO_INTERVAL
 from care_sim.study.protocol_tables import protocol_tables
@@ -78,8 +79,8 @@ def test_the_mark_is_in_all_three_forms(tmp_path, capsys):
     print_report(rows, Console(width=80), protocol)
     printed = capsys.readouterr().out
     markdown, latex = ((tmp_path / name).read_text() for name in ("tables.md", "tables.tex"))
-    for text in (printed, markdown, latex):
-        assert "met° (+5.2)" in text
-        assert BY_EVENTS in " ".join(text.split())
+    for text, plain in ((printed, str), (markdown, str), (latex, escaped)):
+        assert plain("met° (+5.2)") in text
+        assert plain(BY_EVENTS) in " ".join(text.split())
     assert "]°** |" in markdown
-    assert r"]°} \\" in latex
+    assert r"]\textdegree{}} \\" in latex

@@ -31,7 +31,8 @@ def scenes(database: Database, split: str = "val") -> list[Row]:
             where, table = _own_file(database), database.path("scene")
             raise InvalidInput(f"{where}: the split {split!r} names {name!r}, which {table} lacks")
     if not known[split]:
-        raise InvalidInput(f"{database.path('scene')}: holds no scene of the split {split!r}")
+        held = ", ".join(name for name, names in known.items() if names and by_name.keys() >= set(names)) or "none"
+        raise InvalidInput(f"{database.path('scene')}: holds no scene of the split {split!r}; splits it holds: {held}")
     return [by_name[name] for name in known[split]]
 
 
