@@ -10,9 +10,9 @@ from care_sim.study.protocol_rows import FULL, REFERENCE, Plays
 from care_sim.study.styles import FULL as FULL_STYLE
 from care_sim.study.styles import styles
 
-DODGE = 0.025
-"""Share of a budget by which neighbouring policies are moved apart, so that equal lines stay visible."""
-APART = f"policies are drawn {percent(DODGE)} of a budget apart sideways, so that equal points stay visible"
+DODGE, SPREAD = 0.025, 0.1
+"""Share of a budget by which neighbouring policies are moved apart, so that equal lines stay visible; in all."""
+APART = "policies are drawn a little apart sideways, so that equal points stay visible"
 
 
 def levels_figure(plays: Plays) -> Figure:
@@ -45,7 +45,7 @@ def _draw(axes: Axes, plays: Plays, ratio: Ratio) -> None:
     if ceiling is not None:
         axes.axhline(ceiling, color=FULL_STYLE.colour, linestyle=FULL_STYLE.line, linewidth=1.2, label="full scan")
     for number, (policy, look) in enumerate(styles(plays.tags.items()).items()):
-        shift = 1 + DODGE * (number - (len(plays.tags) - 1) / 2)
+        shift = 1 + min(DODGE, SPREAD / len(plays.tags)) * (number - (len(plays.tags) - 1) / 2)
         levels = {budget: plays.level(ratio, policy, budget).by_event for budget in plays.budgets}
         known = {budget * shift: value for budget, value in levels.items() if value is not None}
         order = 4 if policy == REFERENCE else 3

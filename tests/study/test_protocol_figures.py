@@ -72,7 +72,7 @@ def test_the_levels_say_that_policies_are_moved_apart():
     figure, alone = (protocol_figures(study(found))["levels-streets"] for found in (FOUND, {"care": (6, 5)}))
     first, second = (line.get_xdata() for line in figure.axes[0].lines[1:3])
     assert second[0] - first[0] == pytest.approx(0.025 * 0.1)
-    said = "policies are drawn 2.5% of a budget apart sideways, so that equal points stay visible"
+    said = "policies are drawn a little apart sideways, so that equal points stay visible"
     assert said in figure.get_supxlabel().splitlines()
     assert said not in alone.get_supxlabel()
 
