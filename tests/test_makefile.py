@@ -1,5 +1,6 @@
 """`make official` checks what it is given before it installs anything."""
 
+import os
 import subprocess
 from pathlib import Path
 
@@ -11,7 +12,8 @@ ROOT = Path(__file__).resolve().parents[1]
 def official(folder, *arguments):
     """Without a Python to install with, and with no environment installed."""
     command = ["make", "official", f"OFFICIAL={folder / 'environment'}", "PYTHON=false", *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    surroundings = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
+    return subprocess.run(command, cwd=ROOT, env=surroundings, capture_output=True, text=True, check=False)
 
 
 @pytest.fixture
