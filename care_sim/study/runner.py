@@ -121,7 +121,7 @@ class _Run:
         for half in (batch[: len(batch) // 2], batch[len(batch) // 2 :]):
             self.alone(half)
 
-    def _tried(self, batch: Batch) -> Batch:
+    def _tried(self, batch: Batch) -> list[Task]:
         """The tasks of a batch but for those of deadly policies, which fail."""
         self._fail([task for task in batch if self._deaths[task.policy] >= DEADLY], f"{DIED} {DEADLY} times before")
         return [task for task in batch if self._deaths[task.policy] < DEADLY]
@@ -131,9 +131,9 @@ class _Run:
         workers = places(executor, self._workers)
         self._audience.playing(workers)
         while waiting and len(flying) < max(workers, 1):
-            batch = self._tried(waiting[0])
-            if batch:
-                flying[self._submit(executor, batch)] = batch
+            waiting[0] = self._tried(waiting[0])
+            if waiting[0]:
+                flying[self._submit(executor, waiting[0])] = waiting[0]
             waiting.popleft()
 
     def _land(self, flying: Flying) -> None:
