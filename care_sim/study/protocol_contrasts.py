@@ -42,7 +42,11 @@ def _table(plays: Plays, base: str, alike: bool) -> Table:
         (HEADS[base], *map(percent, plays.budgets)),
         tuple(_lines(plays, contrasts)),
         (f"{UNITS} {played(plays)}", *intervals, *left_out(plays), *tag_notes(plays.tags.values())),
-        papers(said[contrast.pair].source for contrast in contrasts if contrast.pair in said),
+        papers(
+            said[contrast.pair].source
+            for contrast in contrasts
+            if contrast.pair in said and said[contrast.pair].among(plays.budgets)
+        ),
         terminal=not alike,
     )
 
@@ -65,5 +69,6 @@ def _lines(plays: Plays, contrasts: Iterable[Contrast]) -> Iterator[tuple[str, .
             yield (heading,)
         if any(gaps):
             yield (marked(policy, plays.tags[policy]), *map(whole, gaps))
-            if said := statements_about(plays.setting).get(pair):
-                yield (PAPER, *(said.at(budget) for budget in plays.budgets))
+            said = statements_about(plays.setting).get(pair)
+            if said and (entries := said.among(plays.budgets)):
+                yield (PAPER, *entries)

@@ -1,6 +1,6 @@
 """What the paper says of its nuScenes evaluation (Secs. 5.2 to 5.4): numbers by budget, and their sentences."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,6 +25,11 @@ class Said:
     def at(self, budget: float) -> str:
         """The entry of a budget, empty where nothing is said."""
         return dict(zip(BUDGETS, self.entries, strict=True)).get(budget, "")
+
+    def among(self, budgets: Sequence[float]) -> tuple[str, ...]:
+        """The entries of these budgets; none at all where nothing is said at any of them."""
+        entries = tuple(map(self.at, budgets))
+        return entries if any(entries) else ()
 
     def short(self, budget: float) -> str:
         """The entry without interval or size of a tie."""

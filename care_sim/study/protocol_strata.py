@@ -87,7 +87,7 @@ def thirds_tables(plays: Plays) -> list[Table]:
             ("third", *map(percent, plays.budgets)),
             tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
             (f"{UNITS} {RANKED}",),
-            papers(text.source for each, text in said.items() if isinstance(each, Third)),
+            papers(text.source for each, text in said.items() if isinstance(each, Third) and text.among(plays.budgets)),
             terminal=False,
         )
     ]
@@ -112,8 +112,9 @@ def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
 
 def _third_lines(plays: Plays, third: Third) -> Iterator[tuple[str, ...]]:
     yield (third.label, *(whole(third.gap(plays, budget)) for budget in plays.budgets))
-    if said := statements_about(plays.setting).get(third):
-        yield (PAPER, *(said.at(budget) for budget in plays.budgets))
+    said = statements_about(plays.setting).get(third)
+    if said and (entries := said.among(plays.budgets)):
+        yield (PAPER, *entries)
 
 
 def _mean_count(plays: Plays, column: str, third: str, budget: float) -> str:
@@ -126,12 +127,13 @@ def allocation_tables(plays: Plays) -> list[Table]:
     """How often every policy fires other cells than CARE, and how many; none without CARE."""
     if not plays.others:
         return []
-    said = {} if plays.setting.conditions else {name: ALLOCATIONS[name] for name in plays.others if name in ALLOCATIONS}
+    asked = {name: text for name, text in ALLOCATIONS.items() if name in plays.others and text.among(plays.budgets)}
+    said = {} if plays.setting.conditions else asked
     lines: list[tuple[str, ...]] = []
     for policy in plays.others:
         lines.append((marked(policy, plays.tags[policy]), *(_differing(plays, policy, b) for b in plays.budgets)))
         if policy in said:
-            lines.append((PAPER, *(said[policy].at(budget) for budget in plays.budgets)))
+            lines.append((PAPER, *said[policy].among(plays.budgets)))
     return [
         Table(
             f"{plays.setting.label}: keyframes on which the allocation differs from that of {REFERENCE}",

@@ -320,3 +320,13 @@ def test_positive_favours_the_first_named():
     (line, _) = block(tables(rows)["care minus each policy"], "First sightings")
     assert float(line[1].split()[0]) == pytest.approx(levels["care"] - levels["history"], abs=0.11)
     assert FIRST_SIGHTING.unit == "points"
+
+
+def test_at_budgets_of_which_the_paper_does_not_speak_it_has_no_line():
+    scarce = study(
+        {"care": (5, 5), "history": (4, 5), "all-camera": (5, 5), "full": (9, 9)}, scenes=9, budgets=(0.03, 0.05)
+    )
+    for table in protocol_tables(scarce):
+        if "levels" not in table.title:
+            assert not [row for row in table.rows if "(paper)" in row]
+            assert not table.quotes
