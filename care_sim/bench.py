@@ -130,7 +130,7 @@ def measure(config: BenchConfig) -> Report:
     reached = float(np.median(speed[main]["steps_per_s"]))
     memory = peak_rss_mb()
     return {
-        "config": {**asdict(config), "out": str(config.out) if config.out else None},
+        "config": {name: value for name, value in asdict(config).items() if name != "out"},
         "machine": machine(),
         "versions": versions(),
         "speed": speed,

@@ -1,10 +1,14 @@
 """Shared scenes: small tables of tracks and detections, and a simulator that is freed after the test."""
 
+import sys
+
 import numpy as np
 import pytest
 from av2_log import at, box, write
 from hypothesis import settings
 
+from care_sim.errors import MissingExtra
+from care_sim.extras import import_open3d
 from care_sim.grid import AngularGrid
 from care_sim.types import CLASSES, ImageDetections, Tracks
 from care_sim.world.bullet import BulletWorld
@@ -66,3 +70,33 @@ def drive(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("logs") / "drive"
     return write(folder, [seen(n) for n in range(50)], [at(0.5 * n) for n in range(50)])
+
+
+@pytest.fixture(scope="session")
+def open3d():
+    """Open3D; skips what needs it where it cannot be imported."""
+    try:
+        return import_open3d()
+    except MissingExtra as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Puts a distribution on the path, as pip would leave it: one module, and policies or detectors by name."""
+
+    def put(package, source, group="care_sim.policies", **things):
+        place = tmp_path / package
+        info = place / f"{package}-1.5.dist-info"
+        info.mkdir(parents=True)
+        (place / f"{package}.py").write_text(source)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.5\n")
+        lines = [f"{name} = {package}:{thing}" for name, thing in things.items()]
+        (info / "entry_points.txt").write_text("\n".join([f"[{group}]", *lines]))
+        monkeypatch.syspath_prepend(str(place))
+        packages.append(package)
+
+    packages = []
+    yield put
+    for package in packages:
+        sys.modules.pop(package, None)

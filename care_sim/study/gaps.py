@@ -19,7 +19,8 @@ from care_sim.evaluation.scene_contrasts import (
     contrast_gap,
 )
 from care_sim.frames import Floats
-from care_sim.study.protocol_rows import REFERENCE, Plays
+from care_sim.study.protocol_rows import Plays
+from care_sim.study.task import REFERENCE
 
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
 HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}

@@ -6,9 +6,10 @@ from matplotlib.figure import Figure
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.study.entries import marked, percent, tag_notes
 from care_sim.study.protocol_paper import published_level
-from care_sim.study.protocol_rows import FULL, REFERENCE, Plays
+from care_sim.study.protocol_rows import Plays
 from care_sim.study.styles import FULL as FULL_STYLE
 from care_sim.study.styles import styles
+from care_sim.study.task import FULL, REFERENCE
 
 DODGE, SPREAD = 0.025, 0.1
 """Share of a budget by which neighbouring policies are moved apart, so that equal lines stay visible; in all."""

@@ -7,8 +7,9 @@ from matplotlib.figure import Figure
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.study.entries import MARKS, marked, percent, tag_notes
-from care_sim.study.protocol_rows import FULL, REFERENCE, Plays
+from care_sim.study.protocol_rows import Plays
 from care_sim.study.styles import Style, styles
+from care_sim.study.task import FULL, REFERENCE
 
 Point = tuple[float, float]
 """Overall and first-sighting recall in %."""

@@ -9,8 +9,8 @@ from care_sim.study.gaps import Gap, Pair
 from care_sim.study.protocol_entries import whole
 from care_sim.study.protocol_notes import counts, on_intervals
 from care_sim.study.protocol_paper import BUDGETS, GATE
-from care_sim.study.protocol_rows import HISTORY, REFERENCE, Plays, Setting, plays_of
-from care_sim.study.task import Row
+from care_sim.study.protocol_rows import HISTORY, Plays, Setting, plays_of
+from care_sim.study.task import REFERENCE, Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:

@@ -8,8 +8,9 @@ from care_sim.study.gaps import RATIOS, Gap, Pair
 from care_sim.study.protocol_entries import PAPER, whole
 from care_sim.study.protocol_notes import UNITS, left_out, on_intervals, papers, played
 from care_sim.study.protocol_paper import statements_about
-from care_sim.study.protocol_rows import HISTORY, REFERENCE, Plays
+from care_sim.study.protocol_rows import HISTORY, Plays
 from care_sim.study.table import Table
+from care_sim.study.task import REFERENCE
 
 TITLES = {REFERENCE: f"{REFERENCE} minus each policy", HISTORY: f"each policy minus {HISTORY}"}
 HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}

@@ -7,8 +7,8 @@ from care_sim.evaluation.recall import Tally
 from care_sim.study.entries import percent
 from care_sim.study.gaps import Gap
 from care_sim.study.protocol_entries import OVER_EVENTS
-from care_sim.study.protocol_rows import FULL, Plays
-from care_sim.study.task import Row
+from care_sim.study.protocol_rows import Plays
+from care_sim.study.task import FULL, Row
 
 UNITS = "Recall in points; TTFD in keyframes, where less is better."
 BY_EVENTS = (

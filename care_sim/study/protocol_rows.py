@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.conditions import UNFELT_BY_FULL, Conditions
+from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
 from care_sim.errors import InvalidInput
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
@@ -15,15 +15,12 @@ from care_sim.evaluation.strata import thirds
 from care_sim.frames import Floats
 from care_sim.perception.registry import PROXY
 from care_sim.study.summary import policy_of, tags_of_row, with_parameters
-from care_sim.study.task import Row
+from care_sim.study.task import FULL, REFERENCE, Row
 
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
-REFERENCE = "care"
-"""The policy that is compared with every other."""
 HISTORY = "history"
 """The policy that every other is held against."""
-FULL = "full"
-_USUAL = {field.name: field.default for field in fields(Conditions) if field.name != "floor_seed"}
+_USUAL = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {"camera_detections": None}
 _COLUMNS = tuple(field.name for field in fields(Tally))
 
 
@@ -164,8 +161,7 @@ def plays_of(rows: Sequence[Row]) -> list[Plays]:
 
 def setting_of(row: Row) -> Setting:
     """The setting that a row belongs to; a condition that it has no column for is the usual one."""
-    usual = _USUAL | {"camera_detections": None}
-    changed = tuple((name, row[name]) for name, value in usual.items() if row.get(name) not in (value, None))
+    changed = tuple((name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None))
     return Setting(row["source"], with_parameters(row, "detector"), changed)
 
 

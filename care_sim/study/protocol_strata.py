@@ -10,8 +10,9 @@ from care_sim.study.gaps import FEWEST_SCENES, GAP, RANKINGS, Pair, Third
 from care_sim.study.protocol_entries import PAPER, whole, written
 from care_sim.study.protocol_notes import UNITS, papers
 from care_sim.study.protocol_paper import ALLOCATIONS, statements_about
-from care_sim.study.protocol_rows import HISTORY, REFERENCE, Plays
+from care_sim.study.protocol_rows import HISTORY, Plays
 from care_sim.study.table import Table
+from care_sim.study.task import REFERENCE
 
 BASES = (HISTORY, "all-camera")
 """The policies that strata compare CARE with."""

@@ -9,11 +9,11 @@ from care_sim.study.protocol_contrasts import contrast_tables
 from care_sim.study.protocol_entries import PAPER, written
 from care_sim.study.protocol_notes import left_out, papers
 from care_sim.study.protocol_paper import LEVELS, LEVELS_SAID, Level
-from care_sim.study.protocol_rows import FULL, Plays, plays_of
+from care_sim.study.protocol_rows import Plays, plays_of
 from care_sim.study.protocol_statements import statements_tables
 from care_sim.study.protocol_strata import allocation_tables, strata_tables, thirds_tables
 from care_sim.study.table import Table
-from care_sim.study.task import Row
+from care_sim.study.task import FULL, Row
 
 LEVEL_COLUMNS = (
     "budget",

@@ -43,11 +43,12 @@ def detector_digest(detector: str) -> str | None:
     return "" if detector in BUILT_IN_DETECTORS else _package_digest(detector_entries()[detector])
 
 
-def file_digest(path: Path) -> str:
-    """Hash of the content of a file, or of the files below a folder; empty where there is neither."""
-    if path.is_dir():
-        return _combined(file_digest(file) for file in sorted(path.rglob("*")) if file.is_file())
-    return _hashed(path, path.stat().st_size, path.stat().st_mtime_ns) if path.is_file() else ""
+def file_digest(path: Path, pattern: str = "*") -> str:
+    """Hash of the content of a file, or of the files below a folder and their names; empty where there is neither."""
+    found = [path] if path.is_file() else [f for f in path.rglob(pattern) if f.is_file() and f.suffix != ".pyc"]
+    named = ((file.relative_to(path), file, file.stat()) for file in sorted(found))
+    hashes = [f"{name} {_hashed(file, stat.st_size, stat.st_mtime_ns)}" for name, file, stat in named]
+    return _combined(hashes) if hashes else ""
 
 
 @lru_cache(maxsize=10_000)
@@ -76,12 +77,8 @@ def _package_digest(entry: EntryPoint) -> str | None:
 
 @cache
 def _content_digest(root: Path, pattern: str = "*") -> str:
-    """Hash of a file, or of the files below a folder and their names; once a process, which has them loaded."""
-    found = [root] if root.is_file() else [f for f in root.rglob(pattern) if f.is_file() and f.suffix != ".pyc"]
-    content = hashlib.sha256()
-    for file in sorted(found):
-        content.update(str(file.relative_to(root)).encode() + file.read_bytes())
-    return content.hexdigest()[:16]
+    """The hash of code, once a process, which has it loaded."""
+    return file_digest(root, pattern)
 
 
 def versions() -> dict[str, str]:

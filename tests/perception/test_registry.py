@@ -10,7 +10,7 @@ from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.film import Annotations, Cloud
 from care_sim.perception.detectors import ReturnsProxy
 from care_sim.perception.points_only import BrokenDetector, PointsOnly
-from care_sim.perception.registry import detector_names, make_detector
+from care_sim.perception.registry import ENTRY_POINTS, detector_names, make_detector
 
 POINTS = shell(8, 6, 0.4, 4.61, 1.95, 1.72)
 CLOUD = Cloud(np.arange(len(POINTS)), POINTS, np.full(len(POINTS), 3))
@@ -60,7 +60,7 @@ class Blind:
 def installed(install):
     things = {"middle": "Middle", "stubborn": "Stubborn", "blind": "Blind", "number": "module", "lost": "Nowhere"}
     things |= {"listed": "listed", "loose": "loose", "quits": "quits"}
-    install("own_detectors", MODULE, returns="Middle", torchscript="Middle", **things)
+    install("own_detectors", MODULE, ENTRY_POINTS, returns="Middle", torchscript="Middle", **things)
 
 
 def test_ours_are_known():
@@ -97,13 +97,13 @@ def test_a_built_in_name_is_taken(installed):
 
 
 def test_of_two_with_one_name_the_first_on_the_path_counts(install):
-    install("behind", MODULE, twin="Stubborn")
-    install("ahead", MODULE, twin="Middle")
+    install("behind", MODULE, ENTRY_POINTS, twin="Stubborn")
+    install("ahead", MODULE, ENTRY_POINTS, twin="Middle")
     assert len(make_detector("twin", HEIGHT).detect(CLOUD, CAR)[0]) == 1
 
 
 def test_a_package_that_ends_the_program_gets_one_line(install):
-    install("rude_detectors", "raise SystemExit('no device')", rude="Any")
+    install("rude_detectors", "raise SystemExit('no device')", ENTRY_POINTS, rude="Any")
     with pytest.raises(BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"):
         make_detector("rude", HEIGHT)
 

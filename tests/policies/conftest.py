@@ -1,14 +1,10 @@
-"""Real observations round the encounter, beliefs made by hand, and packages as pip would leave them."""
-
-import sys
+"""Real observations round the encounter, and beliefs made by hand."""
 
 import gymnasium
 import numpy as np
 import pytest
 
 import care_sim
-from care_sim.errors import MissingExtra
-from care_sim.extras import import_open3d
 from care_sim.types import CLASSES, Belief, Ego, ImageDetections, Tracks
 
 STANDING = Ego()
@@ -36,15 +32,6 @@ def encounter():
 
 
 @pytest.fixture(scope="session")
-def open3d():
-    """Open3D; skips what needs it where it cannot be imported."""
-    try:
-        return import_open3d()
-    except MissingExtra as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope="session")
 def belief_of():
     """Makes a belief from rows of tracks, the ego, and a last scan."""
 
@@ -65,24 +52,3 @@ def car():
         return [number, CLASSES.index("car"), x, y, -1.0, 4.6, 1.95, 1.7, 0.0, vx, vy, misses, 2]
 
     return make
-
-
-@pytest.fixture
-def install(tmp_path, monkeypatch):
-    """Puts a distribution on the path, as pip would leave it: one module, and policies by name."""
-
-    def put(package, source, **policies):
-        place = tmp_path / package
-        info = place / f"{package}-1.5.dist-info"
-        info.mkdir(parents=True)
-        (place / f"{package}.py").write_text(source)
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.5\n")
-        lines = [f"{name} = {package}:{thing}" for name, thing in policies.items()]
-        (info / "entry_points.txt").write_text("\n".join(["[care_sim.policies]", *lines]))
-        monkeypatch.syspath_prepend(str(place))
-        packages.append(package)
-
-    packages = []
-    yield put
-    for package in packages:
-        sys.modules.pop(package, None)

@@ -93,6 +93,32 @@ class Counting(Audience):
         self.ended.append((config, row is not None))
 
 
+class Impatient(Audience):
+    """Interrupts once episodes are in flight."""
+
+    def __init__(self):
+        self.told, self.warned = 0, False
+
+    def playing(self, workers):
+        self.told += 1
+        if self.told == 2:
+            raise KeyboardInterrupt
+
+    def interrupted(self):
+        self.warned = True
+
+
+def test_an_interrupt_finishes_and_keeps_what_is_in_flight(tmp_path):
+    configs, audience = short(["history", "care", "random"], seeds=(0, 1)), Impatient()
+    with Journal(tmp_path / JOURNAL) as journal:
+        with pytest.raises(KeyboardInterrupt):
+            run_all(configs, journal, 2, audience=audience)
+        kept = [config for config in configs if config.digest() in journal]
+    assert audience.warned
+    assert len(kept) >= 2
+    assert len(kept) < len(configs)
+
+
 def test_any_executor_will_do(tmp_path):
     audience = Counting()
     with Journal(tmp_path / JOURNAL) as journal:
