@@ -161,7 +161,7 @@ def scenes(rng, n, gain, rate):
     ("n", "least", "most"), [(150, 0.92, 0.98), (50, 0.90, 0.97), (10, 0.80, 0.93), (5, 0.72, 0.87)]
 )
 def test_how_often_the_interval_of_a_ratio_holds_the_truth(n, least, most):
-    """At the 150 scenes of the protocol, the 50 of a third, and at ten and five, where it falls short as captions say."""
+    """At the 150 scenes of the protocol, the 50 of a third, and at ten and five, where it falls short."""
     rng = np.random.default_rng(10)
     gains, events = scenes(rng, 400_000, 0.05, 27)
     truth, held = gains.sum() / events.sum(), 0
