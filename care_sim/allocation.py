@@ -42,7 +42,7 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
 
 
 def _round_robin(sets: Sequence[Cells], limit: int, chosen: dict[int, None]) -> None:
-    queues: Iterable[Iterator[int]] = [_free(memoryview(cell_set(cells)), chosen) for cells in sets]
+    queues: Iterable[Iterator[int]] = [_free(cell_set(cells).data, chosen) for cells in sets]
     for left in range(len(sets), 0, -1):
         queues = cycle(islice(queues, left))
         _fill(map(next, queues), limit, chosen)  # ends at the limit, or at the first queue that has run dry

@@ -114,7 +114,7 @@ class AngularGrid:
         bundles = np.asarray(bundles, dtype=float)
         if not len(bundles):
             return []
-        x, y, z = np.moveaxis(bundles, -1, 0)
+        x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
         azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
         offset = _wrap(azimuth - azimuth[:, :1])
         return self._sectors(

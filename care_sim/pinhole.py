@@ -16,6 +16,11 @@ from care_sim.frames import BOX_EDGES, Floats, box_corners
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
 
+_BOTH_WAYS = np.concatenate([BOX_EDGES, BOX_EDGES[:, ::-1]])
+_BOX_POINTS = np.array([(4, 5), (0, 1), (0, 3), (2, 1), (2, 3), (6, 1), (6, 3), (0, 7), (2, 7)])
+"""Points (column, row) of an image box among its left, top, right, bottom, its centre, and its u and v nearest to the
+principal point."""
+
 
 @dataclass(frozen=True)
 class PinholeCamera:
@@ -73,11 +78,9 @@ class PinholeCamera:
         beyond it; NaN for a box wholly behind NEAR_M. A box that crosses that plane is cut there.
         """
         corners = (box_corners(boxes) - self.position) @ self.axes.T
-        starts, ends = corners[:, BOX_EDGES[:, 0]], corners[:, BOX_EDGES[:, 1]]
-        points = np.concatenate([_cut(starts, ends), _cut(ends, starts)], axis=1)
-        depth, left, up = np.moveaxis(points, -1, 0)
-        u, v = self.width / 2 - self.focal * left / depth, self.height / 2 - self.focal * up / depth
-        return np.stack([reduce(w, axis=1) for reduce in (np.fmin.reduce, np.fmax.reduce) for w in (u, v)], axis=-1)
+        points = _cut(corners[:, _BOTH_WAYS[:, 0]], corners[:, _BOTH_WAYS[:, 1]])
+        pixels = self._lens.centres - self.focal * points[..., 1:] / points[..., :1]
+        return np.concatenate([np.fmin.reduce(pixels, axis=1), np.fmax.reduce(pixels, axis=1)], axis=1)
 
     @cached_property
     def _lens(self) -> "Lenses":
@@ -110,24 +113,22 @@ class Lenses:
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
         """As `PinholeCamera.project`."""
-        depth, left, up = np.moveaxis((points - self.positions) @ np.swapaxes(self.axes, -1, -2), -1, 0)
+        local = (points - self.positions) @ np.swapaxes(self.axes, -1, -2)
+        depth = local[..., 0]
         scale = self.focals / np.where(depth > 0, depth, np.nan)
-        u, v = self.centres[..., 0] - left * scale, self.centres[..., 1] - up * scale
-        return np.stack([u, v], axis=-1), depth
+        return self.centres - local[..., 1:] * scale[..., None], depth
 
     def rays(self, pixels: Floats) -> Floats:
         """As `PinholeCamera.rays`."""
-        left, up = np.moveaxis((self.centres - pixels) / self.focals[..., None], -1, 0)
-        return np.stack([np.ones_like(left), left, up], axis=-1) @ self.axes
+        local = np.ones((*pixels.shape[:-1], 3))
+        local[..., 1:] = (self.centres - pixels) / self.focals[..., None]
+        return local @ self.axes
 
     def box_rays(self, boxes: Floats) -> Floats:
         """As `PinholeCamera.box_rays`."""
-        left, top, right, bottom = boxes.T
-        u = np.clip(self.centres[..., 0].ravel(), left, right)
-        v = np.clip(self.centres[..., 1].ravel(), top, bottom)
-        columns = np.array([(left + right) / 2, left, left, right, right, u, u, left, right])
-        rows = np.array([(top + bottom) / 2, top, bottom, top, bottom, top, bottom, v, v])
-        return self.rays(np.stack([columns.T, rows.T], axis=-1))
+        low, high = boxes[:, :2], boxes[:, 2:]
+        nearest = np.clip(self.centres.reshape(-1, 2), low, high)
+        return self.rays(np.concatenate([boxes, (low + high) / 2, nearest], axis=1)[:, _BOX_POINTS])
 
 
 def _cut(points: Floats, others: Floats) -> Floats:

@@ -18,10 +18,10 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
         return np.zeros(0, bool)
     centres = np.broadcast_to(tracks.boxes[:, :3], (len(detections), len(tracks), 3))
     centres = turned(centres, detections.yaw_changes[:, None])
-    u, v = np.moveaxis(rig.lenses.take(detections.cameras).project(centres)[0], -1, 0)
-    left, top, right, bottom = detections.boxes.T[..., None]
-    inside = (left <= u) & (u <= right) & (top <= v) & (v <= bottom)
-    result: NDArray[np.bool_] = np.any(inside & (detections.classes[:, None] == tracks.classes), axis=1)
+    pixels, _ = rig.lenses.take(detections.cameras).project(centres)
+    boxes = detections.boxes[:, None]
+    inside = ((boxes[..., :2] <= pixels) & (pixels <= boxes[..., 2:])).all(axis=-1)
+    result: NDArray[np.bool_] = (inside & (detections.classes[:, None] == tracks.classes)).any(axis=1)
     return result
 
 
