@@ -1,6 +1,7 @@
 """Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import cycle, filterfalse, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,32 +37,25 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
     for layer in demand.layers:
         _round_robin(layer, budget, chosen)
     if floor is not None:
-        _fill(floor, budget, chosen)
+        _fill(_free(map(int, floor), chosen), budget, chosen)
     return np.fromiter(chosen, dtype=np.int64, count=len(chosen))
 
 
 def _round_robin(sets: Sequence[Cells], limit: int, chosen: dict[int, None]) -> None:
-    queues = [iter(cell_set(cells).tolist()) for cells in sets]
-    while queues and len(chosen) < limit:
-        waiting = []
-        for queue in queues:
-            for cell in queue:
-                if cell not in chosen:
-                    break
-            else:
-                continue
-            chosen[cell] = None
-            if len(chosen) == limit:
-                return
-            waiting.append(queue)
-        queues = waiting
+    queues: Iterable[Iterator[int]] = [_free(cell_set(cells).data, chosen) for cells in sets]
+    for left in range(len(sets), 0, -1):
+        queues = cycle(islice(queues, left))
+        _fill(map(next, queues), limit, chosen)  # ends at the limit, or at the first queue that has run dry
+
+
+def _free(cells: Iterable[int], chosen: dict[int, None]) -> Iterator[int]:
+    """Those of `cells` that are not chosen by the time they are asked for."""
+    return filterfalse(chosen.__contains__, cells)
 
 
 def _fill(cells: Iterable[int], limit: int, chosen: dict[int, None]) -> None:
-    for cell in cells:
-        if len(chosen) >= limit:
-            return
-        chosen.setdefault(int(cell))
+    for cell in islice(cells, limit - len(chosen)):
+        chosen[cell] = None
 
 
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
@@ -80,5 +74,6 @@ def fired_cells(scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, f
     if len(chosen) > budget:
         chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]
     elif floor is not None and len(chosen) < budget:
-        chosen = np.concatenate([chosen, floor[flat[floor] <= 0][: budget - len(chosen)]])
+        free = floor[:budget]  # enough of it, whatever is chosen: of these at most len(chosen) are taken
+        chosen = np.concatenate([chosen, free[flat[free] <= 0][: budget - len(chosen)]])
     return np.sort(chosen)

@@ -47,7 +47,8 @@ class Cloud:
 
     def take(self, kept: NDArray[np.bool_]) -> "Cloud":
         """Some of the returns, by mask (P,)."""
-        return Cloud(self.cells[kept], self.points[kept], self.objects[kept])
+        rows = np.flatnonzero(kept)
+        return Cloud(self.cells[rows], self.points.take(rows, axis=0), self.objects[rows])
 
 
 @dataclass(frozen=True)

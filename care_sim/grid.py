@@ -114,7 +114,7 @@ class AngularGrid:
         bundles = np.asarray(bundles, dtype=float)
         if not len(bundles):
             return []
-        x, y, z = np.moveaxis(bundles, -1, 0)
+        x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
         azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
         offset = _wrap(azimuth - azimuth[:, :1])
         return self._sectors(
@@ -147,9 +147,15 @@ class AngularGrid:
         return [self._rectangle(*bound) for bound in bounds]
 
     def _rectangle(self, first: int, last: int, upper: int, lower: int) -> Cells:
-        columns = np.sort(np.arange(first, last + 1) % self.columns)
-        rows = np.arange(upper, lower + 1)
-        return (rows[:, None] * self.columns + columns).ravel()
+        start, stop = first % self.columns, first % self.columns + last + 1 - first
+        rows = self._cells[upper : lower + 1]
+        if stop > self.columns:
+            return np.concatenate([rows[:, : stop - self.columns], rows[:, start:]], axis=1).flatten()
+        return rows[:, start:stop].flatten()
+
+    @cached_property
+    def _cells(self) -> Cells:
+        return np.arange(self.size).reshape(self.shape)
 
 
 def _wrap(angle: Floats) -> Floats:
@@ -167,10 +173,10 @@ def _footprints(boxes: Floats) -> tuple[Floats, Floats, Floats]:
 def cell_set(cells: Sequence[int] | Cells) -> Cells:
     """`cells` as an ascending array without repeats. Raises InvalidInput for what is no list of indices."""
     array = np.asarray(cells)
-    if array.ndim != 1 or not (array.size == 0 or np.issubdtype(array.dtype, np.integer)):
+    if array.ndim != 1 or not (array.size == 0 or array.dtype.kind in "iu"):
         raise InvalidInput(
             f"a set of cells must be a list of cell indices, got {array.dtype} of shape {array.shape}"
             " (of a mask take np.flatnonzero)"
         )
     array = array.astype(np.int64, copy=False)
-    return array if np.all(array[1:] > array[:-1]) else np.unique(array)
+    return array if (array[1:] > array[:-1]).all() else np.unique(array)

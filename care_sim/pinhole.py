@@ -4,16 +4,22 @@ Image frame: u right, v down, in pixels, (0, 0) the outer corner of the top-left
 directions are expressed in the sensor frame (x forward, y left, z up) of the LiDAR.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from care_sim.frames import BOX_EDGES, Floats, box_corners
 
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
+
+_BOTH_WAYS = np.concatenate([BOX_EDGES, BOX_EDGES[:, ::-1]])
+_BOX_POINTS = np.array([(4, 5), (0, 1), (0, 3), (2, 1), (2, 3), (6, 1), (6, 3), (0, 7), (2, 7)])
+"""Points (column, row) of an image box among its left, top, right, bottom, its centre, and its u and v nearest to the
+principal point."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +59,11 @@ class PinholeCamera:
 
         Points at or behind the image plane have depth <= 0 and NaN pixels.
         """
-        depth, left, up = np.moveaxis((np.asarray(points, dtype=float) - self.position) @ self.axes.T, -1, 0)
-        scale = self.focal / np.where(depth > 0, depth, np.nan)
-        return np.stack([self.width / 2 - left * scale, self.height / 2 - up * scale], axis=-1), depth
+        return self._lens.project(np.asarray(points, dtype=float))
 
     def rays(self, pixels: ArrayLike) -> Floats:
         """Directions (..., 3), not normalised, through pixels (..., 2), in the sensor frame."""
-        u, v = np.moveaxis(np.asarray(pixels, dtype=float), -1, 0)
-        left, up = (self.width / 2 - u) / self.focal, (self.height / 2 - v) / self.focal
-        return np.stack([np.ones_like(left), left, up], axis=-1) @ self.axes
+        return self._lens.rays(np.asarray(pixels, dtype=float))
 
     def box_rays(self, boxes: ArrayLike) -> Floats:
         """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
@@ -69,23 +71,64 @@ class PinholeCamera:
         Centre first, then the corners (paper, Algorithm 2), then the points of the edges nearest
         to the principal point, where azimuth and elevation of a wide box are extreme.
         """
-        left, top, right, bottom = np.asarray(boxes, dtype=float).reshape(-1, 4).T
-        u = np.clip(self.width / 2, left, right)
-        v = np.clip(self.height / 2, top, bottom)
-        columns = [(left + right) / 2, left, left, right, right, u, u, left, right]
-        rows = [(top + bottom) / 2, top, bottom, top, bottom, top, bottom, v, v]
-        return self.rays(np.stack([np.stack(columns, -1), np.stack(rows, -1)], axis=-1))
+        return self._lens.box_rays(np.asarray(boxes, dtype=float).reshape(-1, 4))
 
     def project_boxes(self, boxes: Floats) -> Floats:
         """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where they reach
         beyond it; NaN for a box wholly behind NEAR_M. A box that crosses that plane is cut there.
         """
         corners = (box_corners(boxes) - self.position) @ self.axes.T
-        starts, ends = corners[:, BOX_EDGES[:, 0]], corners[:, BOX_EDGES[:, 1]]
-        points = np.concatenate([_cut(starts, ends), _cut(ends, starts)], axis=1)
-        depth, left, up = np.moveaxis(points, -1, 0)
-        u, v = self.width / 2 - self.focal * left / depth, self.height / 2 - self.focal * up / depth
-        return np.stack([reduce(w, axis=1) for reduce in (np.fmin.reduce, np.fmax.reduce) for w in (u, v)], axis=-1)
+        points = _cut(corners[:, _BOTH_WAYS[:, 0]], corners[:, _BOTH_WAYS[:, 1]])
+        pixels = self._lens.centres - self.focal * points[..., 1:] / points[..., :1]
+        return np.concatenate([np.fmin.reduce(pixels, axis=1), np.fmax.reduce(pixels, axis=1)], axis=1)
+
+    @cached_property
+    def _lens(self) -> "Lenses":
+        centre = np.array([self.width / 2, self.height / 2])
+        return Lenses(np.array(self.position, dtype=float), self.axes, np.array(self.focal), centre)
+
+
+@dataclass(frozen=True)
+class Lenses:
+    """The pinhole model of one camera or, with an axis of n before each column, of n at once.
+
+    `positions` (3,) and `axes` (3, 3) in the sensor frame, `focals` () and `centres` (2,) in pixels.
+    """
+
+    positions: Floats
+    axes: Floats
+    focals: Floats
+    centres: Floats
+
+    @classmethod
+    def of(cls, cameras: Sequence[PinholeCamera]) -> "Lenses":
+        """Those of n cameras."""
+        lenses = [camera._lens for camera in cameras]
+        return cls(*(np.array([getattr(lens, column.name) for lens in lenses]) for column in fields(cls)))
+
+    def take(self, numbers: NDArray[np.int64]) -> "Lenses":
+        """(n, 1, ...) the lenses of n lists of points or boxes, by number."""
+        positions, focals, centres = (column[numbers, None] for column in (self.positions, self.focals, self.centres))
+        return Lenses(positions, self.axes[numbers], focals, centres)
+
+    def project(self, points: Floats) -> tuple[Floats, Floats]:
+        """As `PinholeCamera.project`."""
+        local = (points - self.positions) @ np.swapaxes(self.axes, -1, -2)
+        depth = local[..., 0]
+        scale = self.focals / np.where(depth > 0, depth, np.nan)
+        return self.centres - local[..., 1:] * scale[..., None], depth
+
+    def rays(self, pixels: Floats) -> Floats:
+        """As `PinholeCamera.rays`."""
+        local = np.ones((*pixels.shape[:-1], 3))
+        local[..., 1:] = (self.centres - pixels) / self.focals[..., None]
+        return local @ self.axes
+
+    def box_rays(self, boxes: Floats) -> Floats:
+        """As `PinholeCamera.box_rays`."""
+        low, high = boxes[:, :2], boxes[:, 2:]
+        nearest = np.clip(self.centres.reshape(-1, 2), low, high)
+        return self.rays(np.concatenate([boxes, (low + high) / 2, nearest], axis=1)[:, _BOX_POINTS])
 
 
 def _cut(points: Floats, others: Floats) -> Floats:

@@ -7,6 +7,7 @@ body id of the simulator: truth stays in the world and in the scoring.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from care_sim.errors import check_number, check_whole
 from care_sim.frames import Floats
 from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
-from care_sim.pinhole import PinholeCamera
+from care_sim.pinhole import Lenses, PinholeCamera
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
 """The five driving classes shared by both detectors and the scoring (paper, Sec. 5.1)."""
@@ -215,6 +216,11 @@ class Rig:
         check_number("reserve_fraction", self.reserve_fraction, 0, 1)
         check_whole("azimuth_margin", self.azimuth_margin, 0)
         check_whole("elevation_margin", self.elevation_margin, 0)
+
+    @cached_property
+    def lenses(self) -> Lenses:
+        """The cameras as one table."""
+        return Lenses.of(self.cameras)
 
     def hulls(self, boxes: Floats, azimuth_margins: Cells | None = None) -> list[Cells]:
         """The cells of sensor-frame boxes (n, 7), dilated by the rig's margins or by `azimuth_margins` (n,)."""

@@ -35,6 +35,24 @@ def by_the_letter(demand, budget, reserve_fraction, floor):
     return taken + rest[: budget - len(taken)]
 
 
+def turn_by_turn(sets, limit, chosen):
+    """The round-robin as nested loops, fast enough for the whole grid."""
+    queues = [iter(np.unique(cells).tolist()) for cells in sets]
+    while queues and len(chosen) < limit:
+        waiting = []
+        for queue in queues:
+            for cell in queue:
+                if cell not in chosen:
+                    break
+            else:
+                continue
+            chosen[cell] = None
+            if len(chosen) == limit:
+                return
+            waiting.append(queue)
+        queues = waiting
+
+
 def test_worked_by_hand():
     """Ten cells, three reserved. Overlaps cost no turn; two cells left over by exploitation go to the layers."""
     demand = Demand(
@@ -102,6 +120,18 @@ def test_without_floor_the_rest_is_unspent():
 def test_agrees_with_the_algorithm_by_the_letter(demand, budget, rho, floor):
     assert allocate(demand, budget, rho, floor).tolist() == by_the_letter(demand, budget, rho, floor)
     assert allocate(demand, budget, rho).tolist() == by_the_letter(demand, budget, rho, None)
+
+
+@given(st.lists(st.lists(st.tuples(*4 * [st.integers(0, 40)]), max_size=12), min_size=1, max_size=3), st.data())
+def test_agrees_with_nested_loops_over_rectangles_of_the_grid(grid, rectangles, data):
+    table = np.arange(grid.size).reshape(grid.shape)
+    sets = [[table[r : r + h, c : c + w].ravel() for c, w, r, h in some] for some in rectangles]
+    budget = data.draw(st.integers(1, 1 + sum(len(cells) for some in sets for cells in some)))
+    expected = {}
+    turn_by_turn(sets[0], round(0.7 * budget), expected)
+    for layer in sets[1:]:
+        turn_by_turn(layer, budget, expected)
+    assert allocate(Demand(sets[0], sets[1:]), budget, 0.3).tolist() == [*expected]
 
 
 @given(demands, budgets, fractions, floors)

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.frames import Frame
-from care_sim.pinhole import NEAR_M, PinholeCamera
+from care_sim.pinhole import NEAR_M, Lenses, PinholeCamera
+from care_sim.sensors.surround import SURROUND_CAMERAS
 
 cameras = st.builds(
     PinholeCamera,
@@ -118,3 +119,16 @@ def test_roll_lowers_the_right_of_the_camera():
 def test_the_axes_of_a_camera_are_those_of_the_frame_it_stands_in(yaw, pitch, roll):
     frame = Frame(0.0, 0.0, 0.0, yaw, roll=roll, pitch=-pitch)
     assert PinholeCamera(yaw=yaw, pitch=pitch, roll=roll).axes == pytest.approx(frame.rotation.as_matrix().T)
+
+
+def test_several_cameras_at_once_see_what_each_sees_alone():
+    boxes = np.array([[10.0, 20, 30, 60], [100, 40, 300, 100], [0, 0, 320, 180], [160, 90, 200, 120]])
+    points = np.random.default_rng(0).uniform(-20, 20, (4, 5, 3))
+    numbers = np.array([5, 0, 2, 0])
+    lenses = Lenses.of(SURROUND_CAMERAS).take(numbers)
+    rays, (pixels, depths) = lenses.box_rays(boxes), lenses.project(points)
+    for row, number in enumerate(numbers):
+        camera = SURROUND_CAMERAS[number]
+        np.testing.assert_array_equal(rays[row], camera.box_rays(boxes[row])[0])
+        np.testing.assert_array_equal(pixels[row], camera.project(points[row])[0])
+        np.testing.assert_array_equal(depths[row], camera.project(points[row])[1])

@@ -58,10 +58,11 @@ class TrackMemory:
         """
         seen = sensor.boxes_to_world(detections.boxes)
         matched, found = self._assign(detections.classes, seen)
-        new = np.setdiff1d(np.arange(len(detections)), found)
+        new = np.ones(len(detections), bool)
+        new[found] = False
         ids = np.empty(len(detections), np.int64)
         ids[found] = self._tracks.ids[matched]
-        ids[new] = self._next_id + np.arange(len(new))
+        ids[new] = self._next_id + np.arange(new.sum())
         self._correct(matched, seen[found])
         self._forget()
         self._start(ids[new], detections.classes[new], seen[new])
@@ -97,10 +98,13 @@ class TrackMemory:
 
     def _forget(self) -> None:
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
-        self._tracks = self._tracks.take(alive)
+        if not alive.all():
+            self._tracks = self._tracks.take(alive)
 
     def _start(self, ids: Cells, classes: Cells, boxes: Floats) -> None:
         count = len(ids)
+        if not count:
+            return
         self._next_id += count
         old = self._tracks
         self._tracks = Tracks(

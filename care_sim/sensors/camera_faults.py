@@ -32,6 +32,8 @@ class Misses:
 
     def draw(self, ranges: Floats) -> NDArray[np.bool_]:
         """(n,) who is missed in this frame; `ranges` (n,) are distances in metres."""
+        if not (self._faults.false_negative_rate or self._faults.false_negative_per_m):
+            return np.zeros(len(ranges), bool)
         burst = self._faults.false_negative_burst
         rates = np.minimum(self._faults.false_negative_rate + self._faults.false_negative_per_m * ranges, 1.0)
         draws = self._rng.random(len(rates))

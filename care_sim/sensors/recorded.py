@@ -39,7 +39,8 @@ class RecordedLidar:
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""
         nearest = np.full(self.grid.size, np.inf)
-        np.minimum.at(nearest, cloud.cells, np.linalg.norm(cloud.points, axis=1))
+        cells, starts = np.unique(cloud.cells, return_index=True)
+        nearest[cells] = np.minimum.reduceat(np.linalg.norm(cloud.points, axis=1), starts)
         return nearest
 
     def _noisy(self, cloud: Cloud) -> Cloud:
