@@ -32,7 +32,7 @@ class ClosedLoop:
         self._reported = [actor for actor in world.actors if actor.body in labels]
         self._actors = {actor.body: actor for actor in world.actors}
         camera_seed, lidar_seed, odometry_seed = seeds
-        engine = ENGINES[sensing.engine](world.bullet)
+        engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, engine, sensing, lidar_seed)
         self._labels = labels
         self._camera = CameraDetector(

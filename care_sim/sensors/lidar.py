@@ -33,17 +33,16 @@ class Lidar:
 
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
-        directions = sensor.vectors_to_world(self.grid.directions)
-        ranges, _ = self._engine.cast(sensor.origin, directions, self.grid.range_m)
-        return Scan(np.arange(self.grid.size), np.where(self._dead, np.inf, ranges))
+        cells = np.arange(self.grid.size)
+        ranges, _ = self._engine.cast(sensor, cells)
+        return Scan(cells, np.where(self._dead, np.inf, ranges))
 
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """Fire `cells` from the frame `sensor`.
 
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
-        directions = sensor.vectors_to_world(self.grid.directions[cells])
-        ranges, ids = self._engine.cast(sensor.origin, directions, self.grid.range_m)
+        ranges, ids = self._engine.cast(sensor, cells)
         if self._faults.lidar_range_sigma > 0:
             draws = self._noise.standard_normal(self.grid.size)[cells]
             noisy = np.clip(ranges + self._faults.lidar_range_sigma * draws, NEAREST_M, self.grid.range_m - NEAREST_M)

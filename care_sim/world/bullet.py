@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from care_sim.frames import Floats, Frame, Pose
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
 
 Integers = NDArray[np.int64]
@@ -34,6 +35,7 @@ class BulletWorld:
 
     def __init__(self, ground: bool = True) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
+        self.primitives = Primitives()
         self.ground = self._lay_ground() if ground else NOTHING
 
     def _lay_ground(self) -> int:
@@ -60,6 +62,7 @@ class BulletWorld:
             physicsClientId=self._client,
         )
         self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
+        self.primitives.add(body, () if transparent else kind.parts)
         self.move(body, pose)
         return int(body)
 
@@ -67,6 +70,7 @@ class BulletWorld:
         """Put a body at a pose on the ground plane, or at a frame: anywhere, turned in any way."""
         place, turn = _standing(pose)
         pybullet.resetBasePositionAndOrientation(body, place, turn, physicsClientId=self._client)
+        self.primitives.move(body, place, turn)
 
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.

@@ -15,14 +15,14 @@ SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 
 
 class Watched:
-    """Passes rays on to an engine and keeps them."""
+    """Passes cells on to an engine and keeps them."""
 
     def __init__(self, engine):
-        self.engine, self.directions = engine, []
+        self.engine, self.cells = engine, []
 
-    def cast(self, origin, directions, reach):
-        self.directions.append(directions)
-        return self.engine.cast(origin, directions, reach)
+    def cast(self, sensor, cells):
+        self.cells.append(cells)
+        return self.engine.cast(sensor, cells)
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def street(bullet):
 
 
 def lidar(grid, bullet, seed=0, **noise):
-    return Lidar(grid, ENGINES["bullet"](bullet), Sensing(**noise), np.random.SeedSequence(seed))
+    return Lidar(grid, ENGINES["bullet"](bullet, grid), Sensing(**noise), np.random.SeedSequence(seed))
 
 
 def everything(grid):
@@ -42,11 +42,10 @@ def everything(grid):
 
 
 def test_only_the_fired_cells_are_cast(grid, street):
-    engine = Watched(street)
+    engine = Watched(ENGINES["bullet"](street, grid))
     cells = np.array([5, 300, 9000, 16383])
     Lidar(grid, engine, Sensing(), np.random.SeedSequence(0)).fire(cells, SENSOR)
-    assert len(engine.directions) == 1
-    assert engine.directions[0] == pytest.approx(grid.directions[cells])
+    assert [cast.tolist() for cast in engine.cells] == [cells.tolist()]
 
 
 def test_a_scan_of_some_cells_is_that_part_of_the_full_scan(grid, street):
