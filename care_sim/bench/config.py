@@ -24,7 +24,7 @@ class BenchConfig:
     repeats: int = 5
     """Rounds; in each round everything is measured once."""
     samples: int = 200
-    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth in all."""
+    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
     resets: int = 2000
     """Episodes begun in the worker whose memory is watched."""
     out: Path | None = None

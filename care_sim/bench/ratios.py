@@ -26,9 +26,11 @@ def same_on_grid(engine: str) -> str:
 
 
 def ratios(report: Report) -> dict[str, float]:
-    """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's does."""
+    """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's does. Steps are
+    those of a second on the core, but for processes side by side.
+    """
     speed, engines, curves = report["speed"], report["scans"]["engines"], report["growth"]["grid"]["ms"]
-    steps = {name: middle(figures["steps_per_s"]) for name, figures in speed.items()}
+    steps = {name: middle(figures["steps_per_cpu_s"]) for name, figures in speed.items()}
     scan = {name: middle(figures["scan_ms"]) for name, figures in engines.items()}
     mine = FAST if FAST in engines else REFERENCE
     one, two = (middle(values) for values in report["vectorised"].values())

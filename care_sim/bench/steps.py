@@ -1,5 +1,6 @@
 """Steps and constructions a second of the environments, and of known ones beside them."""
 
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -44,14 +45,18 @@ def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
 
 
 def speed(maker: Maker, config: BenchConfig) -> dict[str, float]:
-    """`steps_per_s`, resets included, and `inits_per_s`, constructions with a reset."""
+    """`steps_per_s`, resets included; `steps_per_cpu_s`, the same for a second of this process on its core, so that
+    others who share the core do not count; and `inits_per_s`, constructions with a reset.
+    """
     seconds = cast("int", config.seconds)
     with silenced(STANDARD_OUTPUT):
         with maker() as env:
+            started, worked = time.perf_counter(), time.process_time()
             steps = benchmark_step(env, seconds, config.seed)
+            share = (time.process_time() - worked) / (time.perf_counter() - started)
         with ExitStack() as made:
             inits = benchmark_init(partial(_one_at_a_time, maker, made), seconds, config.seed)
-    return {"steps_per_s": steps, "inits_per_s": inits}
+    return {"steps_per_s": steps, "steps_per_cpu_s": steps / share, "inits_per_s": inits}
 
 
 def _one_at_a_time(maker: Maker, made: ExitStack) -> Environment:

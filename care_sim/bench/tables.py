@@ -27,7 +27,7 @@ def tables(report: Report) -> list[Table]:
 
 def _speed(report: Report) -> Table:
     rows = tuple(
-        (name, _spread(figures["steps_per_s"]), _spread(figures["inits_per_s"]))
+        (name, *(_spread(figures[key]) for key in ("steps_per_s", "steps_per_cpu_s", "inits_per_s")))
         for name, figures in report["speed"].items()
     )
     where = report["machine"]
@@ -37,7 +37,9 @@ def _speed(report: Report) -> Table:
         *(f"left out: {line}" for line in report["skipped"]),
     )
     title = f"Speed: {SPREAD} of {report['config']['repeats']}"
-    return Table(title, ("environment", "steps/s, resets included", "constructions with reset/s"), rows, notes)
+    return Table(
+        title, ("environment", "steps/s, resets included", "a CPU second", "constructions with reset/s"), rows, notes
+    )
 
 
 def _scans(report: Report) -> Table:

@@ -58,6 +58,9 @@ def test_everything_is_measured_in_every_round(measured):
     assert {*CLOSED_LOOP, DRIVING, REACHING} <= {*measured["speed"], *left_out}
     for figures in (*measured["speed"].values(), measured["vectorised"], measured["stages"], measured["choices"]):
         assert all(len(values) == 2 and min(values) > 0 for values in figures.values())
+    for figures in measured["speed"].values():
+        for wall, core in zip(figures["steps_per_s"], figures["steps_per_cpu_s"], strict=True):
+            assert core > 0.95 * wall
     assert set(measured["vectorised"]) == {"1", "2"}
 
 
