@@ -66,7 +66,7 @@ class Scenarios:
 
 @dataclass(frozen=True)
 class Bench:
-    """Measure the speed of the environments beside highway-env."""
+    """Measure speed: keyframe, scans, steps and memory, beside other engines and environments."""
 
 
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."

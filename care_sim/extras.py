@@ -31,6 +31,26 @@ def import_torch() -> ModuleType:
     return torch
 
 
+def import_mujoco() -> ModuleType:
+    """MuJoCo. Raises MissingExtra with the extra to install."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingExtra(f"MuJoCo needs the extra 'bench': pip install 'care-sim[bench]' ({error})") from error
+    module: ModuleType = mujoco
+    return module
+
+
+def import_panda_gym() -> ModuleType:
+    """panda-gym, which registers its environments. Raises MissingExtra with the extra to install."""
+    try:
+        import panda_gym
+    except ImportError as error:
+        raise MissingExtra(f"panda-gym needs the extra 'bench': pip install 'care-sim[bench]' ({error})") from error
+    module: ModuleType = panda_gym
+    return module
+
+
 def _load_libusb() -> None:
     """Give Open3D the libusb of the wheel `libusb-package`, for systems without their own."""
     try:

@@ -20,6 +20,7 @@ from care_sim.types import Keyframe, Observation
 from care_sim.world.world import World
 
 Answer = TypeVar("Answer")
+KIB_MB = 1024 / 1e6
 
 
 def attempt(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
@@ -111,5 +112,9 @@ def _one_line(text: str) -> str:
 
 def peak_rss_mb() -> float:
     """The most memory this process has held, in MB."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (1e6 if sys.platform == "darwin" else 1e3)
+    status = Path("/proc/self/status")
+    if status.exists():  # getrusage would count what the parent held when it started this process
+        (peak,) = (line.split()[1] for line in status.read_text().splitlines() if line.startswith("VmHWM:"))
+        return int(peak) * KIB_MB
+    held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return held / (1e6 if sys.platform == "darwin" else 1e3)

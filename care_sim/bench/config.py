@@ -1,0 +1,43 @@
+"""What is measured, and how long."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_sim.errors import InvalidInput, check_whole
+from care_sim.study.config import EpisodeConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchConfig:
+    """Measure speed on one core: a keyframe by stage, scans, steps and memory, beside known ones in the same run."""
+
+    scenario: str = "dense"
+    """Scenario whose keyframe is taken apart and whose speed is held against the targets."""
+    budget: float = 0.10
+    """Budget fraction, 0 to 1."""
+    policy: str = "care"
+    """Policy that chooses the cells."""
+    seed: int = 0
+    """Seed of the first episode, and of the scenes of scans and choices."""
+    seconds: float = 3.0
+    """Duration of every single measurement of steps."""
+    repeats: int = 5
+    """Rounds; in each round everything is measured once."""
+    samples: int = 200
+    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
+    resets: int = 2000
+    """Episodes begun in the worker whose memory is watched."""
+    out: Path | None = None
+    """File for the figures as JSON; the growth curves are drawn beside it, as PNG and SVG."""
+
+    def __post_init__(self) -> None:
+        if not self.seconds > 0:
+            raise InvalidInput(f"seconds must be positive, got {self.seconds}")
+        check_whole("repeats", self.repeats, 1)
+        check_whole("samples", self.samples, 1)
+        check_whole("resets", self.resets, 1)
+
+    @property
+    def episode(self) -> EpisodeConfig:
+        """The first episode. Raises InvalidInput for what it does not accept."""
+        return EpisodeConfig(self.scenario, self.policy, self.budget, self.seed)

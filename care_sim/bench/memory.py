@@ -1,0 +1,30 @@
+"""Memory of a worker: a fresh process that begins episode after episode."""
+
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+from care_sim.bench.config import BenchConfig
+from care_sim.bench.driven import driven
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.episode import peak_rss_mb
+
+Memory = dict[str, float]
+
+
+def worker_memory(config: BenchConfig) -> Memory:
+    """Peak memory in MB of a worker: `imported` when it has its libraries, `early_mb` after a tenth of the resets,
+    `peak_mb` after all of them, `resets` in number. A step follows every reset.
+    """
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(_resets, config.episode, config.resets).result()
+
+
+def _resets(config: EpisodeConfig, resets: int) -> Memory:
+    memory = {"resets": float(resets), "imported_mb": peak_rss_mb()}
+    with driven(config) as env:
+        for number in range(resets):
+            env.reset(seed=config.seed + number)
+            env.step(0)
+            if number == resets // 10:
+                memory["early_mb"] = peak_rss_mb()
+    return {**memory, "peak_mb": peak_rss_mb()}
