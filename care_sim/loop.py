@@ -32,8 +32,8 @@ class ClosedLoop:
         self._reported = [actor for actor in world.actors if actor.body in labels]
         self._actors = {actor.body: actor for actor in world.actors}
         camera_seed, lidar_seed, odometry_seed = seeds
-        engine = ENGINES[sensing.engine](world.bullet, rig.grid)
-        self._lidar = Lidar(rig.grid, engine, sensing, lidar_seed)
+        self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
+        self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
         self._labels = labels
         self._camera = CameraDetector(
             list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, rig.sensor_height_m
@@ -117,7 +117,7 @@ class ClosedLoop:
 
     def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
         window = window_on(camera, boxes)
-        return Picture.of(self.world.bullet.body_ids(camera, sensor, window), window)
+        return Picture.of(self._engine.body_ids(camera, sensor, window), window)
 
     def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_sim.frames import BOX_EDGES, Floats, box_corners
+from care_sim.frames import BOX_EDGES, Floats, Frame, box_corners
 
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
@@ -53,6 +53,10 @@ class PinholeCamera:
         cr, sr = np.cos(self.roll), np.sin(self.roll)
         rolled: Floats = np.array([[1.0, 0.0, 0.0], [0.0, cr, sr], [0.0, -sr, cr]]) @ upright
         return rolled
+
+    def stance(self, sensor: Frame) -> tuple[Floats, Floats]:
+        """World position (3,), and rows (3, 3) forward, left and up in the world, of the camera on a sensor there."""
+        return sensor.origin + sensor.vectors_to_world(np.array(self.position)), sensor.vectors_to_world(self.axes)
 
     def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Pixels (..., 2) and depths (...) of sensor-frame points (..., 3).

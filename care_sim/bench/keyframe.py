@@ -9,15 +9,16 @@ from care_sim.control import BrakingController
 from care_sim.perception.detectors import ReturnsDetector
 from care_sim.perception.memory import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture
+from care_sim.sensors.engines import Bullet
+from care_sim.sensors.fast import Fast
 from care_sim.sensors.lidar import Lidar
 from care_sim.study.config import EpisodeConfig
 from care_sim.types import Belief
-from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
 
 POLICY, REST, WHOLE = "policy + allocation", "the rest", "whole keyframe"
 STAGES: dict[str, tuple[tuple[type, str], ...]] = {
-    "camera": ((BulletWorld, "body_ids"), (Picture, "of"), (CameraDetector, "detect")),
+    "camera": ((Bullet, "body_ids"), (Fast, "body_ids"), (Picture, "of"), (CameraDetector, "detect")),
     "cast": ((Lidar, "fire"),),
     "detect": ((ReturnsDetector, "detect"),),
     "track": ((TrackMemory, "update"), (TrackMemory, "predict"), (TrackMemory, "tracks")),

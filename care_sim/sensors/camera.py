@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from care_sim.conditions import Sensing
 from care_sim.film import Sights
 from care_sim.frames import Floats
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera_faults import Delay, Ghosts, Misses, mounted
+from care_sim.sensors.paint import tally
 from care_sim.types import ImageDetections
 from care_sim.world.bullet import Integers, Window
 
@@ -52,18 +52,10 @@ class Picture:
 
     @classmethod
     def of(cls, ids: Integers, window: Window | None = None) -> "Picture":
-        """Read the box of every body off a picture of ids (height, width), or off a window of it."""
-        left, top, right, bottom = window if window is not None else (0, 0, *ids.shape[::-1])
-        labels = ids[top:bottom, left:right] + 1
-        visible = np.bincount(labels.ravel())
-        found = ndimage.find_objects(labels) if labels.size else []
-        rows = [
-            (body, s[1].start + left, s[0].start + top, s[1].stop + left, s[0].stop + top, visible[body + 1])
-            for body, s in enumerate(found)
-            if s is not None
-        ]
-        table = np.array(rows, dtype=np.int64).reshape(-1, 6)
-        return cls(table[:, 0], table[:, 1:5].astype(float), table[:, 5])
+        """Read the box of every body off a picture of ids (height, width), all of it or that of a window."""
+        table = tally(ids)
+        left, top = window[:2] if window is not None else (0, 0)
+        return cls(table[:, 0], table[:, 1:5] + np.array([left, top, left, top], float), table[:, 5])
 
     def shows(self, body: int) -> bool:
         """Whether enough of a body is visible for a box."""

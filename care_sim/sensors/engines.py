@@ -1,4 +1,4 @@
-"""Ray engines behind one seam: who answers which body a cell's ray hits, and how far away."""
+"""Engines behind one seam: who answers which body a ray hits, how far away, and which body a pixel shows."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -6,11 +6,12 @@ from typing import Protocol
 from care_sim.errors import unknown
 from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
-from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.pinhole import PinholeCamera
+from care_sim.world.bullet import BulletWorld, Integers, Window
 
 
-class RayEngine(Protocol):
-    """Casts the rays of one grid at the bodies of one world."""
+class Engine(Protocol):
+    """Casts the rays of one grid at the bodies of one world, and draws them for cameras."""
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,), NOTHING there, of
@@ -18,26 +19,36 @@ class RayEngine(Protocol):
         """
         ...
 
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
+        """Id of the body that each pixel of a window of `camera` shows, NOTHING where there is none; see
+        `care_sim.world.bullet.BulletWorld.body_ids`.
+        """
+        ...
 
-class BulletRays:
-    """PyBullet's own rays: the reference."""
+
+class Bullet:
+    """PyBullet's own rays and renderer: the reference."""
 
     def __init__(self, world: BulletWorld, grid: AngularGrid):
         self._world, self._grid = world, grid
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `RayEngine`."""
+        """Ranges and body ids; see `Engine`."""
         directions = sensor.vectors_to_world(self._grid.directions[cells])
         return self._world.cast(sensor.origin, directions, self._grid.range_m)
 
-
-def _fast(world: BulletWorld, grid: AngularGrid) -> RayEngine:
-    from care_sim.sensors.fast import FastRays
-
-    return FastRays(world, grid)
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
+        """Body ids of pixels; see `Engine`."""
+        return self._world.body_ids(camera, sensor, window)
 
 
-ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], RayEngine]] = {"bullet": BulletRays, "fast": _fast}
+def _fast(world: BulletWorld, grid: AngularGrid) -> Engine:
+    from care_sim.sensors.fast import Fast
+
+    return Fast(world, grid)
+
+
+ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], Engine]] = {"bullet": Bullet, "fast": _fast}
 """Engine makers by name."""
 
 

@@ -1,18 +1,20 @@
-"""The ray engine `fast`: compiled, and asking each body only about the fired cells that it can cover."""
+"""The engine `fast`: compiled, asking each body only about the fired cells and the pixels that it can cover."""
 
 import numpy as np
 
 from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
+from care_sim.pinhole import NEAR_M, PinholeCamera
+from care_sim.sensors.paint import paint
 from care_sim.sensors.rays import scan
 from care_sim.sensors.windows import placed, windows
-from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.world.bullet import FAR_M, BulletWorld, Integers, Window
 
 
-class FastRays:
-    """Casts at the primitives of a world where they are at the moment; nothing is rebuilt when bodies move.
+class Fast:
+    """Rays and pictures of the bodies of a world where they are at the moment; nothing is rebuilt when bodies move.
 
-    The first cast on a machine compiles for some seconds; later processes read the compiled code from a cache.
+    The first call on a machine compiles for some seconds; later processes read the compiled code from a cache.
     """
 
     def __init__(self, world: BulletWorld, grid: AngularGrid):
@@ -21,7 +23,7 @@ class FastRays:
         self._lattice = (grid.columns, grid.rows, float(grid.top), float(grid.row_height))
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        """Ranges and body ids; see `care_sim.sensors.engines.Engine`."""
         if np.any(cells[1:] < cells[:-1]):
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])
@@ -36,3 +38,12 @@ class FastRays:
             np.ascontiguousarray(cells), *self._rays, road, solids, (centres, turns), bounds
         )
         return result
+
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
+        """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
+        eye, axes = camera.stance(sensor)
+        lens = camera.focal, camera.width / 2, camera.height / 2
+        looks = self._world.looks
+        meshes = (looks.corners, looks.faces, looks.edges, looks.starts, looks.owners)
+        ids: Integers = paint((eye, axes), lens, window, (NEAR_M, FAR_M), meshes, self._world.primitives.poses)
+        return ids

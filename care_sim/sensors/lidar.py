@@ -9,7 +9,7 @@ from care_sim.conditions import LidarFaults
 from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.grid import AngularGrid, Cells
-from care_sim.sensors.engines import RayEngine
+from care_sim.sensors.engines import Engine
 from care_sim.types import Scan
 from care_sim.world.bullet import NOTHING, Integers
 
@@ -20,11 +20,11 @@ NEAREST_M = 0.01
 
 
 class Lidar:
-    """Casts the fired cells through a ray engine; noise draws are one a cell, fired or not, so that
+    """Casts the fired cells through an engine; noise draws are one a cell, fired or not, so that
     every policy meets the same noise (common random numbers).
     """
 
-    def __init__(self, grid: AngularGrid, engine: RayEngine, faults: LidarFaults, seed: np.random.SeedSequence):
+    def __init__(self, grid: AngularGrid, engine: Engine, faults: LidarFaults, seed: np.random.SeedSequence):
         self.grid = grid
         self._engine = engine
         self._faults = faults

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from care_sim.frames import Floats, Frame, Pose
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.looks import Looks
 from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
 
@@ -22,7 +23,8 @@ RAYS_A_CALL = 8192
 
 _SHAPES = {"box": pybullet.GEOM_BOX, "cylinder": pybullet.GEOM_CYLINDER, "sphere": pybullet.GEOM_SPHERE}
 _OPAQUE, _TRANSPARENT = 1, 2
-_FAR_M = 120.0
+FAR_M = 120.0
+"""Nothing further from the image plane is seen."""
 
 
 class BulletWorld:
@@ -36,6 +38,7 @@ class BulletWorld:
     def __init__(self, ground: bool = True) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self.primitives = Primitives()
+        self.looks = Looks()
         self.ground = self._lay_ground() if ground else NOTHING
 
     def _lay_ground(self) -> int:
@@ -55,14 +58,16 @@ class BulletWorld:
 
         A `backdrop` stands behind all that perception reports: rays hit it, cameras need not render it.
         """
+        seen = () if transparent or backdrop else kind.parts
         body = pybullet.createMultiBody(
             0,
             pybullet.createCollisionShapeArray(physicsClientId=self._client, **_collision(kind.parts)),
-            self._no_look() if transparent or backdrop else self._look(kind.parts),
+            self._look(seen) if seen else self._no_look(),
             physicsClientId=self._client,
         )
         self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
         self.primitives.add(body, () if transparent else kind.parts)
+        self.looks.add(body, seen)
         self.move(body, pose)
         return int(body)
 
@@ -92,14 +97,13 @@ class BulletWorld:
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window | None = None) -> Integers:
         """(height, width) id of the body each pixel of `camera` shows, NOTHING where there is none.
 
-        The camera is mounted in the frame `sensor`. Pixels outside `window` are left at NOTHING.
+        The camera is mounted in the frame `sensor`. Of a `window` only its own rows and columns.
         """
         left, top, right, bottom = window if window is not None else (0, 0, camera.width, camera.height)
-        ids = np.full((camera.height, camera.width), NOTHING, np.int64)
-        if left < right and top < bottom:
-            rendered = np.asarray(self._render(camera, sensor, (left, top, right, bottom))[4])
-            ids[top:bottom, left:right] = rendered.reshape(bottom - top, right - left)
-        return ids
+        if left >= right or top >= bottom:
+            return np.empty((0, 0), np.int64)
+        rendered = self._render(camera, sensor, (left, top, right, bottom))[4]
+        return np.asarray(rendered, np.int64).reshape(bottom - top, right - left)
 
     def colours(self, camera: PinholeCamera, sensor: Frame) -> NDArray[np.uint8]:
         """(height, width, 3) rendered picture of the same view as `body_ids`."""
@@ -112,8 +116,7 @@ class BulletWorld:
         return float(min((point[8] for point in points), default=np.inf))
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: Window) -> tuple[Any, ...]:
-        eye = sensor.origin + sensor.vectors_to_world(np.array(camera.position))
-        forward, _, up = sensor.vectors_to_world(camera.axes)
+        eye, (forward, _, up) = camera.stance(sensor)
         left, top, right, bottom = window
         scale = NEAR_M / camera.focal
         across = [(u - camera.width / 2) * scale for u in (left, right)]
@@ -122,7 +125,7 @@ class BulletWorld:
             right - left,
             bottom - top,
             pybullet.computeViewMatrix(eye, eye + forward, up),
-            pybullet.computeProjectionMatrix(*across, *upward, NEAR_M, _FAR_M),
+            pybullet.computeProjectionMatrix(*across, *upward, NEAR_M, FAR_M),
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
