@@ -87,5 +87,5 @@ def directions() -> Floats:
 
 
 def _ring(azimuths: Floats, side: float) -> Floats:
-    flat = 2 * np.column_stack([np.cos(azimuths), np.sin(azimuths)])
-    return np.column_stack([flat, np.full(len(azimuths), side)]) / np.sqrt(5)
+    points: Floats = np.column_stack([2 * np.cos(azimuths), 2 * np.sin(azimuths), np.full(len(azimuths), side)])
+    return points / np.sqrt(5)
