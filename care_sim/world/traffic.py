@@ -6,6 +6,7 @@ right.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +28,22 @@ STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
 """From centre to centre, what an IDM driver leaves before what stands ahead."""
 
 
+class LaneAlongX(StraightLane):  # type: ignore[misc]
+    """A lane from (-x, y) to (x, y) or back."""
+
+    def local_coordinates(self, position: Sequence[float]) -> tuple[float, float]:
+        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without its dot products
+        of axes that are 0 and 1 or -1.
+        """
+        x, y = position
+        start_x, start_y, sign = self._origin
+        return (float(x) - start_x) * sign, (float(y) - start_y) * sign + 0.0
+
+    @cached_property
+    def _origin(self) -> tuple[float, float, float]:
+        return float(self.start[0]), float(self.start[1]), float(self.direction[0])
+
+
 class Traffic:
     """A straight road and the vehicles that drive on it.
 
@@ -43,7 +60,7 @@ class Traffic:
             ends = ([-_ROAD_LENGTH_M, y], [_ROAD_LENGTH_M, y])
             start, end = ends if direction > 0 else ends[::-1]
             nodes = ("a", "b") if direction > 0 else ("b", "a")
-            network.add_lane(*nodes, StraightLane(start, end, width=lane_width, speed_limit=speed_limit))
+            network.add_lane(*nodes, LaneAlongX(start, end, width=lane_width, speed_limit=speed_limit))
             self._lanes.append((*nodes, counts[direction]))
             counts[direction] += 1
         self._ego_lane = ego_lane
@@ -51,9 +68,10 @@ class Traffic:
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
         """The car that carries the sensors, in lane 0 at `x`, driven by `RoadVehicle.accelerate`."""
-        vehicle = self._make(Vehicle, x, 0, speed, kind)
-        vehicle.enter()
-        return vehicle
+        ego = self._make(Vehicle, x, 0, speed, kind)
+        ego.enter()
+        ego.forget_lane()
+        return ego
 
     def add_driver(self, x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
         """A vehicle that keeps its lane and follows the intelligent driver model (IDM) at `speed`."""
@@ -122,6 +140,10 @@ class RoadVehicle:
     def enter(self) -> None:
         """Join the traffic: from now on the vehicle moves, and others see it."""
         self._traffic.join(self._vehicle)
+
+    def forget_lane(self) -> None:
+        """Never again look up the nearest lane: only drivers ask which one they are in."""
+        self._vehicle.road = None
 
     def stand(self) -> None:
         """Lose all speed at once."""
