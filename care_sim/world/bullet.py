@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from care_sim.frames import Floats, Frame, Pose
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.clients import borrow, give_back
 from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
 
@@ -36,7 +37,7 @@ class BulletWorld:
     """
 
     def __init__(self, ground: bool = True) -> None:
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._client = borrow()
         self.primitives = Primitives()
         self._moved: set[int] = set()
         self.ground = self._lay_ground() if ground else NOTHING
@@ -48,9 +49,9 @@ class BulletWorld:
         return int(ground)
 
     def close(self) -> None:
-        """Free the client; calling it again does nothing."""
+        """Give the client back; calling it again does nothing."""
         if self._client >= 0:
-            pybullet.disconnect(physicsClientId=self._client)
+            give_back(self._client)
             self._client = -1
 
     def add(self, kind: BodyKind, pose: Pose | Frame, *, transparent: bool = False, backdrop: bool = False) -> int:
