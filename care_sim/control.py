@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.frames import Floats
 from care_sim.types import Command, Ego, Tracks
 
 
@@ -60,9 +61,11 @@ class BrakingController:
 
     def command(self, tracks: Tracks, ego: Ego) -> Command:
         """Decide from the tracks of this keyframe, in the sensor frame, and the ego's motion."""
-        counting = self._counting(tracks)
+        halves = _half_extents(tracks)
+        counting = self._counting(tracks, *halves)
         if self._braking_s is None:
-            if np.any(counting & (self._gaps(tracks) <= self._stopping_distances(tracks, ego.speed))):
+            gaps = tracks.boxes[:, 0] - halves[0] - self._front_m
+            if np.any(counting & (gaps <= self._stopping_distances(tracks, ego.speed))):
                 self._braking_s, self._free_s = 0.0, 0.0
         else:
             self._braking_s += self._keyframe_s
@@ -75,29 +78,25 @@ class BrakingController:
     def _act(self, speed: float) -> Command:
         if self._braking_s is None:
             wanted = (self._cruise_mps - speed) / self._keyframe_s
-            return Command(float(np.clip(wanted, -self._rules.comfort, self._rules.comfort)), False)
+            return Command(float(min(max(wanted, -self._rules.comfort), self._rules.comfort)), False)
         acting = self._braking_s >= self._rules.reaction_s - 1e-9
         return Command(-self._rules.deceleration if acting else 0.0, True)
 
-    def _counting(self, tracks: Tracks) -> NDArray[np.bool_]:
+    def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> NDArray[np.bool_]:
         rules = self._rules
-        half_x, half_y = _half_extents(tracks)
         ahead = tracks.boxes[:, 0] + half_x > self._front_m
         reach = self._half_width_m + rules.side_margin_m + half_y
         now, then = tracks.boxes[:, 1], tracks.boxes[:, 1] + tracks.velocities[:, 1] * rules.horizon_s
         return ahead & (np.minimum(now, then) <= reach) & (np.maximum(now, then) >= -reach)
 
-    def _gaps(self, tracks: Tracks) -> NDArray[np.float64]:
-        return tracks.boxes[:, 0] - _half_extents(tracks)[0] - self._front_m
-
-    def _stopping_distances(self, tracks: Tracks, speed: float) -> NDArray[np.float64]:
+    def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
         rules = self._rules
         own = speed * rules.reaction_s + speed**2 / (2 * rules.deceleration) + rules.standstill_m
         theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.deceleration)
         return own - theirs
 
 
-def _half_extents(tracks: Tracks) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _half_extents(tracks: Tracks) -> tuple[Floats, Floats]:
     """Half the extent of every box along x and along y."""
     length, width, yaw = tracks.boxes[:, 3], tracks.boxes[:, 4], tracks.boxes[:, 6]
     cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))

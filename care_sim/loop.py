@@ -1,7 +1,6 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +28,7 @@ class ClosedLoop:
     def __init__(self, world: World, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence]):
         self.world, self.rig = world, rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
-        self._reported = [actor for actor in world.actors if actor.body in labels]
-        self._actors = {actor.body: actor for actor in world.actors}
+        self._reported = np.array(list(labels), np.int64)
         camera_seed, lidar_seed, odometry_seed = seeds
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
@@ -49,18 +47,13 @@ class ClosedLoop:
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
-    @property
-    def sensor(self) -> Frame:
-        """Where the LiDAR is now."""
-        return Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
-
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
         world, sensor, in_view = self.world, self.sensor, self._in_view()
         index, time, speed = self.index, world.time, world.ego_motion.speed
 
         scan, bodies = self._lidar.fire(fired, sensor)
-        detections, detected = self._detector.detect(bodies, partial(self._local_boxes, sensor))
+        detections, detected = self._detector.detect(bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._identities.note(tracks, detected)
         command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
@@ -90,9 +83,8 @@ class ClosedLoop:
         """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object
         keeps its forecast. Truth: for the privileged alone.
         """
-        sensor = self.sensor
         return self._identities.boxes(
-            tracks, lambda bodies: dict(zip(bodies, self._local_boxes(sensor, np.array(bodies)), strict=True))
+            tracks, lambda bodies: dict(zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True))
         )
 
     def full_scan(self) -> Scan:
@@ -101,8 +93,9 @@ class ClosedLoop:
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
-        sensor = self.sensor
-        boxes = sensor.boxes_to_local(self.world.boxes(self._reported))
+        self.sensor = sensor = Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
+        """Where the LiDAR is now."""
+        boxes = self._local_boxes(self._reported)
         (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
@@ -124,8 +117,8 @@ class ClosedLoop:
         ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
 
-    def _local_boxes(self, sensor: Frame, bodies: Integers) -> Floats:
-        return sensor.boxes_to_local(self.world.boxes([self._actors[body] for body in bodies.tolist()]))
+    def _local_boxes(self, bodies: Integers) -> Floats:
+        return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
 
     def _in_view(self) -> bool:
         target = self.world.first_sighting

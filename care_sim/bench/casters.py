@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Protocol
 
+import numpy as np
+
 from care_sim.bench.embree import Embree
 from care_sim.bench.mujoco import MuJoCo
 from care_sim.errors import MissingExtra
@@ -34,13 +36,12 @@ class OverWorld:
 
     def __init__(self, engine: str, kinds: Sequence[BodyKind], grid: AngularGrid):
         self.world = BulletWorld()
-        self._bodies = [self.world.add(kind, (0.0, 0.0, 0.0)) for kind in kinds]
+        self._bodies = np.array([self.world.add(kind, (0.0, 0.0, 0.0)) for kind in kinds])
         self._engine = ENGINES[engine](self.world, grid)
 
     def place(self, poses: Floats) -> None:
         """Move all bodies: (n, 3) x, y, heading."""
-        for body, (x, y, yaw) in zip(self._bodies, poses.tolist(), strict=True):
-            self.world.move(body, (x, y, yaw))
+        self.world.move_all(self._bodies, poses)
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges (n,) and body ids (n,), as the engine answers."""

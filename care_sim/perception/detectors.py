@@ -36,7 +36,8 @@ class ReturnsDetector:
     """
 
     def __init__(self, labels: Mapping[int, int], min_returns: int = MIN_RETURNS):
-        self._labels = labels
+        self._bodies = np.array([*sorted(labels), np.iinfo(np.int64).max])
+        self._labels = np.array([labels[body] for body in sorted(labels)], np.int64)
         self._min_returns = min_returns
 
     def detect(self, hits: Integers, boxes_of: Callable[[Integers], Floats]) -> tuple[Detections, Integers]:
@@ -44,10 +45,11 @@ class ReturnsDetector:
 
         `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
         """
-        bodies, counts = np.unique(hits, return_counts=True)
-        labels = np.array([self._labels.get(body, -1) for body in bodies.tolist()], dtype=np.int64)
-        kept = (labels >= 0) & (counts >= self._min_returns)
-        return Detections(labels[kept], boxes_of(bodies[kept]), counts[kept]), bodies[kept]
+        rows = np.searchsorted(self._bodies, hits)
+        counts = np.bincount(rows[self._bodies[rows] == hits], minlength=len(self._bodies))
+        kept = np.flatnonzero(counts[:-1] >= self._min_returns)
+        bodies = self._bodies[kept]
+        return Detections(self._labels[kept], boxes_of(bodies), counts[kept]), bodies
 
 
 class ReturnsProxy:

@@ -1,6 +1,6 @@
 """Track memory: assignment by position, velocity from two frames, coasting, death, forecasts."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -38,18 +38,24 @@ class TrackMemory:
 
         After `predict` they are the forecasts for the coming keyframe, after `update` its estimates.
         """
-        local = replace(
-            self._tracks,
-            boxes=sensor.boxes_to_local(self._tracks.boxes),
-            velocities=turned(self._tracks.velocities, -sensor.yaw),
+        tracks = self._tracks
+        boxes = sensor.boxes_to_local(tracks.boxes)
+        nearest = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")[:MAX_TRACKS]
+        return Tracks(
+            tracks.ids[nearest],
+            tracks.classes[nearest],
+            boxes[nearest],
+            turned(tracks.velocities[nearest], -sensor.yaw),
+            tracks.misses[nearest],
+            tracks.hits[nearest],
         )
-        return local.take(np.argsort(local.ranges, kind="stable")[:MAX_TRACKS])
 
     def predict(self) -> None:
         """Move every track one keyframe ahead at constant velocity."""
-        boxes = self._tracks.boxes.copy()
-        boxes[:, :2] += self._tracks.velocities * self._keyframe_s
-        self._tracks = replace(self._tracks, boxes=boxes)
+        tracks = self._tracks
+        boxes = tracks.boxes.copy()
+        boxes[:, :2] += tracks.velocities * self._keyframe_s
+        self._tracks = Tracks(tracks.ids, tracks.classes, boxes, tracks.velocities, tracks.misses, tracks.hits)
 
     def update(self, detections: Detections, sensor: Frame) -> Cells:
         """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
@@ -62,7 +68,7 @@ class TrackMemory:
         new[found] = False
         ids = np.empty(len(detections), np.int64)
         ids[found] = self._tracks.ids[matched]
-        ids[new] = self._next_id + np.arange(new.sum())
+        ids[new] = np.arange(self._next_id, self._next_id + len(ids) - len(found))
         self._correct(matched, seen[found])
         self._forget()
         self._start(ids[new], detections.classes[new], seen[new])
@@ -94,7 +100,7 @@ class TrackMemory:
         velocities[rows] = (seen[:, :2] - last_seen) / elapsed
         boxes[rows], misses[rows] = seen, 0
         hits[rows] += 1
-        self._tracks = replace(tracks, boxes=boxes, velocities=velocities, misses=misses, hits=hits)
+        self._tracks = Tracks(tracks.ids, tracks.classes, boxes, velocities, misses, hits)
 
     def _forget(self) -> None:
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9

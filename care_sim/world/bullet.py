@@ -1,6 +1,6 @@
 """The one owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from care_sim.frames import Floats, Frame, Pose
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.clients import borrow, give_back
 from care_sim.world.looks import Looks
 from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
@@ -33,12 +34,15 @@ class BulletWorld:
 
     The ground, transparent bodies and backdrops have no look: no camera needs their ids, and rendering them
     costs more than everything else in the picture.
+
+    `primitives` know every pose at once. PyBullet learns of it when it is asked about the body.
     """
 
     def __init__(self, ground: bool = True) -> None:
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._client = borrow()
         self.primitives = Primitives()
         self.looks = Looks()
+        self._moved: set[int] = set()
         self.ground = self._lay_ground() if ground else NOTHING
 
     def _lay_ground(self) -> int:
@@ -48,9 +52,9 @@ class BulletWorld:
         return int(ground)
 
     def close(self) -> None:
-        """Free the client; calling it again does nothing."""
+        """Give the client back; calling it again does nothing."""
         if self._client >= 0:
-            pybullet.disconnect(physicsClientId=self._client)
+            give_back(self._client)
             self._client = -1
 
     def add(self, kind: BodyKind, pose: Pose | Frame, *, transparent: bool = False, backdrop: bool = False) -> int:
@@ -69,19 +73,28 @@ class BulletWorld:
         self.primitives.add(body, () if transparent else kind.parts)
         self.looks.add(body, seen)
         self.move(body, pose)
+        self._tell([body])
         return int(body)
 
     def move(self, body: int, pose: Pose | Frame) -> None:
         """Put a body at a pose on the ground plane, or at a frame: anywhere, turned in any way."""
-        place, turn = _standing(pose)
-        pybullet.resetBasePositionAndOrientation(body, place, turn, physicsClientId=self._client)
-        self.primitives.move(body, place, turn)
+        self.primitives.poses[body] = _standing(pose)
+        self._moved.add(body)
+
+    def move_all(self, bodies: Integers, poses: Floats) -> None:
+        """Put bodies (n,) at poses (n, 3) on the ground plane: x, y, heading."""
+        half = poses[:, 2] / 2
+        rows = np.zeros((len(poses), 7))
+        rows[:, :2], rows[:, 5], rows[:, 6] = poses[:, :2], np.sin(half), np.cos(half)
+        self.primitives.poses[bodies] = rows
+        self._moved.update(bodies.tolist())
 
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.
 
         Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NOTHING there.
         """
+        self._tell(self._moved)
         targets = origin + directions * reach
         hits: list[tuple[Any, ...]] = []
         for start in range(0, len(targets), RAYS_A_CALL):
@@ -112,10 +125,19 @@ class BulletWorld:
 
     def clearance(self, body: int, other: int, within: float = 100.0) -> float:
         """Smallest distance between two hulls, metres; negative when they overlap, inf beyond `within`."""
+        self._tell({body, other} & self._moved)
         points = pybullet.getClosestPoints(body, other, within, physicsClientId=self._client)
         return float(min((point[8] for point in points), default=np.inf))
 
+    def _tell(self, moved: Iterable[int]) -> None:
+        """Let PyBullet know where bodies are by now."""
+        for body in tuple(moved):
+            pose = self.primitives.poses[body].tolist()
+            pybullet.resetBasePositionAndOrientation(body, pose[:3], pose[3:], physicsClientId=self._client)
+            self._moved.discard(body)
+
     def _render(self, camera: PinholeCamera, sensor: Frame, window: Window) -> tuple[Any, ...]:
+        self._tell(self._moved)
         eye, (forward, _, up) = camera.stance(sensor)
         left, top, right, bottom = window
         scale = NEAR_M / camera.focal
@@ -143,12 +165,12 @@ class BulletWorld:
         return self._look([Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))])
 
 
-def _standing(pose: Pose | Frame) -> tuple[Sequence[float], Sequence[float]]:
-    """Position and quaternion (x, y, z, w)."""
+def _standing(pose: Pose | Frame) -> Sequence[float]:
+    """Position x, y, z and quaternion x, y, z, w."""
     if isinstance(pose, Frame):
-        return pose.origin.tolist(), pose.rotation.as_quat().tolist()
+        return (*pose.origin.tolist(), *pose.rotation.as_quat().tolist())
     x, y, yaw = pose
-    return (x, y, 0.0), (0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))
+    return x, y, 0.0, 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)
 
 
 def _collision(parts: Sequence[Part]) -> dict[str, Any]:

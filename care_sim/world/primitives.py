@@ -32,7 +32,3 @@ class Primitives:
             self.owners = np.append(self.owners, [body] * len(parts))
             self.halves = np.vstack([self.halves, np.array([part.size for part in parts]) / 2])
             self.offsets = np.vstack([self.offsets, [part.centre for part in parts]])
-
-    def move(self, body: int, place: Sequence[float], turn: Sequence[float]) -> None:
-        """Note that a body is at `place` (x, y, z), turned by the quaternion `turn` (x, y, z, w)."""
-        self.poses[body] = (*place, *turn)

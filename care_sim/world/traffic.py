@@ -6,22 +6,59 @@ right.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-from highway_env.road.lane import StraightLane
-from highway_env.road.road import Road, RoadNetwork
-from highway_env.vehicle.behavior import IDMVehicle
-from highway_env.vehicle.kinematics import Vehicle
-from highway_env.vehicle.objects import Obstacle
 
 from care_sim.frames import Pose
+from care_sim.world.bare import bare
 from care_sim.world.bodies import BodyKind
+
+with bare("highway_env"):  # its environments load pandas, Matplotlib and pygame
+    from highway_env.road.lane import StraightLane
+    from highway_env.road.road import Road, RoadNetwork
+    from highway_env.vehicle.behavior import IDMVehicle
+    from highway_env.vehicle.kinematics import Vehicle
+    from highway_env.vehicle.objects import Obstacle
 
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)
 """Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out sideways."""
 STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
 """From centre to centre, what an IDM driver leaves before what stands ahead."""
+
+
+class LaneAlongX(StraightLane):  # type: ignore[misc]
+    """A lane from (-x, y) to (x, y) or back."""
+
+    def local_coordinates(self, position: Sequence[float]) -> tuple[float, float]:
+        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without its dot products
+        of axes that are 0 and 1 or -1.
+        """
+        x, y = position
+        start_x, start_y, sign = self._origin
+        return (float(x) - start_x) * sign, (float(y) - start_y) * sign + 0.0
+
+    @cached_property
+    def _origin(self) -> tuple[float, float, float]:
+        return float(self.start[0]), float(self.start[1]), float(self.direction[0])
+
+
+class Driver(IDMVehicle):  # type: ignore[misc]
+    """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the middle of one."""
+
+    def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
+        """Angle of the front wheels, radians."""
+        follows = self._follows(self.road.network.get_lane(target_lane_index))
+        return 0.0 if follows else float(super().steering_control(target_lane_index))
+
+    def on_state_update(self) -> None:
+        """Note the lane."""
+        if not self._follows(self.lane):
+            super().on_state_update()
+
+    def _follows(self, lane: LaneAlongX) -> bool:
+        return bool(self.heading == lane.heading and lane.local_coordinates(self.position)[1] == 0.0)
 
 
 class Traffic:
@@ -40,7 +77,7 @@ class Traffic:
             ends = ([-_ROAD_LENGTH_M, y], [_ROAD_LENGTH_M, y])
             start, end = ends if direction > 0 else ends[::-1]
             nodes = ("a", "b") if direction > 0 else ("b", "a")
-            network.add_lane(*nodes, StraightLane(start, end, width=lane_width, speed_limit=speed_limit))
+            network.add_lane(*nodes, LaneAlongX(start, end, width=lane_width, speed_limit=speed_limit))
             self._lanes.append((*nodes, counts[direction]))
             counts[direction] += 1
         self._ego_lane = ego_lane
@@ -48,19 +85,20 @@ class Traffic:
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
         """The car that carries the sensors, in lane 0 at `x`, driven by `RoadVehicle.accelerate`."""
-        vehicle = self._make(Vehicle, x, 0, speed, kind)
-        vehicle.enter()
-        return vehicle
+        ego = self._make(Vehicle, x, 0, speed, kind)
+        ego.enter()
+        ego.forget_lane()
+        return ego
 
     def add_driver(self, x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
         """A vehicle that keeps its lane and follows the intelligent driver model (IDM) at `speed`."""
-        vehicle = self._make(IDMVehicle, x, lane, speed, kind)
+        vehicle = self._make(Driver, x, lane, speed, kind)
         vehicle.enter()
         return vehicle
 
     def add_parked_driver(self, x: float, lane: int, kind: BodyKind, target_speed: float) -> "RoadVehicle":
         """An IDM driver who stands in `lane` until told to `pull_out`, and then wants `target_speed`."""
-        vehicle = self._make(IDMVehicle, x, lane, target_speed, kind)
+        vehicle = self._make(Driver, x, lane, target_speed, kind)
         vehicle.stand()
         return vehicle
 
@@ -119,6 +157,10 @@ class RoadVehicle:
     def enter(self) -> None:
         """Join the traffic: from now on the vehicle moves, and others see it."""
         self._traffic.join(self._vehicle)
+
+    def forget_lane(self) -> None:
+        """Never again look up the nearest lane: only drivers ask which one they are in."""
+        self._vehicle.road = None
 
     def stand(self) -> None:
         """Lose all speed at once."""

@@ -10,12 +10,14 @@ from care_sim.errors import InvalidInput, is_number
 from care_sim.frames import Floats, Pose
 from care_sim.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
-from care_sim.world.bullet import BulletWorld
+from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.world.footprints import Footprints
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 STEP_S = 0.05
 """World step. Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
-
+CONTACT_REACH_M = 0.5
+"""Contact is looked for among bodies this close: far more than the centimetres by which hulls are padded."""
 
 Motion = Callable[[float], Pose]
 """The pose of a body at a time in seconds."""
@@ -64,6 +66,8 @@ class World:
         self.ego_kind = CATALOGUE["ego"]
         self.ego = traffic.add_ego(0.0, ego_speed, self.ego_kind)
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
+        self._footprints = Footprints()
+        self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
         self.first_sighting: Actor | None = None
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
@@ -85,7 +89,9 @@ class World:
         that perception reports, so that the camera need not render it.
         """
         pose_at = _motion(pose)
-        body = self.bullet.add(CATALOGUE[kind], pose_at(0.0), backdrop=backdrop)
+        place = pose_at(self.time)
+        body = self.bullet.add(CATALOGUE[kind], place, backdrop=backdrop)
+        self._footprints.add(body, CATALOGUE[kind].size, place)
         actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
@@ -103,9 +109,11 @@ class World:
 
     def boxes(self, actors: Sequence[Actor]) -> Floats:
         """(n, 7) boxes of actors in the world frame."""
-        rows = [(*actor.pose_at(self.time), *actor.kind.size) for actor in actors]
-        x, y, yaw, length, width, height = np.array(rows).reshape(-1, 6).T
-        return np.column_stack([x, y, height / 2, length, width, height, yaw])
+        return self.boxes_of(np.array([actor.body for actor in actors], np.int64))
+
+    def boxes_of(self, bodies: Integers) -> Floats:
+        """(n, 7) boxes of bodies (n,) in the world frame."""
+        return self._footprints.boxes[bodies]
 
     def advance(self, acceleration: float, duration: float) -> Passage:
         """Move everything by `duration` seconds, a whole number of world steps."""
@@ -127,13 +135,18 @@ class World:
             event()
         self._events = [(due, event) for due, event in self._events if due > self.time]
         self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / STEP_S)
-        self.bullet.move(self.ego_body, self.ego.pose)
+        self._move(self.ego_body, self.ego.pose)
         for actor in self._moving:
-            self.bullet.move(actor.body, actor.pose_at(self.time))
+            self._move(actor.body, actor.pose_at(self.time))
         return self._passage()
 
+    def _move(self, body: int, pose: Pose) -> None:
+        self.bullet.move(body, pose)
+        self._footprints.move(body, pose)
+
     def _passage(self) -> Passage:
-        touched = any(self.bullet.clearance(self.ego_body, actor.body, 0.5) <= 0.0 for actor in self.actors)
+        near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
+        touched = any(self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0 for body in near)
         nearest, clearance = np.inf, np.inf
         if self.first_sighting is not None:
             x, y, _ = self.first_sighting.pose_at(self.time)

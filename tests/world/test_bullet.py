@@ -74,6 +74,46 @@ def test_a_moved_body_is_where_it_was_put(bullet):
     assert bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)[0][0] == pytest.approx(10 + NEAR_SIDE)
 
 
+def test_rays_pictures_and_clearance_all_know_of_a_move(bullet):
+    """From 20 m ahead to 30, each asked first after its move."""
+    body, other = bullet.add(BLOCK, (20.0, 0.0, np.pi / 2)), bullet.add(BLOCK, (0.0, 0.0, np.pi / 2))
+    bullet.move(body, (30.0, 0.0, np.pi / 2))
+    assert bullet.clearance(body, other) == pytest.approx(30.0 - BLOCK.size[1], abs=1e-3)
+    bullet.move(body, (-30.0, 0.0, np.pi / 2))
+    assert body not in bullet.body_ids(FRONT_CAMERA, Frame(2.0, 0.0, 1.84, 0.0))
+    bullet.move(body, (30.0, 0.0, np.pi / 2))
+    assert body in bullet.body_ids(FRONT_CAMERA, Frame(2.0, 0.0, 1.84, 0.0))
+    bullet.move(body, (40.0, 0.0, np.pi / 2))
+    assert bullet.cast([2.0, 0.0, 1.0], FORWARD, 50.0)[0][0] == pytest.approx(18 + NEAR_SIDE)
+
+
+def test_clearance_between_two_bodies_leaves_a_third_one_to_be_told_of(bullet):
+    near, far, third = (bullet.add(BLOCK, (x, 0.0, np.pi / 2)) for x in (20.0, 30.0, 40.0))
+    bullet.move(third, (10.0, 0.0, np.pi / 2))
+    assert bullet.clearance(near, far) == pytest.approx(10.0 - BLOCK.size[1], abs=1e-3)
+    assert bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)[1].tolist() == [third]
+
+
+def test_moving_all_is_moving_each(bullet):
+    rng = np.random.default_rng(0)
+    bodies = [bullet.add(BLOCK, Frame(0.0, 0.0, 1.0, 0.0, 0.3, 0.2)) for _ in range(5)]
+    poses = rng.uniform(-10, 10, (5, 3))
+    for body, pose in zip(bodies, poses.tolist(), strict=True):
+        bullet.move(body, tuple(pose))
+    each = bullet.primitives.poses.copy()
+    bullet.primitives.poses[bodies] = 0.0
+    bullet.move_all(np.array(bodies), poses)
+    assert np.array_equal(bullet.primitives.poses, each)
+
+
+def test_rays_know_of_bodies_moved_together(bullet):
+    bodies = np.array([bullet.add(BLOCK, (20.0, 0.0, np.pi / 2)), bullet.add(BLOCK, (30.0, 0.0, np.pi / 2))])
+    bullet.move_all(bodies, np.array([[40.0, 0.0, np.pi / 2], [10.0, 0.0, np.pi / 2]]))
+    ranges, ids = bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)
+    assert ids.tolist() == [bodies[1]]
+    assert ranges[0] == pytest.approx(NEAR_SIDE - 10.0)
+
+
 def test_the_ground_returns_rays(bullet):
     down = np.array([[np.cos(0.3), 0.0, -np.sin(0.3)]])
     ranges, ids = bullet.cast([0.0, 0.0, 1.84], down, 50.0)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from care_sim.world import traffic
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 
@@ -113,3 +114,26 @@ def test_two_roads_with_the_same_traffic_agree_to_the_last_bit():
         return drive(traffic, 4.0, ego, driver, ego=ego)
 
     assert np.array_equal(trace(), trace())
+
+
+def mixed():
+    """Ego, a follower, an oncoming driver and two lane changes, one of them oncoming; the ego brakes on the way, and
+    the follower starts in the middle of its lane but not along it.
+    """
+    road = Traffic((1, 1, -1, -1), 0, 3.5, 14.0)
+    ego = road.add_ego(0.0, 8.0, EGO)
+    drivers = [road.add_driver(-22.5, 0, 8.0, CAR), road.add_driver(90.0, 2, 9.0, CAR)]
+    drivers[0]._vehicle.heading = 0.05
+    for x, start, target in ((25.0, 1, 0), (60.0, 3, 2)):
+        drivers.append(road.add_parked_driver(x, start, CAR, 8.0))
+        drivers[-1].pull_out(target)
+    return drive(road, 9.0, ego, *drivers, ego=ego, acceleration=lambda time: -2.0 if 1 < time < 3 else 0.5)
+
+
+def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):
+    poses = mixed()
+    monkeypatch.setattr(traffic, "Driver", traffic.IDMVehicle)
+    monkeypatch.setattr(traffic, "LaneAlongX", traffic.StraightLane)
+    monkeypatch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
+    assert poses.tobytes() == mixed().tobytes()
+    assert np.ptp(poses[:, 3:, 1], axis=0) == pytest.approx(3.5, abs=0.1)

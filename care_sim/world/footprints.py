@@ -1,0 +1,42 @@
+"""The boxes of the bodies of a world, and which of them can be close to each other."""
+
+import math
+
+import numpy as np
+
+from care_sim.frames import Pose
+from care_sim.world.bodies import Triple
+from care_sim.world.bullet import Integers
+
+
+class Footprints:
+    """`boxes` (m, 7) in the world frame, one row a body id; NaN where there is no such body."""
+
+    def __init__(self) -> None:
+        self.boxes = np.empty((0, 7))
+        self._halves = np.empty((0, 2))
+
+    def add(self, body: int, size: Triple, pose: Pose) -> None:
+        """Take in a body of a size on the ground plane."""
+        missing = body + 1 - len(self.boxes)
+        self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
+        self._halves = np.vstack([self._halves, np.full((missing, 2), np.nan)])
+        self.boxes[body, 2:6] = size[2] / 2, *size
+        self.move(body, pose)
+
+    def move(self, body: int, pose: Pose) -> None:
+        """Put a body at a pose."""
+        box, half = self.boxes[body], self._halves[body]
+        box[0], box[1], box[6] = pose
+        length, width = box[3:5].tolist()
+        cos, sin = abs(math.cos(pose[2])), abs(math.sin(pose[2]))
+        half[0], half[1] = (length * cos + width * sin) / 2, (length * sin + width * cos) / 2
+
+    def near(self, body: int, within: float) -> Integers:
+        """Ids of the other bodies that may be within `within` metres of one: all but those further from it by the
+        rectangles, along x and y, around the footprints.
+        """
+        gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (self._halves + self._halves[body])
+        close = (gaps[:, 0] <= within) & (gaps[:, 1] <= within)
+        close[body] = False
+        return np.flatnonzero(close)

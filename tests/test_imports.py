@@ -1,0 +1,36 @@
+"""What an episode makes a process load: a worker must stay small."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+EPISODE = """
+import json, sys
+import gymnasium
+import care_sim
+env = gymnasium.make("CARE-Dense-v0", engine=sys.argv[1])
+policy = care_sim.make_policy("care", env)
+observation, _ = env.reset(seed=0)
+ended = False
+while not ended:
+    observation, _, terminated, truncated, _ = env.step(policy(observation))
+    ended = terminated or truncated
+env.close()
+print(json.dumps(sorted(sys.modules)))
+"""
+HEAVY = {
+    "PIL", "dask", "distributed", "highway_env", "matplotlib", "mujoco", "open3d", "pandas", "plotly", "pyarrow",
+    "pygame", "rerun", "rich", "sklearn", "stable_baselines3", "torch", "tyro",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["bullet", "fast"])
+def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
+    played = subprocess.run([sys.executable, "-c", EPISODE, engine], capture_output=True, text=True, check=True)
+    loaded = set(json.loads(played.stdout.splitlines()[-1]))
+    assert {"care_sim", "gymnasium", "pybullet"} <= loaded
+    assert {name.partition(".")[0] for name in loaded} & HEAVY == set()
+    assert ("numba" in loaded) == (engine == "fast")
+    assert "scipy.stats" not in loaded
