@@ -1,17 +1,19 @@
 """Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import cycle, filterfalse, islice
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_number, is_number
-from care_sim.grid import Cells, cell_set
+from care_sim.errors import LARGEST, InvalidInput, check_number, is_number
+from care_sim.grid import Cells, cell_indices
 from care_sim.types import Action, Demand
 
 RESERVE_FRACTION = 0.3
 """rho, the share of the budget kept for the reserve (paper, Remark 2)."""
+
+_NO_CELLS = np.empty(0, np.int64)
 
 
 def budget_cells(budget: float, cells: int) -> int:
@@ -31,31 +33,38 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
     are taken in ascending order, and a cell already taken costs the set no turn. rho = 0 keeps no
     reserve: layers then take only what exploitation leaves.
     """
+    from care_sim.turns import in_turns
+
     check_number("reserve_fraction", reserve_fraction, 0, 1)
-    chosen: dict[int, None] = {}
-    _round_robin(demand.exploitation, round((1 - reserve_fraction) * budget), chosen)
-    for layer in demand.layers:
-        _round_robin(layer, budget, chosen)
+    stages: list[Sequence[Cells]] = [demand.exploitation, *demand.layers]
+    limits = [round((1 - reserve_fraction) * budget)] + [budget] * (len(stages) - 1)
+    sets = [cell_indices(cells) for stage in stages for cells in stage]
+    cells, ends = _end_to_end(sets)
     if floor is not None:
-        _fill(_free(map(int, floor), chosen), budget, chosen)
-    return np.fromiter(chosen, dtype=np.int64, count=len(chosen))
+        cells = np.concatenate([cells, np.fromiter(floor, np.int64)])
+        stages, limits, ends = [*stages, [cells]], [*limits, budget], [*ends, len(cells)]
+    lowest, span = _span(cells)
+    last_sets = np.array([*accumulate(map(len, stages))])
+    chosen: Cells = in_turns(cells - lowest, np.array(ends, np.int64), last_sets, np.array(limits), np.zeros(span, bool))
+    return chosen + lowest
 
 
-def _round_robin(sets: Sequence[Cells], limit: int, chosen: dict[int, None]) -> None:
-    queues: Iterable[Iterator[int]] = [_free(cell_set(cells).data, chosen) for cells in sets]
-    for left in range(len(sets), 0, -1):
-        queues = cycle(islice(queues, left))
-        _fill(map(next, queues), limit, chosen)  # ends at the limit, or at the first queue that has run dry
+def _end_to_end(sets: Sequence[NDArray[np.integer]]) -> tuple[Cells, list[int]]:
+    """The cells of sets one after the other, each ascending, and where each ends."""
+    cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
+    ends = [*accumulate(map(len, sets))]
+    drops = np.flatnonzero(cells[1:] < cells[:-1]) + 1
+    if not set(drops.tolist()) <= set(ends):
+        cells = cells[np.lexsort((cells, np.repeat(np.arange(len(sets)), [*map(len, sets)])))]
+    return cells, ends
 
 
-def _free(cells: Iterable[int], chosen: dict[int, None]) -> Iterator[int]:
-    """Those of `cells` that are not chosen by the time they are asked for."""
-    return filterfalse(chosen.__contains__, cells)
-
-
-def _fill(cells: Iterable[int], limit: int, chosen: dict[int, None]) -> None:
-    for cell in islice(cells, limit - len(chosen)):
-        chosen[cell] = None
+def _span(cells: Cells) -> tuple[int, int]:
+    """The lowest index, at most 0, and how many there are from it to the highest."""
+    lowest, highest = int(cells.min(initial=0)), int(cells.max(initial=0))
+    if highest - lowest > LARGEST:
+        raise InvalidInput(f"cells must lie in 0..{LARGEST}, got {lowest if lowest < 0 else highest}")
+    return lowest, highest - lowest + 1
 
 
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
