@@ -1,7 +1,7 @@
 """Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
 
 from collections.abc import Iterable, Sequence
-from itertools import accumulate
+from itertools import accumulate, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,38 +33,35 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
     are taken in ascending order, and a cell already taken costs the set no turn. rho = 0 keeps no
     reserve: layers then take only what exploitation leaves.
     """
-    from care_sim.turns import in_turns
-
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     stages: list[Sequence[Cells]] = [demand.exploitation, *demand.layers]
-    limits = [round((1 - reserve_fraction) * budget)] + [budget] * (len(stages) - 1)
+    limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(demand.layers)
+    chosen = _in_turns(stages, limits)
+    return chosen if floor is None else np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
+
+
+def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
+    """Stage after stage, round-robin over its sets up to its limit in all."""
+    from care_sim.turns import in_turns, survey
+
     sets = [cell_indices(cells) for stage in stages for cells in stage]
-    cells, ends = _end_to_end(sets)
-    if floor is not None:
-        cells = np.concatenate([cells, np.fromiter(floor, np.int64)])
-        stages, limits, ends = [*stages, [cells]], [*limits, budget], [*ends, len(cells)]
-    lowest, span = _span(cells)
-    last_sets = np.array([*accumulate(map(len, stages))])
-    chosen: Cells = in_turns(cells - lowest, np.array(ends, np.int64), last_sets, np.array(limits), np.zeros(span, bool))
-    return chosen + lowest
-
-
-def _end_to_end(sets: Sequence[NDArray[np.integer]]) -> tuple[Cells, list[int]]:
-    """The cells of sets one after the other, each ascending, and where each ends."""
     cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
-    ends = [*accumulate(map(len, sets))]
-    drops = np.flatnonzero(cells[1:] < cells[:-1]) + 1
-    if not set(drops.tolist()) <= set(ends):
-        cells = cells[np.lexsort((cells, np.repeat(np.arange(len(sets)), [*map(len, sets)])))]
-    return cells, ends
-
-
-def _span(cells: Cells) -> tuple[int, int]:
-    """The lowest index, at most 0, and how many there are from it to the highest."""
-    lowest, highest = int(cells.min(initial=0)), int(cells.max(initial=0))
+    ends = np.array([*accumulate(map(len, sets))], np.int64)
+    lowest, highest, ascending = survey(cells, ends)
     if highest - lowest > LARGEST:
         raise InvalidInput(f"cells must lie in 0..{LARGEST}, got {lowest if lowest < 0 else highest}")
-    return lowest, highest - lowest + 1
+    if not ascending:
+        cells = np.concatenate([np.sort(part) for part in np.split(cells, ends)])
+    last_sets = np.array([*accumulate(map(len, stages))], np.int64)
+    chosen: Cells = in_turns(cells, ends, last_sets, np.array(limits, np.int64), (lowest, highest))
+    return chosen
+
+
+def _free(floor: Iterable[int], chosen: Cells, count: int) -> Cells:
+    """The first `count` cells of the floor that are not chosen."""
+    taken = set(chosen.tolist())
+    free = (cell for cell in dict.fromkeys(map(int, floor)) if cell not in taken)
+    return np.fromiter(islice(free, count), np.int64)
 
 
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from care_sim.errors import InvalidInput
-from care_sim.frames import Floats, box_corners, turned
+from care_sim.frames import Floats
 
 Cells = NDArray[np.int64]
 
@@ -91,14 +91,12 @@ class AngularGrid:
         boxes = np.asarray(boxes, dtype=float).reshape(-1, 7)
         if not len(boxes):
             return []
-        corners, nearest, farthest = _footprints(boxes)
-        planar = np.concatenate([boxes[:, None, :2], corners], axis=1)
-        top, bottom = boxes[:, 2] + boxes[:, 5] / 2, boxes[:, 2] - boxes[:, 5] / 2
-        highest = np.arctan2(top, np.where(top > 0, nearest, farthest))
-        lowest = np.arctan2(bottom, np.where(bottom < 0, nearest, farthest))
-        margins = np.where(nearest <= 0.0, self.columns, azimuth_margin)
+        from care_sim.sectors import silhouettes
+
+        planar, upright, around = silhouettes(boxes)
         azimuths = np.arctan2(planar[..., 1], planar[..., 0])
-        return self._sectors(azimuths, np.stack([lowest, highest], axis=1), margins, elevation_margin)
+        elevations = np.arctan2(upright[..., 0], upright[..., 1])
+        return self._sectors(azimuths, elevations, np.where(around, self.columns, azimuth_margin), elevation_margin)
 
     def wedges(
         self,
@@ -129,14 +127,6 @@ class AngularGrid:
     @cached_property
     def _lattice(self) -> tuple[int, int, float, float, float]:
         return self.columns, self.rows, self.column_width, float(self.top), float(self.row_height)
-
-
-def _footprints(boxes: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ground-plane corners (n, 4, 2), and the nearest and farthest distance of each footprint."""
-    corners = box_corners(boxes)[:, :4, :2]
-    sensor = turned(-boxes[:, :2], -boxes[:, 6])
-    outside = np.maximum(np.abs(sensor) - boxes[:, 3:5] / 2, 0.0)
-    return corners, np.hypot(*outside.T), np.hypot(corners[..., 0], corners[..., 1]).max(axis=1)
 
 
 def cell_indices(cells: Sequence[int] | Cells) -> NDArray[np.integer]:

@@ -127,7 +127,7 @@ class Lenses:
     def box_rays(self, boxes: Floats) -> Floats:
         """As `PinholeCamera.box_rays`."""
         low, high = boxes[:, :2], boxes[:, 2:]
-        nearest = np.clip(self.centres.reshape(-1, 2), low, high)
+        nearest = np.minimum(np.maximum(self.centres.reshape(-1, 2), low), high)
         return self.rays(np.concatenate([boxes, (low + high) / 2, nearest], axis=1)[:, _BOX_POINTS])
 
 

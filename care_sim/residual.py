@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.frames import turned
+from care_sim.frames import Floats, turned
 from care_sim.grid import Cells
 from care_sim.types import Belief, ImageDetections, Rig, Tracks
 
@@ -16,13 +16,22 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
     """
     if not len(detections):
         return np.zeros(0, bool)
-    centres = np.broadcast_to(tracks.boxes[:, :3], (len(detections), len(tracks), 3))
-    centres = turned(centres, detections.yaw_changes[:, None])
-    pixels, _ = rig.lenses.take(detections.cameras).project(centres)
-    boxes = detections.boxes[:, None]
-    inside = ((boxes[..., :2] <= pixels) & (pixels <= boxes[..., 2:])).all(axis=-1)
+    pixels = _pixels(tracks.boxes[:, :3], detections, rig)
+    boxes = detections.boxes[:, :, None]
+    u, v = pixels[..., 0], pixels[..., 1]
+    inside = (boxes[:, 0] <= u) & (u <= boxes[:, 2]) & (boxes[:, 1] <= v) & (v <= boxes[:, 3])
     result: NDArray[np.bool_] = (inside & (detections.classes[:, None] == tracks.classes)).any(axis=1)
     return result
+
+
+def _pixels(points: Floats, detections: ImageDetections, rig: Rig) -> Floats:
+    """(n, m, 2) where m points lie in the pictures of n detections; every picture is reckoned once."""
+    of_detections = [*zip(detections.cameras.tolist(), detections.yaw_changes.tolist(), strict=True)]
+    numbers = {picture: number for number, picture in enumerate(dict.fromkeys(of_detections))}
+    cameras, yaw_changes = zip(*numbers, strict=True)
+    seen = np.broadcast_to(points, (len(numbers), *points.shape))
+    pixels, _ = rig.lenses.take(np.array(cameras)).project(turned(seen, np.array(yaw_changes)[:, None]))
+    return pixels[[numbers[picture] for picture in of_detections]]
 
 
 def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:

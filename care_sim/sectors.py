@@ -10,6 +10,31 @@ from numba import njit
 
 
 @njit(cache=True)
+def silhouettes(boxes):  # type: ignore[no-untyped-def]
+    """What of boxes (n, 7) bounds their hulls, seen from the origin, and which of them stand around it.
+
+    Returns x and y (n, 5, 2) of the centre and the four corners, and (n, 2, 2) the heights of bottom and top, each
+    with the distance in the x, y plane at which it is lowest or highest: of the nearest or the farthest point.
+    """
+    planar, upright = np.empty((len(boxes), 5, 2)), np.empty((len(boxes), 2, 2))
+    around = np.empty(len(boxes), np.bool_)
+    for n, (x, y, z, length, width, height, yaw) in enumerate(boxes):
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        beyond = abs(cos * x + sin * y) - length / 2, abs(sin * x - cos * y) - width / 2
+        near, far = math.hypot(max(beyond[0], 0.0), max(beyond[1], 0.0)), 0.0
+        planar[n, 0] = x, y
+        for k, (front, left) in enumerate(((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))):
+            along, across = front * length, left * width
+            corner = x + (cos * along - sin * across), y + (sin * along + cos * across)
+            planar[n, k + 1], far = corner, max(far, math.hypot(corner[0], corner[1]))
+        bottom, top = z - height / 2, z + height / 2
+        upright[n, 0] = bottom, near if bottom < 0 else far
+        upright[n, 1] = top, near if top > 0 else far
+        around[n] = near <= 0.0
+    return planar, upright, around
+
+
+@njit(cache=True)
 def sectors(azimuths, elevations, azimuth_margins, elevation_margin, lattice):  # type: ignore[no-untyped-def]
     """The cells of n rectangles one after the other, each ascending, and (n,) where each ends.
 
