@@ -88,7 +88,7 @@ class AngularGrid:
         `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
         number or one a box. A box that surrounds the sensor covers every column.
         """
-        boxes = np.asarray(boxes, dtype=float).reshape(-1, 7)
+        boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 7)
         if not len(boxes):
             return []
         from care_sim.sectors import silhouettes

@@ -34,9 +34,10 @@ def in_turns(cells, ends, stages, limits, span):  # type: ignore[no-untyped-def]
     places = np.empty(len(ends), np.int64)
     places[:1], places[1:] = 0, ends[:-1]
     count = first = 0
-    for stage, limit in zip(stages, limits):
-        count = _round_robin((cells, places, ends), np.arange(first, stage), (taken, lowest), (chosen, count, limit))
-        first = stage
+    for stage, last in enumerate(stages):
+        selection = chosen, count, limits[stage]
+        count = _round_robin((cells, places, ends), np.arange(first, last), (taken, lowest), selection)
+        first = last
     return chosen[:count]
 
 
