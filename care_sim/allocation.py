@@ -1,17 +1,19 @@
 """Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import cycle, filterfalse, islice
+from collections.abc import Iterable, Sequence
+from itertools import accumulate, islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_number, is_number
-from care_sim.grid import Cells, cell_set
+from care_sim.errors import LARGEST, InvalidInput, check_number, is_number
+from care_sim.grid import Cells, cell_indices
 from care_sim.types import Action, Demand
 
 RESERVE_FRACTION = 0.3
 """rho, the share of the budget kept for the reserve (paper, Remark 2)."""
+
+_NO_CELLS = np.empty(0, np.int64)
 
 
 def budget_cells(budget: float, cells: int) -> int:
@@ -32,30 +34,34 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
     reserve: layers then take only what exploitation leaves.
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
-    chosen: dict[int, None] = {}
-    _round_robin(demand.exploitation, round((1 - reserve_fraction) * budget), chosen)
-    for layer in demand.layers:
-        _round_robin(layer, budget, chosen)
-    if floor is not None:
-        _fill(_free(map(int, floor), chosen), budget, chosen)
-    return np.fromiter(chosen, dtype=np.int64, count=len(chosen))
+    stages: list[Sequence[Cells]] = [demand.exploitation, *demand.layers]
+    limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(demand.layers)
+    chosen = _in_turns(stages, limits)
+    return chosen if floor is None else np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
 
 
-def _round_robin(sets: Sequence[Cells], limit: int, chosen: dict[int, None]) -> None:
-    queues: Iterable[Iterator[int]] = [_free(cell_set(cells).data, chosen) for cells in sets]
-    for left in range(len(sets), 0, -1):
-        queues = cycle(islice(queues, left))
-        _fill(map(next, queues), limit, chosen)  # ends at the limit, or at the first queue that has run dry
+def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
+    """Stage after stage, round-robin over its sets up to its limit in all."""
+    from care_sim.turns import in_turns, survey
+
+    sets = [cell_indices(cells) for stage in stages for cells in stage]
+    cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
+    ends = np.array([*accumulate(map(len, sets))], np.int64)
+    lowest, highest, ascending = survey(cells, ends)
+    if highest - lowest > LARGEST:
+        raise InvalidInput(f"cells must lie in 0..{LARGEST}, got {lowest if lowest < 0 else highest}")
+    if not ascending:
+        cells = np.concatenate([np.sort(part) for part in np.split(cells, ends)])
+    last_sets = np.array([*accumulate(map(len, stages))], np.int64)
+    chosen: Cells = in_turns(cells, ends, last_sets, np.array(limits, np.int64), (lowest, highest))
+    return chosen
 
 
-def _free(cells: Iterable[int], chosen: dict[int, None]) -> Iterator[int]:
-    """Those of `cells` that are not chosen by the time they are asked for."""
-    return filterfalse(chosen.__contains__, cells)
-
-
-def _fill(cells: Iterable[int], limit: int, chosen: dict[int, None]) -> None:
-    for cell in islice(cells, limit - len(chosen)):
-        chosen[cell] = None
+def _free(floor: Iterable[int], chosen: Cells, count: int) -> Cells:
+    """The first `count` cells of the floor that are not chosen."""
+    taken = set(chosen.tolist())
+    free = (cell for cell in dict.fromkeys(map(int, floor)) if cell not in taken)
+    return np.fromiter(islice(free, count), np.int64)
 
 
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:

@@ -8,12 +8,13 @@ Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from care_sim.errors import InvalidInput
-from care_sim.frames import Floats, box_corners, turned
+from care_sim.frames import Floats
 
 Cells = NDArray[np.int64]
 
@@ -87,19 +88,15 @@ class AngularGrid:
         `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
         number or one a box. A box that surrounds the sensor covers every column.
         """
-        boxes = np.asarray(boxes, dtype=float).reshape(-1, 7)
+        boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 7)
         if not len(boxes):
             return []
-        corners, nearest, farthest = _footprints(boxes)
-        heading = np.arctan2(boxes[:, 1], boxes[:, 0])
-        offset = _wrap(np.arctan2(corners[..., 1], corners[..., 0]) - heading[:, None])
-        surrounds = nearest <= 0.0
-        left = np.where(surrounds, -np.pi, offset.min(axis=1))
-        right = np.where(surrounds, np.pi, offset.max(axis=1))
-        top, bottom = boxes[:, 2] + boxes[:, 5] / 2, boxes[:, 2] - boxes[:, 5] / 2
-        highest = np.arctan2(top, np.where(top > 0, nearest, farthest))
-        lowest = np.arctan2(bottom, np.where(bottom < 0, nearest, farthest))
-        return self._sectors(heading + left, heading + right, lowest, highest, azimuth_margin, elevation_margin)
+        from care_sim.sectors import silhouettes
+
+        planar, upright, around = silhouettes(boxes)
+        azimuths = np.arctan2(planar[..., 1], planar[..., 0])
+        elevations = np.arctan2(upright[..., 0], upright[..., 1])
+        return self._sectors(azimuths, elevations, np.where(around, self.columns, azimuth_margin), elevation_margin)
 
     def wedges(
         self,
@@ -115,68 +112,29 @@ class AngularGrid:
         if not len(bundles):
             return []
         x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
-        azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
-        offset = _wrap(azimuth - azimuth[:, :1])
-        return self._sectors(
-            azimuth[:, 0] + offset.min(axis=1),
-            azimuth[:, 0] + offset.max(axis=1),
-            elevation.min(axis=1),
-            elevation.max(axis=1),
-            azimuth_margin,
-            elevation_margin,
-        )
+        margins = np.full(len(bundles), azimuth_margin)
+        return self._sectors(np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)), margins, elevation_margin)
 
     def _row(self, elevation: Floats) -> Cells:
         return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
 
-    def _sectors(
-        self,
-        right: Floats,
-        left: Floats,
-        lowest: Floats,
-        highest: Floats,
-        azimuth_margin: int | Cells,
-        elevation_margin: int,
-    ) -> list[Cells]:
-        first = np.floor((right + np.pi) / self.column_width).astype(np.int64) - azimuth_margin
-        last = np.floor((left + np.pi) / self.column_width).astype(np.int64) + azimuth_margin
-        last = np.minimum(last, first + self.columns - 1)
-        upper = np.clip(self._row(highest) - elevation_margin, 0, self.rows)
-        lower = np.clip(self._row(lowest) + elevation_margin, -1, self.rows - 1)
-        bounds = zip(first.tolist(), last.tolist(), upper.tolist(), lower.tolist(), strict=True)
-        return [self._rectangle(*bound) for bound in bounds]
+    def _sectors(self, azimuths: Floats, elevations: Floats, margins: Cells, elevation_margin: int) -> list[Cells]:
+        from care_sim.sectors import sectors
 
-    def _rectangle(self, first: int, last: int, upper: int, lower: int) -> Cells:
-        start, stop = first % self.columns, first % self.columns + last + 1 - first
-        rows = self._cells[upper : lower + 1]
-        if stop > self.columns:
-            return np.concatenate([rows[:, : stop - self.columns], rows[:, start:]], axis=1).flatten()
-        return rows[:, start:stop].flatten()
+        cells, ends = sectors(azimuths, elevations, margins, elevation_margin, self._lattice)
+        return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
 
     @cached_property
-    def _cells(self) -> Cells:
-        return np.arange(self.size).reshape(self.shape)
+    def _lattice(self) -> tuple[int, int, float, float, float]:
+        return self.columns, self.rows, self.column_width, float(self.top), float(self.row_height)
 
 
-def _wrap(angle: Floats) -> Floats:
-    return (angle + np.pi) % (2 * np.pi) - np.pi
-
-
-def _footprints(boxes: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ground-plane corners (n, 4, 2), and the nearest and farthest distance of each footprint."""
-    corners = box_corners(boxes)[:, :4, :2]
-    sensor = turned(-boxes[:, :2], -boxes[:, 6])
-    outside = np.maximum(np.abs(sensor) - boxes[:, 3:5] / 2, 0.0)
-    return corners, np.hypot(*outside.T), np.hypot(corners[..., 0], corners[..., 1]).max(axis=1)
-
-
-def cell_set(cells: Sequence[int] | Cells) -> Cells:
-    """`cells` as an ascending array without repeats. Raises InvalidInput for what is no list of indices."""
+def cell_indices(cells: Sequence[int] | Cells) -> NDArray[np.integer]:
+    """`cells` as an array. Raises InvalidInput for what is no list of indices."""
     array = np.asarray(cells)
-    if array.ndim != 1 or not (array.size == 0 or array.dtype.kind in "iu"):
+    if array.ndim != 1 or not (array.dtype.kind in "iu" or array.size == 0):
         raise InvalidInput(
             f"a set of cells must be a list of cell indices, got {array.dtype} of shape {array.shape}"
             " (of a mask take np.flatnonzero)"
         )
-    array = array.astype(np.int64, copy=False)
-    return array if (array[1:] > array[:-1]).all() else np.unique(array)
+    return array

@@ -5,8 +5,9 @@ directions are expressed in the sensor frame (x forward, y left, z up) of the Li
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +18,6 @@ NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
 
 _BOTH_WAYS = np.concatenate([BOX_EDGES, BOX_EDGES[:, ::-1]])
-_BOX_POINTS = np.array([(4, 5), (0, 1), (0, 3), (2, 1), (2, 3), (6, 1), (6, 3), (0, 7), (2, 7)])
-"""Points (column, row) of an image box among its left, top, right, bottom, its centre, and its u and v nearest to the
-principal point."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +61,19 @@ class PinholeCamera:
 
         Points at or behind the image plane have depth <= 0 and NaN pixels.
         """
-        return self._lens.project(np.asarray(points, dtype=float))
+        from care_sim.lenses import project
+
+        points = np.ascontiguousarray(points, dtype=float)
+        pixels, depths = project(points.reshape(-1, 3), self._lens)
+        return pixels.reshape(*points.shape[:-1], 2), depths.reshape(points.shape[:-1])
 
     def rays(self, pixels: ArrayLike) -> Floats:
         """Directions (..., 3), not normalised, through pixels (..., 2), in the sensor frame."""
-        return self._lens.rays(np.asarray(pixels, dtype=float))
+        from care_sim.lenses import rays
+
+        pixels = np.ascontiguousarray(pixels, dtype=float)
+        directions: Floats = rays(pixels.reshape(-1, 2), self._lens).reshape(*pixels.shape[:-1], 3)
+        return directions
 
     def box_rays(self, boxes: ArrayLike) -> Floats:
         """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom).
@@ -75,7 +81,8 @@ class PinholeCamera:
         Centre first, then the corners (paper, Algorithm 2), then the points of the edges nearest
         to the principal point, where azimuth and elevation of a wide box are extreme.
         """
-        return self._lens.box_rays(np.asarray(boxes, dtype=float).reshape(-1, 4))
+        boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
+        return Lenses.of([self]).box_rays(boxes, np.zeros(len(boxes), np.int64))
 
     def project_boxes(self, boxes: Floats) -> Floats:
         """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where they reach
@@ -83,20 +90,18 @@ class PinholeCamera:
         """
         corners = (box_corners(boxes) - self.position) @ self.axes.T
         points = _cut(corners[:, _BOTH_WAYS[:, 0]], corners[:, _BOTH_WAYS[:, 1]])
-        pixels = self._lens.centres - self.focal * points[..., 1:] / points[..., :1]
+        pixels = self._lens[3] - self.focal * points[..., 1:] / points[..., :1]
         return np.concatenate([np.fmin.reduce(pixels, axis=1), np.fmax.reduce(pixels, axis=1)], axis=1)
 
     @cached_property
-    def _lens(self) -> "Lenses":
+    def _lens(self) -> tuple[Floats, Floats, float, Floats]:
         centre = np.array([self.width / 2, self.height / 2])
-        return Lenses(np.array(self.position, dtype=float), self.axes, np.array(self.focal), centre)
+        return np.array(self.position, dtype=float), self.axes, self.focal, centre
 
 
-@dataclass(frozen=True)
-class Lenses:
-    """The pinhole model of one camera or, with an axis of n before each column, of n at once.
-
-    `positions` (3,) and `axes` (3, 3) in the sensor frame, `focals` () and `centres` (2,) in pixels.
+class Lenses(NamedTuple):
+    """The pinhole model of k cameras: `positions` (k, 3), `axes` (k, 3, 3), `focals` (k,) and `centres` (k, 2) as in
+    `care_sim.lenses`.
     """
 
     positions: Floats
@@ -106,33 +111,15 @@ class Lenses:
 
     @classmethod
     def of(cls, cameras: Sequence[PinholeCamera]) -> "Lenses":
-        """Those of n cameras."""
-        lenses = [camera._lens for camera in cameras]
-        return cls(*(np.array([getattr(lens, column.name) for lens in lenses]) for column in fields(cls)))
+        """Those of k cameras."""
+        return cls(*(np.array(column) for column in zip(*(camera._lens for camera in cameras), strict=True)))
 
-    def take(self, numbers: NDArray[np.int64]) -> "Lenses":
-        """(n, 1, ...) the lenses of n lists of points or boxes, by number."""
-        positions, focals, centres = (column[numbers, None] for column in (self.positions, self.focals, self.centres))
-        return Lenses(positions, self.axes[numbers], focals, centres)
+    def box_rays(self, boxes: Floats, cameras: NDArray[np.int64]) -> Floats:
+        """As `PinholeCamera.box_rays`, of boxes (n, 4) in the pictures of `cameras` (n,), by number."""
+        from care_sim.lenses import box_rays
 
-    def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """As `PinholeCamera.project`."""
-        local = (points - self.positions) @ np.swapaxes(self.axes, -1, -2)
-        depth = local[..., 0]
-        scale = self.focals / np.where(depth > 0, depth, np.nan)
-        return self.centres - local[..., 1:] * scale[..., None], depth
-
-    def rays(self, pixels: Floats) -> Floats:
-        """As `PinholeCamera.rays`."""
-        local = np.ones((*pixels.shape[:-1], 3))
-        local[..., 1:] = (self.centres - pixels) / self.focals[..., None]
-        return local @ self.axes
-
-    def box_rays(self, boxes: Floats) -> Floats:
-        """As `PinholeCamera.box_rays`."""
-        low, high = boxes[:, :2], boxes[:, 2:]
-        nearest = np.clip(self.centres.reshape(-1, 2), low, high)
-        return self.rays(np.concatenate([boxes, (low + high) / 2, nearest], axis=1)[:, _BOX_POINTS])
+        bundles: Floats = box_rays(np.ascontiguousarray(boxes), np.ascontiguousarray(cameras), self)
+        return bundles
 
 
 def _cut(points: Floats, others: Floats) -> Floats:

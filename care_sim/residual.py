@@ -1,5 +1,7 @@
 """Algorithm 2 of the paper: camera detections that no forecast explains, as wedges of cells."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,12 +18,11 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
     """
     if not len(detections):
         return np.zeros(0, bool)
-    centres = np.broadcast_to(tracks.boxes[:, :3], (len(detections), len(tracks), 3))
-    centres = turned(centres, detections.yaw_changes[:, None])
-    pixels, _ = rig.lenses.take(detections.cameras).project(centres)
-    boxes = detections.boxes[:, None]
-    inside = ((boxes[..., :2] <= pixels) & (pixels <= boxes[..., 2:])).all(axis=-1)
-    result: NDArray[np.bool_] = (inside & (detections.classes[:, None] == tracks.classes)).any(axis=1)
+    from care_sim.lenses import matched
+
+    columns = detections.boxes, detections.classes, detections.cameras, detections.yaw_changes
+    forecasts = tracks.boxes[:, :3], tracks.classes
+    result: NDArray[np.bool_] = matched(_contiguous(*columns), _contiguous(*forecasts), rig.lenses)
     return result
 
 
@@ -29,7 +30,7 @@ def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:
     """The depth-free wedge W(d) of every detection, turned by the yaw change since its picture."""
     if not len(detections):
         return []
-    bundles = rig.lenses.take(detections.cameras).box_rays(detections.boxes)
+    bundles = rig.lenses.box_rays(detections.boxes, detections.cameras)
     return rig.wedges(turned(bundles, -detections.yaw_changes[:, None]))
 
 
@@ -40,3 +41,8 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
     unexplained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if not is_known]
     explained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if is_known]
     return unexplained_wedges, explained_wedges
+
+
+def _contiguous(*columns: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """One layout, so that compiled code is compiled once."""
+    return tuple(map(np.ascontiguousarray, columns))

@@ -106,6 +106,22 @@ def test_a_burst_of_reserve_cells_never_displaces_exploitation():
     assert quiet.tolist() == burst[:70].tolist()
 
 
+def test_sets_in_any_order_and_below_zero_are_taken_as_they_are():
+    """The policies' door refuses what the grid does not have; the allocator knows no grid."""
+    assert allocate(Demand([[7, -3, 7], [-3, 12]], [[[5, 4]]]), 5, 0.0).tolist() == [-3, 12, 7, 4, 5]
+
+
+def test_cells_further_apart_than_any_grid_are_refused():
+    with pytest.raises(InvalidInput, match=r"cells must lie in 0..2147483647, got 1099511627776"):
+        allocate(Demand([[3, 2**40]]), 1, 0.0)
+
+
+@pytest.mark.parametrize("cells", [[0.5], np.ones((2, 2), int), np.ones(4, bool)])
+def test_what_is_no_list_of_indices_is_refused(cells):
+    with pytest.raises(InvalidInput, match="a set of cells must be a list of cell indices"):
+        allocate(Demand([[1, 2], cells]), 5, 0.3)
+
+
 def test_the_floor_comes_last_and_skips_what_is_taken():
     floor = [3, 1, 8, 2, 9]
     assert allocate(Demand([[1]], [[[2]]]), 4, 0.5, floor).tolist() == [1, 2, 3, 8]

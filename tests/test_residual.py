@@ -1,9 +1,13 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from care_sim.frames import turned
 from care_sim.pinhole import PinholeCamera
 from care_sim.residual import camera_layers, explained, wedges
-from care_sim.types import Belief, Ego, ImageDetections, Rig
+from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.types import Belief, Ego, ImageDetections, Rig, Tracks
 
 CAMERA = PinholeCamera()
 RIG = Rig(cameras=(CAMERA,))
@@ -102,3 +106,20 @@ def test_each_detection_is_turned_by_its_own_yaw_change(seen):
     both = ImageDetections.from_rows(np.concatenate([new.rows(), old.rows()]))
     columns = [np.unique(wedge % 512).mean() for wedge in wedges(both, RIG)]
     assert columns == pytest.approx([255.5, 255.5], abs=2)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_box_is_explained_when_the_picture_of_a_forecast_of_its_class_lies_in_it(seed):
+    """Eq. 2 once more, camera by camera."""
+    rng = np.random.default_rng(seed)
+    centres, corner = rng.uniform(-30, 30, (12, 3)) * (1, 1, 0.1), rng.uniform(-20, 300, (20, 2))
+    kinds, classes = rng.integers(0, 5, 12), rng.integers(0, 5, 20)
+    cameras, yaw_changes = rng.integers(0, 6, 20), rng.choice([0.0, 0.02, -0.3], 20)
+    boxes = np.concatenate([corner, corner + rng.uniform(1, 200, (20, 2))], axis=1)
+    detections = ImageDetections(classes, np.ones(20), boxes, cameras, np.zeros(20), yaw_changes)
+    nothing = np.zeros(12, np.int64)
+    tracks = Tracks(nothing, kinds, np.column_stack([centres, np.ones((12, 4))]), np.zeros((12, 2)), nothing, nothing)
+    for n, known in enumerate(explained(detections, tracks, Rig(cameras=SURROUND_CAMERAS))):
+        pixels, _ = SURROUND_CAMERAS[cameras[n]].project(turned(centres[kinds == classes[n]], yaw_changes[n]))
+        inside = np.all((boxes[n, :2] <= pixels) & (pixels <= boxes[n, 2:]), axis=1)
+        assert known == inside.any()

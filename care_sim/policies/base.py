@@ -3,8 +3,6 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-import numpy as np
-
 from care_sim.allocation import allocate, scores_of
 from care_sim.errors import InvalidInput
 from care_sim.grid import Cells
@@ -51,6 +49,6 @@ class Policy(ABC):
         if not isinstance(demand, Demand):
             raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")
         cells = allocate(demand, belief.budget, self.rig.reserve_fraction)
-        if np.any((cells < 0) | (cells >= self.rig.grid.size)):
+        if cells.min(initial=0) < 0 or cells.max(initial=0) >= self.rig.grid.size:
             raise InvalidInput(f"cells must lie in 0..{self.rig.grid.size - 1}")
         return cells
