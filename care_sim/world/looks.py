@@ -1,5 +1,6 @@
 """Bodies as PyBullet's renderer draws them: convex polyhedra, which only stand near to round parts."""
 
+import math
 from collections.abc import Sequence
 from functools import cache
 
@@ -88,4 +89,4 @@ def directions() -> Floats:
 
 def _ring(azimuths: Floats, side: float) -> Floats:
     points: Floats = np.column_stack([2 * np.cos(azimuths), 2 * np.sin(azimuths), np.full(len(azimuths), side)])
-    return points / np.sqrt(5)
+    return points / math.sqrt(5)
