@@ -31,14 +31,14 @@ def scan(cells, directions, shape, reach, road, parts, stances, bounds):  # type
     for part, (first, last, upper, lower) in enumerate(bounds):
         solid = shapes[part], turns[part], halves[part], _start(turns[part], centres[part])
         for row in range(upper, lower + 1):
-            low, high, begin = starts[row], starts[row + 1], row * columns
-            ahead = _stretch(cells, begin + first, begin + last, low, high)
-            beyond_seam = _stretch(cells, begin, begin + last - columns, low, ahead[0])
-            for stretch in (ahead, beyond_seam):
-                for n in range(stretch[0], stretch[1]):
-                    distance = _entry(solid, directions[cells[n]])
-                    if distance < ranges[n] and distance <= reach:
-                        ranges[n], ids[n] = distance, owners[part]
+            begin, low, high = row * columns, starts[row], starts[row + 1]
+            ahead = _first_from(cells, begin + first, low, high)
+            for place, end in ((low, begin + last - columns), (ahead, begin + last)):
+                while place < high and cells[place] <= end:
+                    distance = _entry(solid, directions[cells[place]])
+                    if distance < ranges[place] and distance <= reach:
+                        ranges[place], ids[place] = distance, owners[part]
+                    place += 1
     return ranges, ids
 
 
@@ -62,13 +62,6 @@ def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
     for row in range(1, rows + 1):
         starts[row] = _first_from(cells, row * columns, starts[row - 1], len(cells))
     return starts
-
-
-@njit(cache=True)
-def _stretch(cells, first, last, low, high):  # type: ignore[no-untyped-def]
-    """Begin and end of the cells first..last among the places low..high of ascending `cells`."""
-    begin = _first_from(cells, first, low, high)
-    return begin, _first_from(cells, last + 1, begin, high)
 
 
 @njit(cache=True)
