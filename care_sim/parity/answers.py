@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
@@ -26,7 +27,8 @@ GRAZE_M = 1e-6
 MM = 1000.0
 
 _SIDES = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
-_NUDGES = GRAZE_M * _SIDES / np.linalg.norm(_SIDES, axis=1, keepdims=True)
+_NUDGES = GRAZE_M * Rotation.from_rotvec((0.3, 0.5, 0.7)).apply(_SIDES / np.linalg.norm(_SIDES, axis=1, keepdims=True))
+"""(26, 3) none of them along an axis: an error in one place alone, as where a body is exactly overhead, is no edge."""
 
 
 class Millimetres:

@@ -8,7 +8,7 @@ from care_sim.study.table import Table
 
 COLUMNS = ("against", "rays", "other body", "over 1 mm off", *VERDICTS[1:], "widest gap, m")
 NOTES = (
-    "grazing: `fast` gives the other's answer to a ray 1 um aside; lost: the other gives that of `fast` to one;"
+    "of rays 1 um aside, grazing: `fast` gives some the other's answer; lost: the other gives some that of `fast`;"
     " tolerance: Bullet in millimetres sides with `fast`; widest gap: between ranges to the same body",
 )
 

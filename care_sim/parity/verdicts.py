@@ -11,8 +11,8 @@ from care_sim.sensors.engines import RayEngine
 from care_sim.world.bullet import Integers
 
 VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
-"""Grazing: `fast` gives the reference's answer to a ray a micrometre aside. Lost: it does not, but the reference
-gives that of `fast` there. Tolerance: not grazing, but Bullet in millimetres sides with `fast`.
+"""Grazing: of rays a micrometre aside `fast` gives some the reference's answer, some its own. Lost: it does not, but
+the reference gives some the answer of `fast`. Tolerance: not grazing, but Bullet in millimetres sides with `fast`.
 """
 SAME, GRAZING, LOST, TOLERANCE, UNEXPLAINED = range(5)
 
@@ -50,7 +50,7 @@ def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
 
 
 def _judge(fast: RayEngine, reference: RayEngine, sensor: Frame, cell: int, answer: Answers, expected: Answers) -> int:
-    if aside(fast, sensor, cell, expected):
+    if aside(fast, sensor, cell, expected) and aside(fast, sensor, cell, answer):
         return GRAZING
     return LOST if aside(reference, sensor, cell, answer) else UNEXPLAINED
 

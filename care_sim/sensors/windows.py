@@ -43,7 +43,7 @@ def windows(centres, turns, halves, lattice):  # type: ignore[no-untyped-def]
     for part, centre in enumerate(centres):
         _lay_corners(centre, turns[part], halves[part], corners)
         heading, right, left = _spread(centre, corners)
-        surrounds = left - right >= math.pi
+        surrounds = left - right >= math.pi or (centre[0] == 0.0 and centre[1] == 0.0)
         if surrounds:
             heading, right, left = 0.0, -math.pi, math.pi
         bounds[part, 0], bounds[part, 1] = _columns(heading + right, heading + left, lattice[0])

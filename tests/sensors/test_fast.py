@@ -59,6 +59,7 @@ def assert_parity(kinds, frames, sensor, lost=0):
     ("kind", "frame", "sensor"),
     [
         ("bus", Frame(0.0, 0.0, 0.0, 0.0), Frame(0.3, 0.1, 5.0, 0.0)),
+        ("bus", Frame(0.0, 0.0, 0.0, 0.0), Frame(0.0, 0.0, 5.0, 0.0)),
         ("terrace", Frame(10.0, 6.0, 0.0, 0.1), Frame(0.0, 0.0, 1.84, 0.0)),
         ("drum", Frame(0.0, 0.0, 1.5, 0.0), Frame(0.8, 0.1, 1.0, 0.3, 0.1, -0.4)),
         ("pedestrian", Frame(-3.0, 0.05, 0.0, 0.7), Frame(0.0, 0.0, 1.84, 0.0, 0.1, 0.1)),
