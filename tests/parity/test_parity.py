@@ -90,7 +90,7 @@ def test_a_difference_is_listed_with_its_scene(street):
     (line,) = tally.listed
     assert (line["scene"], line["ray"], line["meets"], line["on_exact"]) == (3, 0, "boxes, upright", "unexplained")
     assert line["exact"]["m"] - line["fast"]["m"] == pytest.approx(0.01, abs=1e-3)
-    assert unexplained({"scans": {"one": tally.figures()}}) == 2
+    assert unexplained({"scans": {"one": tally.figures()}}) == 1
 
 
 def test_bodies_are_grouped_by_shape_and_stance():
