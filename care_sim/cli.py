@@ -1,6 +1,7 @@
 """The command line `care-sim`: finds the command, runs it, and says in one line what was wrong."""
 
 import contextlib
+import importlib
 import inspect
 import io
 import signal
@@ -69,6 +70,11 @@ class Bench:
     """Measure speed: keyframe, scans, steps and memory, beside other engines and environments."""
 
 
+@dataclass(frozen=True)
+class Parity:
+    """Hold the ray engine fast against Bullet, in random scenes and every keyframe of every scenario."""
+
+
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
@@ -84,8 +90,11 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "detectors": Detectors,
     "scenarios": Scenarios,
     "bench": Bench,
+    "parity": Parity,
 }
 
+MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig"}
+"""Commands of packages that are imported for them alone, and what they are told in."""
 STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 """Commands that keep what they have finished."""
 
@@ -109,15 +118,19 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _command(arguments: list[str]) -> int:
-    if arguments[:1] == ["bench"]:
-        from care_sim import bench
-
-        options = _in_one_line(lambda: tyro.cli(bench.BenchConfig, args=arguments[1:], prog="care-sim bench"))
-        return bench.run(options)
+    if arguments and arguments[0] in MEASURES:
+        return _measure(*arguments)
     command = _in_one_line(
         lambda: tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="care-sim", description=ABOUT, args=arguments)
     )
     return int(command())
+
+
+def _measure(name: str, *options: str) -> int:
+    package = importlib.import_module(f"care_sim.{name}")
+    config = getattr(package, MEASURES[name])
+    parsed = _in_one_line(lambda: tyro.cli(config, args=options, prog=f"care-sim {name}"))
+    return int(package.run(parsed))
 
 
 def _in_one_line(parse: Callable[[], Any]) -> Any:

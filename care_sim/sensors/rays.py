@@ -29,16 +29,17 @@ def scan(cells, directions, shape, reach, road, parts, stances, bounds):  # type
     ranges, ids = _road(cells, directions, reach, road)
     starts = _row_starts(cells, rows, columns)
     for part, (first, last, upper, lower) in enumerate(bounds):
-        solid = shapes[part], turns[part], halves[part], _start(turns[part], centres[part])
+        turn = _triple(turns[part, 0]), _triple(turns[part, 1]), _triple(turns[part, 2])
+        solid = shapes[part], turn, _triple(halves[part]), _start(turn, _triple(centres[part]))
         for row in range(upper, lower + 1):
-            low, high, begin = starts[row], starts[row + 1], row * columns
-            ahead = _stretch(cells, begin + first, begin + last, low, high)
-            beyond_seam = _stretch(cells, begin, begin + last - columns, low, ahead[0])
-            for stretch in (ahead, beyond_seam):
-                for n in range(stretch[0], stretch[1]):
-                    distance = _entry(solid, directions[cells[n]])
-                    if distance < ranges[n] and distance <= reach:
-                        ranges[n], ids[n] = distance, owners[part]
+            begin, low, high = row * columns, starts[row], starts[row + 1]
+            ahead = _first_from(cells, begin + first, low, high)
+            for place, end in ((low, begin + last - columns), (ahead, begin + last)):
+                while place < high and cells[place] <= end:
+                    distance = _entry(solid, _ray(directions, cells[place]))
+                    if distance < ranges[place] and distance <= reach:
+                        ranges[place], ids[place] = distance, owners[part]
+                    place += 1
     return ranges, ids
 
 
@@ -49,7 +50,7 @@ def _road(cells, directions, reach, road):  # type: ignore[no-untyped-def]
     ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NOTHING)
     if ground != NOTHING:
         for n, cell in enumerate(cells):
-            distance = -height / _dot(up, directions[cell])
+            distance = -height / _dot(up, _ray(directions, cell))
             if 0.0 <= distance <= reach:
                 ranges[n], ids[n] = distance, ground
     return ranges, ids
@@ -65,13 +66,6 @@ def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _stretch(cells, first, last, low, high):  # type: ignore[no-untyped-def]
-    """Begin and end of the cells first..last among the places low..high of ascending `cells`."""
-    begin = _first_from(cells, first, low, high)
-    return begin, _first_from(cells, last + 1, begin, high)
-
-
-@njit(cache=True)
 def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
     """The first place in low..high of ascending `cells` that holds `cell` or a later one, else `high`."""
     while low < high:
@@ -81,6 +75,17 @@ def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
         else:
             high = middle
     return low
+
+
+@njit(cache=True)
+def _ray(directions, cell):  # type: ignore[no-untyped-def]
+    return directions[cell, 0], directions[cell, 1], directions[cell, 2]
+
+
+@njit(cache=True)
+def _triple(row):  # type: ignore[no-untyped-def]
+    """The numbers of an array (3,): passing views on would count references, ray by ray."""
+    return row[0], row[1], row[2]
 
 
 @njit(cache=True)

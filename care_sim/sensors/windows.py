@@ -43,7 +43,7 @@ def windows(centres, turns, halves, lattice):  # type: ignore[no-untyped-def]
     for part, centre in enumerate(centres):
         _lay_corners(centre, turns[part], halves[part], corners)
         heading, right, left = _spread(centre, corners)
-        surrounds = left - right >= math.pi
+        surrounds = left - right >= math.pi or (centre[0] == 0.0 and centre[1] == 0.0)
         if surrounds:
             heading, right, left = 0.0, -math.pi, math.pi
         bounds[part, 0], bounds[part, 1] = _columns(heading + right, heading + left, lattice[0])
@@ -86,11 +86,24 @@ def _lay_corners(centre, axes, half, corners):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _spread(centre, corners):  # type: ignore[no-untyped-def]
     """Azimuth of a centre, and how far its corners reach to the right (negative) and left of it, radians."""
-    right, left = 0.0, 0.0
+    rightmost, leftmost, least, most = (1.0, 0.0), (1.0, 0.0), 0.0, 0.0
     for x, y, _ in corners:
-        offset = math.atan2(centre[0] * y - centre[1] * x, centre[0] * x + centre[1] * y)
-        right, left = min(right, offset), max(left, offset)
+        along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
+        order = _order(along, across)
+        if order < least:
+            rightmost, least = (along, across), order
+        if order > most:
+            leftmost, most = (along, across), order
+    right, left = math.atan2(rightmost[1], rightmost[0]), math.atan2(leftmost[1], leftmost[0])
     return math.atan2(centre[1], centre[0]), right, left
+
+
+@njit(cache=True)
+def _order(along, across):  # type: ignore[no-untyped-def]
+    """Grows from -2 to 2 as the direction of (along, across) turns from -pi to pi, at less cost than the angle."""
+    size = abs(along) + abs(across)
+    share = across / size if size > 0.0 else 0.0
+    return share if along >= 0.0 else math.copysign(2.0, across) - share
 
 
 @njit(cache=True)
@@ -107,7 +120,8 @@ def _rows(corners, surrounds, lattice):  # type: ignore[no-untyped-def]
     near, far = (0.0 if surrounds else _nearest(corners)), 0.0
     lowest, highest = math.inf, -math.inf
     for x, y, z in corners:
-        far, lowest, highest = max(far, math.hypot(x, y)), min(lowest, z), max(highest, z)
+        far, lowest, highest = max(far, x * x + y * y), min(lowest, z), max(highest, z)
+    far = math.sqrt(far)
     upper = (top - math.atan2(highest, near if highest > 0.0 else far)) / row_height
     lower = (top - math.atan2(lowest, near if lowest < 0.0 else far)) / row_height
     return max(0, math.ceil(upper) - MARGIN), min(rows - 1, math.floor(lower) + MARGIN)

@@ -33,22 +33,34 @@ def street(bullet):
     return bullet
 
 
-def lidar(grid, bullet, seed=0, **noise):
-    return Lidar(grid, ENGINES["bullet"](bullet, grid), Sensing(**noise), np.random.SeedSequence(seed))
+@pytest.fixture(params=sorted(ENGINES))
+def engine(request):
+    """The name of every engine in turn."""
+    return request.param
+
+
+@pytest.fixture
+def lidar(engine):
+    """Makes a LiDAR over a world, with noise."""
+
+    def make(grid, bullet, seed=0, **noise):
+        return Lidar(grid, ENGINES[engine](bullet, grid), Sensing(**noise), np.random.SeedSequence(seed))
+
+    return make
 
 
 def everything(grid):
     return np.arange(grid.size)
 
 
-def test_only_the_fired_cells_are_cast(grid, street):
-    engine = Watched(ENGINES["bullet"](street, grid))
+def test_only_the_fired_cells_are_cast(grid, street, engine):
+    watched = Watched(ENGINES[engine](street, grid))
     cells = np.array([5, 300, 9000, 16383])
-    Lidar(grid, engine, Sensing(), np.random.SeedSequence(0)).fire(cells, SENSOR)
-    assert [cast.tolist() for cast in engine.cells] == [cells.tolist()]
+    Lidar(grid, watched, Sensing(), np.random.SeedSequence(0)).fire(cells, SENSOR)
+    assert [cast.tolist() for cast in watched.cells] == [cells.tolist()]
 
 
-def test_a_scan_of_some_cells_is_that_part_of_the_full_scan(grid, street):
+def test_a_scan_of_some_cells_is_that_part_of_the_full_scan(grid, street, lidar):
     full, full_bodies = lidar(grid, street).fire(everything(grid), SENSOR)
     cells = np.sort(np.random.default_rng(1).choice(grid.size, 500, replace=False))
     part, bodies = lidar(grid, street).fire(cells, SENSOR)
@@ -57,13 +69,13 @@ def test_a_scan_of_some_cells_is_that_part_of_the_full_scan(grid, street):
     assert np.array_equal(bodies, full_bodies[cells])
 
 
-def test_a_full_scan_answers_every_cell(grid, street):
+def test_a_full_scan_answers_every_cell(grid, street, lidar):
     scan, bodies = lidar(grid, street).fire(everything(grid), SENSOR)
     assert len(scan.ranges) == len(bodies) == 16384
     assert len(set(bodies.tolist()) - {-1, street.ground}) == 3
 
 
-def test_returns_lie_on_the_bodies_they_hit(grid, street):
+def test_returns_lie_on_the_bodies_they_hit(grid, street, lidar):
     bus = street.add(CATALOGUE["bus"], (5.0, 20.0, 1.0))
     scan, bodies = lidar(grid, street).fire(everything(grid), SENSOR)
     hit = bodies == bus
@@ -74,7 +86,7 @@ def test_returns_lie_on_the_bodies_they_hit(grid, street):
     assert np.abs(np.abs(local) / (np.array([11.19, 2.94, 3.47]) / 2)).max(axis=1) == pytest.approx(1, abs=1e-3)
 
 
-def test_the_scan_turns_with_the_sensor(grid, street):
+def test_the_scan_turns_with_the_sensor(grid, street, lidar):
     trailer_behind = lidar(grid, street).fire(np.array([8 * 512]), SENSOR)[1]
     turned_round = lidar(grid, street).fire(np.array([8 * 512 + 256]), Frame(0, 0, 1.84, np.pi))[1]
     assert trailer_behind.tolist() == turned_round.tolist()
@@ -85,13 +97,13 @@ def test_a_scan_carries_no_body_ids():
     assert [field.name for field in fields(Scan)] == ["cells", "ranges"]
 
 
-def test_without_noise_the_generator_does_not_matter(grid, street):
+def test_without_noise_the_generator_does_not_matter(grid, street, lidar):
     one, other = (lidar(grid, street, seed).fire(everything(grid), SENSOR) for seed in (0, 1))
     assert np.array_equal(one[0].ranges, other[0].ranges)
     assert np.array_equal(one[1], other[1])
 
 
-def test_range_noise_has_its_spread_and_leaves_misses_alone(grid, street):
+def test_range_noise_has_its_spread_and_leaves_misses_alone(grid, street, lidar):
     clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
     noisy, _ = lidar(grid, street, lidar_range_sigma=0.05).fire(everything(grid), SENSOR)
     hit = np.isfinite(clean.ranges)
@@ -101,7 +113,7 @@ def test_range_noise_has_its_spread_and_leaves_misses_alone(grid, street):
     assert errors.mean() == pytest.approx(0, abs=0.01)
 
 
-def test_dropout_loses_its_share_of_returns_with_their_bodies(grid, street):
+def test_dropout_loses_its_share_of_returns_with_their_bodies(grid, street, lidar):
     clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
     noisy, bodies = lidar(grid, street, lidar_dropout=0.3).fire(everything(grid), SENSOR)
     hit = np.isfinite(clean.ranges)
@@ -111,25 +123,25 @@ def test_dropout_loses_its_share_of_returns_with_their_bodies(grid, street):
     assert np.array_equal(noisy.ranges[kept], clean.ranges[kept])
 
 
-def test_total_dropout_returns_nothing(grid, street):
+def test_total_dropout_returns_nothing(grid, street, lidar):
     scan, bodies = lidar(grid, street, lidar_dropout=1.0).fire(everything(grid), SENSOR)
     assert np.isinf(scan.ranges).all()
     assert np.all(bodies == -1)
 
 
-def test_noise_does_not_move_what_drops_out(grid, street):
+def test_noise_does_not_move_what_drops_out(grid, street, lidar):
     plain, _ = lidar(grid, street, lidar_dropout=0.3).fire(everything(grid), SENSOR)
     noisy, _ = lidar(grid, street, lidar_dropout=0.3, lidar_range_sigma=0.1).fire(everything(grid), SENSOR)
     assert np.array_equal(np.isinf(plain.ranges), np.isinf(noisy.ranges))
 
 
-def test_a_peek_sees_no_more_than_live_rows_can_return(grid, street):
+def test_a_peek_sees_no_more_than_live_rows_can_return(grid, street, lidar):
     peeked = lidar(grid, street, lidar_dead_rows=(9, 12), lidar_dropout=0.5).peek(SENSOR)
     fired, _ = lidar(grid, street, lidar_dead_rows=(9, 12)).fire(everything(grid), SENSOR)
     assert np.array_equal(peeked.ranges, fired.ranges)
 
 
-def test_noise_of_a_cell_does_not_depend_on_which_others_fire(grid, street):
+def test_noise_of_a_cell_does_not_depend_on_which_others_fire(grid, street, lidar):
     noise = {"lidar_range_sigma": 0.1, "lidar_dropout": 0.3}
     everywhere, here = lidar(grid, street, **noise), lidar(grid, street, **noise)
     cells = np.arange(7000, 9000, 3)
@@ -138,7 +150,7 @@ def test_noise_of_a_cell_does_not_depend_on_which_others_fire(grid, street):
         assert np.array_equal(part.ranges, full.ranges[cells])
 
 
-def test_a_dead_row_fires_and_returns_nothing(grid, street):
+def test_a_dead_row_fires_and_returns_nothing(grid, street, lidar):
     clean, _ = lidar(grid, street).fire(everything(grid), SENSOR)
     scan, bodies = lidar(grid, street, lidar_dead_rows=(9, 12)).fire(everything(grid), SENSOR)
     dead = np.isin(np.arange(grid.size) // grid.columns, (9, 12))
@@ -153,7 +165,7 @@ def test_a_row_that_the_grid_lacks_cannot_be_dead(grid):
         dead_cells(grid, (32,))
 
 
-def test_firing_nothing_returns_nothing(grid, street):
+def test_firing_nothing_returns_nothing(grid, street, lidar):
     scan, bodies = lidar(grid, street).fire(np.array([], dtype=np.int64), SENSOR)
     assert len(scan.ranges) == len(bodies) == 0
 
@@ -170,6 +182,7 @@ def test_impossible_noise_is_refused_by_name(noise, named):
 
 
 def test_an_unknown_engine_is_refused_with_the_known_ones():
-    check_engine("bullet")
+    for name in ENGINES:
+        check_engine(name)
     with pytest.raises(InvalidInput, match=r"engine 'warp'.*bullet"):
         check_engine("warp")

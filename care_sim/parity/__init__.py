@@ -1,0 +1,6 @@
+"""Whether the compiled ray engine answers as Bullet does: `care-sim parity`."""
+
+from care_sim.parity.config import ParityConfig
+from care_sim.parity.run import run
+
+__all__ = ["ParityConfig", "run"]

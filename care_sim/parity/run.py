@@ -1,0 +1,57 @@
+"""`care-sim parity`: compare, print, write."""
+
+import json
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+from rich.console import Console
+
+from care_sim.parity.config import ParityConfig
+from care_sim.parity.keyframes import keyframes
+from care_sim.parity.random_scenes import random_scenes
+from care_sim.parity.tables import tables
+from care_sim.parity.tally import REFERENCES, Tally
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.progress import Lines, bar
+from care_sim.study.provenance import machine, versions
+
+
+def run(config: ParityConfig) -> int:
+    """Compare, print the tables, write JSON; 1 if a difference from Bullet in millimetres has no explanation."""
+    if config.out is not None:
+        config.out.parent.mkdir(parents=True, exist_ok=True)
+        config.out.touch()
+    report = measure(config)
+    console = Console(highlight=False)
+    for table in tables(report["scans"]):
+        console.print(table.rich())
+    if config.out is not None:
+        config.out.write_text(json.dumps(report, indent=2) + "\n")
+    return 1 if unexplained(report) else 0
+
+
+def measure(config: ParityConfig) -> dict[str, Any]:
+    """`config`, `machine`, `versions`, and `scans`: the figures of random scenes and of every scenario."""
+    scans = {"random scenes": _shown("scenes", config.scenes, partial(random_scenes, config.seed))}
+    scans |= {name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name)) for name in SCENARIOS}
+    return {
+        "config": {name: value for name, value in asdict(config).items() if name != "out"},
+        "machine": machine(),
+        "versions": versions(),
+        "scans": {name: tally.figures() for name, tally in scans.items() if tally.scans},
+    }
+
+
+def unexplained(report: dict[str, Any]) -> int:
+    """How many rays differ from Bullet in millimetres without an explanation."""
+    met = (figures["references"][REFERENCES[-1]].values() for figures in report["scans"].values())
+    return sum(counts["unexplained"] for groups in met for counts in groups)
+
+
+def _shown(unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Tally]) -> Tally:
+    with bar(total, unit) if sys.stderr.isatty() else nullcontext(Lines(total, unit)) as show:
+        return compare(total, lambda done: show(done, ""))

@@ -1,0 +1,32 @@
+"""The figures of a comparison for people."""
+
+from dataclasses import replace
+from typing import Any
+
+from care_sim.parity.verdicts import VERDICTS
+from care_sim.study.table import Table
+
+COLUMNS = ("against", "rays", "other body", "over 1 mm off", *VERDICTS[1:], "widest gap, m")
+NOTES = (
+    "of rays 1 um aside, grazing: `fast` gives some the other's answer; lost: the other gives some that of `fast`;"
+    " tolerance: Bullet in millimetres sides with `fast`; widest gap: between ranges to the same body",
+)
+
+
+def tables(scans: dict[str, Any]) -> list[Table]:
+    """One for random scenes and for each scenario, the notes below the last."""
+    made = [_table(title, figures) for title, figures in scans.items()]
+    return [*made[:-1], *(replace(last, notes=NOTES) for last in made[-1:])]
+
+
+def _table(title: str, figures: dict[str, Any]) -> Table:
+    """One reference after the other, what the rays meet line by line."""
+    rows: list[tuple[str, ...]] = []
+    for reference, met in figures["references"].items():
+        rows += [(reference,), *(_row(group, counts) for group, counts in met.items() if counts["rays"])]
+    return Table(f"{title}: {figures['scans']} scans", COLUMNS, tuple(rows))
+
+
+def _row(group: str, counts: dict[str, float]) -> tuple[str, ...]:
+    whole = (counts[key] for key in ("rays", "other_ids", "other_ranges", *VERDICTS[1:]))
+    return group, *(f"{number:.0f}" for number in whole), f"{counts['widest_m']:.1e}"
