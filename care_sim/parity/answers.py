@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
-from care_sim.sensors.engines import BulletRays, Engine
+from care_sim.sensors.engines import Bullet, RayEngine
 from care_sim.world.bodies import BodyKind, Triple
 from care_sim.world.bullet import BulletWorld, Integers
 
@@ -37,7 +37,7 @@ class Millimetres:
     def __init__(self, kinds: Sequence[BodyKind], grid: AngularGrid):
         self._world = BulletWorld()
         self._bodies = [self._world.add(_enlarged(kind), (0.0, 0.0, 0.0)) for kind in kinds]
-        self._rays = BulletRays(self._world, replace(grid, range_m=MM * grid.range_m))
+        self._rays = Bullet(self._world, replace(grid, range_m=MM * grid.range_m))
 
     def place(self, frames: Sequence[Frame]) -> None:
         """Move all bodies; the frames are in metres."""
@@ -45,7 +45,7 @@ class Millimetres:
             self._world.move(body, _far(frame))
 
     def cast(self, sensor: Frame, cells: Cells) -> Answers:
-        """Ranges in metres, and body ids; see `care_sim.sensors.engines.Engine`."""
+        """Ranges in metres, and body ids; see `care_sim.sensors.engines.RayEngine`."""
         ranges, ids = self._rays.cast(_far(sensor), cells)
         return ranges / MM, ids
 
@@ -60,7 +60,7 @@ def same(one: Answers, other: Answers) -> NDArray[np.bool_]:
     return alike
 
 
-def aside(engine: Engine, sensor: Frame, cell: int, answer: Answers) -> bool:
+def aside(engine: RayEngine, sensor: Frame, cell: int, answer: Answers) -> bool:
     """Whether `engine` gives `answer`, of one ray, to any of 26 rays `GRAZE_M` around that of `cell`."""
     cells = np.array([cell])
     places = (sensor.origin + _NUDGES).tolist()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from rich.console import Console
 
@@ -14,10 +14,12 @@ from care_sim.parity.config import ParityConfig
 from care_sim.parity.keyframes import keyframes
 from care_sim.parity.random_scenes import random_scenes
 from care_sim.parity.tables import tables
-from care_sim.parity.tally import REFERENCES, Tally
+from care_sim.parity.tally import REFERENCES
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.progress import Lines, bar
 from care_sim.study.provenance import machine, versions
+
+Compared = TypeVar("Compared")
 
 
 def run(config: ParityConfig) -> int:
@@ -27,7 +29,7 @@ def run(config: ParityConfig) -> int:
         config.out.touch()
     report = measure(config)
     console = Console(highlight=False)
-    for table in tables(report["scans"]):
+    for table in tables(report):
         console.print(table.rich())
     if config.out is not None:
         config.out.write_text(json.dumps(report, indent=2) + "\n")
@@ -35,14 +37,19 @@ def run(config: ParityConfig) -> int:
 
 
 def measure(config: ParityConfig) -> dict[str, Any]:
-    """`config`, `machine`, `versions`, and `scans`: the figures of random scenes and of every scenario."""
-    scans = {"random scenes": _shown("scenes", config.scenes, partial(random_scenes, config.seed))}
-    scans |= {name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name)) for name in SCENARIOS}
+    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario, and `pictures`:
+    those of every scenario.
+    """
+    random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
+    played = {name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name)) for name in SCENARIOS}
+    scans = {"random scenes": random, **{name: compared.rays for name, compared in played.items()}}
+    pictures = {name: compared.pictures for name, compared in played.items()}
     return {
         "config": {name: value for name, value in asdict(config).items() if name != "out"},
         "machine": machine(),
         "versions": versions(),
         "scans": {name: tally.figures() for name, tally in scans.items() if tally.scans},
+        "pictures": {name: seen.figures() for name, seen in pictures.items() if seen.pictures},
     }
 
 
@@ -52,6 +59,6 @@ def unexplained(report: dict[str, Any]) -> int:
     return sum(counts["unexplained"] for groups in met for counts in groups)
 
 
-def _shown(unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Tally]) -> Tally:
+def _shown(unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Compared]) -> Compared:
     with bar(total, unit) if sys.stderr.isatty() else nullcontext(Lines(total, unit)) as show:
         return compare(total, lambda done: show(done, ""))

@@ -11,12 +11,27 @@ NOTES = (
     "of rays 1 um aside, grazing: `fast` gives some the other's answer; lost: the other gives some that of `fast`;"
     " tolerance: Bullet in millimetres sides with `fast`; widest gap: between ranges to the same body",
 )
+PICTURES = {
+    "pictures": "pictures",
+    "pixels": "pixels that show a body",
+    "other_pixels": "another body",
+    "boxes": "visible boxes",
+    "other_boxes": "another box",
+    "widest_px": "widest gap, px",
+    "in_one_only": "in one picture only",
+}
 
 
-def tables(scans: dict[str, Any]) -> list[Table]:
-    """One for random scenes and for each scenario, the notes below the last."""
-    made = [_table(title, figures) for title, figures in scans.items()]
-    return [*made[:-1], *(replace(last, notes=NOTES) for last in made[-1:])]
+def tables(report: dict[str, Any]) -> list[Table]:
+    """One for random scenes and for each scenario, the notes below the last of them, and one of the pictures."""
+    made = [_table(title, figures) for title, figures in report["scans"].items()]
+    scans = [*made[:-1], *(replace(last, notes=NOTES) for last in made[-1:])]
+    return [*scans, *([_pictures(report["pictures"])] if report["pictures"] else [])]
+
+
+def _pictures(pictures: dict[str, Any]) -> Table:
+    rows = ((name, *(f"{figures[key]:.0f}" for key in PICTURES)) for name, figures in pictures.items())
+    return Table("Pictures of the camera against Bullet", ("scenario", *PICTURES.values()), tuple(rows))
 
 
 def _table(title: str, figures: dict[str, Any]) -> Table:

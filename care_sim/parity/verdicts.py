@@ -7,7 +7,7 @@ import numpy as np
 from care_sim.frames import Frame
 from care_sim.grid import Cells
 from care_sim.parity.answers import Answers, aside, same
-from care_sim.sensors.engines import Engine
+from care_sim.sensors.engines import RayEngine
 from care_sim.world.bullet import Integers
 
 VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
@@ -21,9 +21,9 @@ SAME, GRAZING, LOST, TOLERANCE, UNEXPLAINED = range(5)
 class Engines:
     """The engine in question, the reference, and the reference asked in millimetres."""
 
-    fast: Engine
-    bullet: Engine
-    exact: Engine
+    fast: RayEngine
+    bullet: RayEngine
+    exact: RayEngine
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
     return Compared(fast, bullet, exact, on_bullet, on_exact)
 
 
-def _judge(fast: Engine, reference: Engine, sensor: Frame, cell: int, answer: Answers, expected: Answers) -> int:
+def _judge(fast: RayEngine, reference: RayEngine, sensor: Frame, cell: int, answer: Answers, expected: Answers) -> int:
     if aside(fast, sensor, cell, expected) and aside(fast, sensor, cell, answer):
         return GRAZING
     return LOST if aside(reference, sensor, cell, answer) else UNEXPLAINED

@@ -10,14 +10,18 @@ from care_sim.pinhole import PinholeCamera
 from care_sim.world.bullet import BulletWorld, Integers, Window
 
 
-class Engine(Protocol):
-    """Casts the rays of one grid at the bodies of one world, and draws them for cameras."""
+class RayEngine(Protocol):
+    """Casts the rays of one grid at the bodies of one world."""
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,), NOTHING there, of
         `cells` (n,) fired from the frame `sensor`.
         """
         ...
+
+
+class Engine(RayEngine, Protocol):
+    """Also draws the bodies for cameras."""
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
         """Id of the body that each pixel of a window of `camera` shows, NOTHING where there is none; see
@@ -33,7 +37,7 @@ class Bullet:
         self._world, self._grid = world, grid
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `Engine`."""
+        """Ranges and body ids; see `RayEngine`."""
         directions = sensor.vectors_to_world(self._grid.directions[cells])
         return self._world.cast(sensor.origin, directions, self._grid.range_m)
 

@@ -23,7 +23,7 @@ class Fast:
         self._lattice = (grid.columns, grid.rows, float(grid.top), float(grid.row_height))
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `care_sim.sensors.engines.Engine`."""
+        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
         if np.any(cells[1:] < cells[:-1]):
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])

@@ -9,7 +9,7 @@ from care_sim.conditions import LidarFaults
 from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.grid import AngularGrid, Cells
-from care_sim.sensors.engines import Engine
+from care_sim.sensors.engines import RayEngine
 from care_sim.types import Scan
 from care_sim.world.bullet import NOTHING, Integers
 
@@ -24,7 +24,7 @@ class Lidar:
     every policy meets the same noise (common random numbers).
     """
 
-    def __init__(self, grid: AngularGrid, engine: Engine, faults: LidarFaults, seed: np.random.SeedSequence):
+    def __init__(self, grid: AngularGrid, engine: RayEngine, faults: LidarFaults, seed: np.random.SeedSequence):
         self.grid = grid
         self._engine = engine
         self._faults = faults

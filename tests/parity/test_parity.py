@@ -8,11 +8,14 @@ from care_sim.cli import main
 from care_sim.frames import Frame
 from care_sim.grid import AngularGrid
 from care_sim.parity.answers import Millimetres, aside
-from care_sim.parity.keyframes import compare_episode
+from care_sim.parity.keyframes import Compared, compare_episode
+from care_sim.parity.pictures import Pictures
 from care_sim.parity.run import unexplained
 from care_sim.parity.scenes import GRIDS, draw_bodies, draw_scene
 from care_sim.parity.tally import GROUPS, Tally, groups
 from care_sim.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
+from care_sim.pinhole import PinholeCamera
+from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.config import EpisodeConfig
 from care_sim.world.bodies import CATALOGUE
@@ -110,9 +113,12 @@ def test_a_scene_is_drawn_again_from_its_number():
 
 
 def test_every_keyframe_of_an_episode_is_scanned_in_full():
-    tally = Tally()
-    compare_episode(EpisodeConfig("dense", "care", 0.1, 0, scenario_parameters=(("duration_s", 0.2),)), tally)
-    assert tally.scans == 3
+    compared = Compared()
+    compare_episode(EpisodeConfig("dense", "care", 0.1, 0, scenario_parameters=(("duration_s", 0.2),)), compared)
+    tally = compared.rays
+    assert tally.scans == compared.pictures.pictures == 3
+    assert compared.pictures.boxes > 10
+    assert compared.pictures.widest_px <= 1
     on_bullet, on_exact = tally.verdicts.sum(axis=1)
     assert on_exact.tolist() == [3 * 16384, 0, 0, 0, 0]
     assert on_bullet[UNEXPLAINED] == 0
@@ -135,3 +141,27 @@ def test_a_number_below_zero_is_refused(capsys):
         main(["parity", "--scenes", "-1"])
     assert end.value.code == 2
     assert "scenes must be a whole number >= 0" in capsys.readouterr().err
+
+
+class Shifted:
+    """A real engine that draws what a camera two pixels to the left of it shows."""
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def body_ids(self, camera, sensor, window):
+        left, top, right, bottom = window
+        return self.engine.body_ids(camera, sensor, (left + 2, top, right + 2, bottom))
+
+
+def test_pictures_that_agree_and_that_do_not(bullet):
+    body = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
+    fast, reference = ENGINES["fast"](bullet, GRID), ENGINES["bullet"](bullet, GRID)
+    seen = Pictures()
+    seen.compare(fast, reference, [FRONT_CAMERA, PinholeCamera(100, 80)], SENSOR)
+    assert body == 1
+    counts = {"pictures": 2, "boxes": 2, "other_boxes": 0, "other_pixels": 0, "in_one_only": 0, "widest_px": 0}
+    assert {name: seen.figures()[name] for name in counts} == counts
+    seen.compare(Shifted(fast), reference, [FRONT_CAMERA], SENSOR)
+    assert (seen.figures()["other_boxes"], seen.figures()["widest_px"]) == (1, 2)
+    assert seen.figures()["other_pixels"] > 10
