@@ -109,7 +109,7 @@ def test_the_row_names_every_condition_and_the_label_what_departs(source):
     assert listed([config])["scenes"] == ["a"]
     assert listed([config])["configurations"][0]["floor_seeds"] == [2]
     with pytest.raises(InvalidInput, match="engine cannot be changed in the open loop"):
-        replace(config, engine="fast")
+        replace(config, engine="bullet")
     with pytest.raises(InvalidInput, match="unknown detector 'yolo'"):
         replace(config, detector="yolo")
     with pytest.raises(InvalidInput, match="k_safe"):
@@ -193,7 +193,7 @@ def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
         (["--budgets", "1.5"], "budget"),
         (["--floor-seeds", "0"], "floor_seeds must be a whole number >= 1, got 0"),
         (["--detector", "yolo"], "unknown detector 'yolo'"),
-        (["--engine", "fast"], "engine cannot be changed in the open loop"),
+        (["--engine", "bullet"], "engine cannot be changed in the open loop"),
         (["--camera-latency", "1", "--camera-latencies", "0", "1"], "give camera_latency one value or several"),
     ],
 )
