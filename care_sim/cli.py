@@ -72,7 +72,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Parity:
-    """Hold the ray engine fast against Bullet, in random scenes and every keyframe of every scenario."""
+    """Hold the engine fast against Bullet: rays of random scenes and of every keyframe, pictures, whole episodes."""
 
 
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."

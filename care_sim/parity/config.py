@@ -8,12 +8,14 @@ from care_sim.errors import check_whole
 
 @dataclass(frozen=True, kw_only=True)
 class ParityConfig:
-    """Hold the ray engine `fast` against Bullet: in random scenes, and in full scans of every scenario's keyframes."""
+    """Hold the engine `fast` against Bullet: in random scenes, in full scans and pictures of the keyframes of every
+    scenario, and in how the episodes of the paper's study go.
+    """
 
     scenes: int = 100_000
     """Random scenes."""
     episodes: int = 5
-    """Episodes a scenario, seeds from 0; every keyframe is scanned in full."""
+    """Seeds from 0 of every scenario, where every keyframe is scanned in full, and of the paper's study."""
     seed: int = 0
     """Seed of the random scenes."""
     out: Path | None = None

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from care_sim.parity.config import ParityConfig
 from care_sim.parity.keyframes import keyframes
+from care_sim.parity.outcomes import outcomes
 from care_sim.parity.random_scenes import random_scenes
 from care_sim.parity.tables import tables
 from care_sim.parity.tally import REFERENCES
@@ -23,7 +24,9 @@ Compared = TypeVar("Compared")
 
 
 def run(config: ParityConfig) -> int:
-    """Compare, print the tables, write JSON; 1 if a difference from Bullet in millimetres has no explanation."""
+    """Compare, print the tables, write JSON; 1 if an episode ends otherwise, or a difference from Bullet in
+    millimetres has no explanation.
+    """
     if config.out is not None:
         config.out.parent.mkdir(parents=True, exist_ok=True)
         config.out.touch()
@@ -33,15 +36,16 @@ def run(config: ParityConfig) -> int:
         console.print(table.rich())
     if config.out is not None:
         config.out.write_text(json.dumps(report, indent=2) + "\n")
-    return 1 if unexplained(report) else 0
+    return 1 if unexplained(report) or report["outcomes"]["other_outcomes"] else 0
 
 
 def measure(config: ParityConfig) -> dict[str, Any]:
-    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario, and `pictures`:
-    those of every scenario.
+    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario, `pictures`: those
+    of every scenario, and `outcomes`: those of whole episodes.
     """
     random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
     played = {name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name)) for name in SCENARIOS}
+    ended = _shown("seeds of the paper's study", config.episodes, outcomes)
     scans = {"random scenes": random, **{name: compared.rays for name, compared in played.items()}}
     pictures = {name: compared.pictures for name, compared in played.items()}
     return {
@@ -50,6 +54,7 @@ def measure(config: ParityConfig) -> dict[str, Any]:
         "versions": versions(),
         "scans": {name: tally.figures() for name, tally in scans.items() if tally.scans},
         "pictures": {name: seen.figures() for name, seen in pictures.items() if seen.pictures},
+        "outcomes": ended.figures(),
     }
 
 

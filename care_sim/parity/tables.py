@@ -23,10 +23,13 @@ PICTURES = {
 
 
 def tables(report: dict[str, Any]) -> list[Table]:
-    """One for random scenes and for each scenario, the notes below the last of them, and one of the pictures."""
+    """One for random scenes and for each scenario, the notes below the last of them, one of the pictures and one of
+    the outcomes.
+    """
     made = [_table(title, figures) for title, figures in report["scans"].items()]
     scans = [*made[:-1], *(replace(last, notes=NOTES) for last in made[-1:])]
-    return [*scans, *([_pictures(report["pictures"])] if report["pictures"] else [])]
+    seen = [_pictures(report["pictures"])] if report["pictures"] else []
+    return [*scans, *seen, *([_outcomes(report["outcomes"])] if report["outcomes"]["episodes"] else [])]
 
 
 def _pictures(pictures: dict[str, Any]) -> Table:
@@ -45,3 +48,11 @@ def _table(title: str, figures: dict[str, Any]) -> Table:
 def _row(group: str, counts: dict[str, float]) -> tuple[str, ...]:
     whole = (counts[key] for key in ("rays", "other_ids", "other_ranges", *VERDICTS[1:]))
     return group, *(f"{number:.0f}" for number in whole), f"{counts['widest_m']:.1e}"
+
+
+def _outcomes(outcomes: dict[str, Any]) -> Table:
+    columns = ("episodes", "another outcome", "another keyframe", "keyframes")
+    counts = (outcomes[key] for key in ("episodes", "other_outcomes", "other_keyframes", "keyframes"))
+    row = tuple(str(count if isinstance(count, int) else len(count)) for count in counts)
+    differing = dict.fromkeys([*outcomes["other_outcomes"], *outcomes["other_keyframes"]])
+    return Table("Episodes of the paper's study under either engine", columns, (row,), tuple(differing))

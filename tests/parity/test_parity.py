@@ -7,14 +7,17 @@ import pytest
 from care_sim.cli import main
 from care_sim.frames import Frame
 from care_sim.grid import AngularGrid
+from care_sim.parity import outcomes as parity_outcomes
 from care_sim.parity.answers import Millimetres, aside
 from care_sim.parity.keyframes import Compared, compare_episode
+from care_sim.parity.outcomes import Outcomes
 from care_sim.parity.pictures import Pictures
 from care_sim.parity.run import unexplained
 from care_sim.parity.scenes import GRIDS, draw_bodies, draw_scene
 from care_sim.parity.tally import GROUPS, Tally, groups
 from care_sim.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
 from care_sim.pinhole import PinholeCamera
+from care_sim.scenarios import SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.config import EpisodeConfig
@@ -165,3 +168,33 @@ def test_pictures_that_agree_and_that_do_not(bullet):
     seen.compare(Shifted(fast), reference, [FRONT_CAMERA], SENSOR)
     assert (seen.figures()["other_boxes"], seen.figures()["widest_px"]) == (1, 2)
     assert seen.figures()["other_pixels"] > 10
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("changes", [{}, {"camera_latency": 1, "camera_rotation_sigma_deg": 1.0, "lidar_dropout": 0.1}])
+def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
+    outcomes = Outcomes()
+    outcomes.compare(EpisodeConfig(scenario, "care", 0.05, 7, **changes))
+    assert outcomes.figures() == {
+        "episodes": 1, "keyframes": outcomes.keyframes, "other_outcomes": [], "other_keyframes": []
+    }  # fmt: skip
+    assert outcomes.keyframes > 20
+
+
+def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
+    monkeypatch.setattr(parity_outcomes, "ENGINES", ("fast", "nearsighted"))
+    monkeypatch.setitem(ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid)))
+    config, outcomes = EpisodeConfig("dense", "care", 0.1, 0), Outcomes()
+    outcomes.compare(config)
+    assert outcomes.other_outcomes == outcomes.other_keyframes == [config.changed(engine="fast").label]
+
+
+class Nearsighted:
+    """A real engine whose rays end after 5 m."""
+
+    def __init__(self, engine):
+        self.engine, self.body_ids = engine, engine.body_ids
+
+    def cast(self, sensor, cells):
+        ranges, ids = self.engine.cast(sensor, cells)
+        return np.where(ranges < 5, ranges, np.inf), np.where(ranges < 5, ids, -1)
