@@ -65,6 +65,60 @@ def matched(detections, forecasts, lenses):  # type: ignore[no-untyped-def]
     return found
 
 
+@njit(cache=True)
+def rectangles(boxes, lens, nearest):  # type: ignore[no-untyped-def]
+    """(n, 4) what 3D boxes (n, 7) span in the picture; see `care_sim.pinhole.PinholeCamera.project_boxes`."""
+    spans, corners = np.empty((len(boxes), 4)), np.empty((8, 3))
+    for n, box in enumerate(boxes):
+        _lay_corners(box, lens, corners)
+        span = math.inf, math.inf, -math.inf, -math.inf
+        for one in range(8):
+            if corners[one, 0] >= nearest:
+                span = _widened(span, corners[one], lens)
+            for axis in range(3):
+                other = one ^ 1 << axis
+                if corners[one, 0] < nearest <= corners[other, 0]:
+                    share = (nearest - corners[one, 0]) / (corners[other, 0] - corners[one, 0])
+                    span = _widened(span, corners[one] + (corners[other] - corners[one]) * share, lens)
+        spans[n] = span if span[0] <= span[2] else (math.nan, math.nan, math.nan, math.nan)
+    return spans
+
+
+@njit(cache=True)
+def window_around(spans, width, height):  # type: ignore[no-untyped-def]
+    """Left, top, right, bottom of the whole pixels, and one more on each side, that hold `spans` (n, 4) in a picture."""
+    left, top, right, bottom = width, height, 0, 0
+    for span in spans:
+        if span[0] <= span[2]:
+            low = max(math.floor(span[0]) - 1, 0), max(math.floor(span[1]) - 1, 0)
+            high = min(math.ceil(span[2]) + 1, width), min(math.ceil(span[3]) + 1, height)
+            if low[0] < high[0] and low[1] < high[1]:
+                left, top = min(left, low[0]), min(top, low[1])
+                right, bottom = max(right, high[0]), max(bottom, high[1])
+    return (left, top, right, bottom) if left < right else (0, 0, 0, 0)
+
+
+@njit(cache=True)
+def _lay_corners(box, lens, corners):  # type: ignore[no-untyped-def]
+    """Fill `corners` (8, 3: depth, left, up): bit i of a corner's number says on which side of axis i it lies."""
+    position, axes, _, _ = lens
+    cos, sin = math.cos(box[6]), math.sin(box[6])
+    for n in range(8):
+        along, across, upward = box[3] * ((n & 1) - 0.5), box[4] * ((n >> 1 & 1) - 0.5), box[5] * ((n >> 2) - 0.5)
+        x = box[0] + cos * along - sin * across - position[0]
+        y = box[1] + sin * along + cos * across - position[1]
+        for i in range(3):
+            corners[n, i] = _along(axes[i], x, y, box[2] + upward - position[2])
+
+
+@njit(cache=True)
+def _widened(span, point, lens):  # type: ignore[no-untyped-def]
+    """A span that holds the pixel of a point (depth, left, up) as well."""
+    _, _, focal, centre = lens
+    u, v = centre[0] - focal * point[1] / point[0], centre[1] - focal * point[2] / point[0]
+    return min(span[0], u), min(span[1], v), max(span[2], u), max(span[3], v)
+
+
 @njit(cache=True, boundscheck=True)
 def _of(lenses, camera):  # type: ignore[no-untyped-def]
     """The lens of a camera. Raises IndexError for one that there is not."""

@@ -12,12 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_sim.frames import BOX_EDGES, Floats, Frame, box_corners
+from care_sim.frames import Floats, Frame
 
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
-
-_BOTH_WAYS = np.concatenate([BOX_EDGES, BOX_EDGES[:, ::-1]])
 
 
 @dataclass(frozen=True)
@@ -88,10 +86,10 @@ class PinholeCamera:
         """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where they reach
         beyond it; NaN for a box wholly behind NEAR_M. A box that crosses that plane is cut there.
         """
-        corners = (box_corners(boxes) - self.position) @ self.axes.T
-        points = _cut(corners[:, _BOTH_WAYS[:, 0]], corners[:, _BOTH_WAYS[:, 1]])
-        pixels = self._lens[3] - self.focal * points[..., 1:] / points[..., :1]
-        return np.concatenate([np.fmin.reduce(pixels, axis=1), np.fmax.reduce(pixels, axis=1)], axis=1)
+        from care_sim.lenses import rectangles
+
+        spans: Floats = rectangles(np.ascontiguousarray(boxes, dtype=float), self._lens, NEAR_M)
+        return spans
 
     @cached_property
     def _lens(self) -> tuple[Floats, Floats, float, Floats]:
@@ -120,12 +118,3 @@ class Lenses(NamedTuple):
 
         bundles: Floats = box_rays(np.ascontiguousarray(boxes), np.ascontiguousarray(cameras), self)
         return bundles
-
-
-def _cut(points: Floats, others: Floats) -> Floats:
-    """`points` (..., 3: depth, left, up), moved along the line to `others` up to NEAR_M; NaN if both lie behind."""
-    depth, far = points[..., 0], others[..., 0]
-    behind = depth < NEAR_M
-    span = np.where(behind & (far >= NEAR_M), far - depth, np.nan)
-    share = np.where(behind, (NEAR_M - depth) / span, 0.0)
-    return points + (others - points) * share[..., None]

@@ -8,6 +8,7 @@ import numpy as np
 from care_sim.conditions import Sensing
 from care_sim.film import Sights
 from care_sim.frames import Floats
+from care_sim.lenses import window_around
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera_faults import Delay, Ghosts, Misses, mounted
 from care_sim.sensors.paint import tally
@@ -31,15 +32,8 @@ FULL_CONFIDENCE = 3 * MIN_PIXELS
 
 def window_on(camera: PinholeCamera, boxes: Floats) -> Window:
     """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in view."""
-    rectangles = camera.project_boxes(boxes)
-    low = np.clip(np.floor(rectangles[:, :2]) - 1, 0, None)
-    high = np.clip(np.ceil(rectangles[:, 2:]) + 1, None, (camera.width, camera.height))
-    visible = np.all(low < high, axis=1)
-    if not visible.any():
-        return 0, 0, 0, 0
-    left, top = low[visible].min(axis=0).astype(int).tolist()
-    right, bottom = high[visible].max(axis=0).astype(int).tolist()
-    return left, top, right, bottom
+    held: Window = window_around(camera.project_boxes(boxes), camera.width, camera.height)
+    return held
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,10 @@
 
 import gymnasium
 import numpy as np
+import pytest
+
+from care_sim.sensors.engines import Bullet
+from care_sim.sensors.fast import Fast
 
 BEHIND = (-15.0, 1.0, 0.0)
 
@@ -40,12 +44,12 @@ def test_moving_what_a_fired_ray_touches_changes_the_scan():
     assert not np.array_equal(near[0]["ranges"], far[0]["ranges"])
 
 
-def test_only_fired_cells_are_cast(monkeypatch):
-    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.05).unwrapped
+@pytest.mark.parametrize(("name", "engine"), [("bullet", Bullet), ("fast", Fast)])
+def test_only_fired_cells_are_cast(monkeypatch, name, engine):
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.05, engine=name).unwrapped
     env.reset(seed=0)
-    counts = []
-    cast = env.loop.world.bullet.cast
-    monkeypatch.setattr(env.loop.world.bullet, "cast", lambda *given: counts.append(len(given[1])) or cast(*given))
+    counts, cast = [], engine.cast
+    monkeypatch.setattr(engine, "cast", lambda *given: counts.append(len(given[2])) or cast(*given))
     for _ in range(3):
         env.step(env.action_space.sample())
     assert counts == [819, 819, 819]
