@@ -86,7 +86,7 @@ def rectangles(boxes, lens, nearest):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def window_around(spans, width, height):  # type: ignore[no-untyped-def]
-    """Left, top, right, bottom of the whole pixels, and one more on each side, that hold `spans` (n, 4) in a picture."""
+    """Left, top, right, bottom: the whole pixels of a picture that hold `spans` (n, 4), and one more on each side."""
     left, top, right, bottom = width, height, 0, 0
     for span in spans:
         if span[0] <= span[2]:
