@@ -1,12 +1,10 @@
-"""Memory of a worker: a fresh process that begins episode after episode."""
-
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+"""Memory of a worker of the studies, which begins episode after episode."""
 
 from care_sim.bench.config import BenchConfig
 from care_sim.bench.driven import driven
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.episode import peak_rss_mb
+from care_sim.study.executors import processes
 
 Memory = dict[str, float]
 
@@ -15,7 +13,7 @@ def worker_memory(config: BenchConfig) -> Memory:
     """Peak memory in MB of a worker: `imported` when it has its libraries, `early_mb` after a tenth of the resets,
     `peak_mb` after all of them, `resets` in number. A step follows every reset.
     """
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    with processes(1) as pool:
         return pool.submit(_resets, config.episode, config.resets).result()
 
 
