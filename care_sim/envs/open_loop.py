@@ -50,7 +50,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     ### Arguments
     `budget` beta in (0, 1]; `detector` by name (`care_sim.perception.registry.detector_names`) and
     `detector_parameters`; any field of `care_sim.conditions.Conditions` but those for which the scene would have to
-    be filmed anew: an error of the cameras' mount, the ray engine. `min_returns` is the `returns` detector's. A value
+    be filmed anew: an error of the cameras' mount, the engine. `min_returns` is the `returns` detector's. A value
     that is not allowed raises `care_sim.InvalidInput`.
     """
 

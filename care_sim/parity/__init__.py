@@ -1,4 +1,4 @@
-"""Whether the compiled ray engine answers as Bullet does: `care-sim parity`."""
+"""Whether the engine `fast` answers as Bullet does: `care-sim parity`."""
 
 from care_sim.parity.config import ParityConfig
 from care_sim.parity.run import run

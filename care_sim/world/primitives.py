@@ -1,4 +1,4 @@
-"""The bodies of a world as flat arrays: what a compiled ray engine reads without asking about each body."""
+"""The bodies of a world as flat arrays: what a compiled engine reads without asking about each body."""
 
 from collections.abc import Sequence
 
