@@ -59,13 +59,19 @@ class AngularGrid:
         return (self.top - self.bottom) / (self.rows - 1)
 
     @cached_property
+    def fan(self) -> tuple[Floats, Floats]:
+        """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of every row (rows, 2)."""
+        azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
+        elevations = np.linspace(self.top, self.bottom, self.rows)
+        across, down = (np.stack([np.cos(angles), np.sin(angles)], axis=1) for angles in (azimuths, elevations))
+        return across, down
+
+    @cached_property
     def directions(self) -> Floats:
         """(N, 3) unit vectors of the rays, one through the centre of every cell."""
-        azimuth = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
-        elevation = np.linspace(self.top, self.bottom, self.rows)
-        el, az = np.meshgrid(elevation, azimuth, indexing="ij")
-        directions = np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=-1)
-        directions = directions.reshape(-1, 3)
+        (cos_az, sin_az), (cos_el, sin_el) = (angles.T for angles in self.fan)
+        level = np.broadcast_to(sin_el[:, None], self.shape)
+        directions = np.stack([np.outer(cos_el, cos_az), np.outer(cos_el, sin_az), level], axis=-1).reshape(-1, 3)
         directions.flags.writeable = False
         return directions
 

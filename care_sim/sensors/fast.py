@@ -7,7 +7,7 @@ from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.sensors.paint import paint
 from care_sim.sensors.rays import scan
-from care_sim.sensors.windows import placed, windows
+from care_sim.sensors.windows import seen_from
 from care_sim.world.bullet import FAR_M, BulletWorld, Integers, Window
 
 
@@ -19,23 +19,23 @@ class Fast:
 
     def __init__(self, world: BulletWorld, grid: AngularGrid):
         self._world = world
-        self._rays = (grid.directions, grid.shape, float(grid.range_m))
+        self._rays = (grid.fan, float(grid.range_m))
         self._lattice = (grid.columns, grid.rows, float(grid.top), float(grid.row_height))
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
-        if np.any(cells[1:] < cells[:-1]):
+        if (cells[1:] < cells[:-1]).any():
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])
             return ranges[np.argsort(order)], ids[np.argsort(order)]
-        parts = self._world.primitives
+        world, parts = self._world, self._world.primitives
         stance = np.array((sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.roll, sensor.pitch), float)
-        centres, turns, up = placed(stance, parts.offsets, parts.owners, parts.poses)
-        bounds = windows(centres, turns, parts.halves, self._lattice)
-        road = (up, float(sensor.z), self._world.ground)
-        solids = (parts.shapes, parts.halves, parts.owners)
+        up, centres, turns, windows = seen_from(
+            stance, (parts.halves, parts.offsets, parts.owners), parts.poses, self._lattice
+        )
+        road, solids = (up, float(sensor.z), world.ground), (parts.shapes, parts.halves, parts.owners)
         result: tuple[Floats, Integers] = scan(
-            np.ascontiguousarray(cells), *self._rays, road, solids, (centres, turns), bounds
+            np.ascontiguousarray(cells), *self._rays, road, solids, (centres, turns), windows
         )
         return result
 

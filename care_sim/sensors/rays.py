@@ -16,19 +16,20 @@ BOX, CYLINDER, SPHERE = range(3)
 
 
 @njit(cache=True, error_model="numpy")
-def scan(cells, directions, shape, reach, road, parts, stances, bounds):  # type: ignore[no-untyped-def]
+def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-untyped-def]
     """Ranges (n,) of ascending `cells`, inf beyond `reach`, and body ids (n,), NOTHING there.
 
-    `directions` (N, 3) and `shape` (rows, columns) are the grid's; `road` is the world's up (3,) in the frame of the
-    sensor, its height and the body id of the plane z = 0 (NOTHING without). `parts` are their shapes, half extents
-    and body ids, `stances` their centres and axes, `bounds` their windows, both of `care_sim.sensors.windows`.
+    `fan` is the grid's (smaller than its directions, and so nearer at hand); `road` is the world's up (3,) in the frame
+    of the sensor, its height and the body id of the plane z = 0 (NOTHING without). `parts` are their shapes, half
+    extents and body ids, `stances` their centres and axes, `windows` their windows, both of
+    `care_sim.sensors.windows`.
     """
-    rows, columns = shape
     shapes, halves, owners = parts
     centres, turns = stances
-    ranges, ids = _road(cells, directions, reach, road)
-    starts = _row_starts(cells, rows, columns)
-    for part, (first, last, upper, lower) in enumerate(bounds):
+    columns = len(fan[0])
+    starts = _row_starts(cells, len(fan[1]), columns)
+    ranges, ids = _road(cells, starts, fan, reach, road)
+    for part, (first, last, upper, lower) in enumerate(windows):
         turn = _triple(turns[part, 0]), _triple(turns[part, 1]), _triple(turns[part, 2])
         solid = shapes[part], turn, _triple(halves[part]), _start(turn, _triple(centres[part]))
         for row in range(upper, lower + 1):
@@ -36,7 +37,7 @@ def scan(cells, directions, shape, reach, road, parts, stances, bounds):  # type
             ahead = _first_from(cells, begin + first, low, high)
             for place, end in ((low, begin + last - columns), (ahead, begin + last)):
                 while place < high and cells[place] <= end:
-                    distance = _entry(solid, _ray(directions, cells[place]))
+                    distance = _entry(solid, _ray(fan, row, cells[place] - begin))
                     if distance < ranges[place] and distance <= reach:
                         ranges[place], ids[place] = distance, owners[part]
                     place += 1
@@ -44,15 +45,16 @@ def scan(cells, directions, shape, reach, road, parts, stances, bounds):  # type
 
 
 @njit(cache=True, error_model="numpy")
-def _road(cells, directions, reach, road):  # type: ignore[no-untyped-def]
+def _road(cells, starts, fan, reach, road):  # type: ignore[no-untyped-def]
     """What the rays meet in a world of road alone."""
     up, height, ground = road
     ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NOTHING)
     if ground != NOTHING:
-        for n, cell in enumerate(cells):
-            distance = -height / _dot(up, _ray(directions, cell))
-            if 0.0 <= distance <= reach:
-                ranges[n], ids[n] = distance, ground
+        for row in range(len(starts) - 1):
+            for n in range(starts[row], starts[row + 1]):
+                distance = -height / _dot(up, _ray(fan, row, cells[n] - row * len(fan[0])))
+                if 0.0 <= distance <= reach:
+                    ranges[n], ids[n] = distance, ground
     return ranges, ids
 
 
@@ -78,8 +80,10 @@ def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _ray(directions, cell):  # type: ignore[no-untyped-def]
-    return directions[cell, 0], directions[cell, 1], directions[cell, 2]
+def _ray(fan, row, column):  # type: ignore[no-untyped-def]
+    """The direction of a cell."""
+    across, down = fan
+    return down[row, 0] * across[column, 0], down[row, 0] * across[column, 1], down[row, 1]
 
 
 @njit(cache=True)

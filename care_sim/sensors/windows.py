@@ -13,11 +13,22 @@ MARGIN = 1
 
 
 @njit(cache=True)
-def placed(sensor, offsets, owners, poses):  # type: ignore[no-untyped-def]
+def seen_from(sensor, parts, poses, lattice):  # type: ignore[no-untyped-def]
     """Parts in the frame of a sensor at `sensor`: x, y, z, yaw, roll, pitch of a `care_sim.frames.Frame`.
 
-    Returns their centres (k, 3), their own axes (k, 3, 3), row i axis i, and the world's up (3,).
+    `parts` are their half extents, offsets and body ids, `lattice` the grid's columns, rows, top and row height.
+    Returns the world's up (3,), their centres (k, 3), their own axes (k, 3, 3), row i axis i, and their windows (k, 4):
+    first and last column and row of the angular rectangle of the box that holds each. The first column lies on the
+    grid, the last up to a turn beyond it; the first row lies below the last where a part covers none.
     """
+    halves, offsets, owners = parts
+    centres, turns, up = _placed(sensor, offsets, owners, poses)
+    return up, centres, turns, _windows(centres, turns, halves, lattice)
+
+
+@njit(cache=True)
+def _placed(sensor, offsets, owners, poses):  # type: ignore[no-untyped-def]
+    """Centres, axes and up."""
     centres, turns = np.empty((len(owners), 3)), np.empty((len(owners), 3, 3))
     axes = _sensor_axes(sensor[3], sensor[4], sensor[5])
     for part, owner in enumerate(owners):
@@ -33,12 +44,7 @@ def placed(sensor, offsets, owners, poses):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def windows(centres, turns, halves, lattice):  # type: ignore[no-untyped-def]
-    """(k, 4) first and last column and row of the angular rectangle of the box that holds each part.
-
-    `lattice` is the grid's columns, rows, top and row height. The first column lies on the grid, the last up to a
-    turn beyond it; the first row lies below the last where a part covers none.
-    """
+def _windows(centres, turns, halves, lattice):  # type: ignore[no-untyped-def]
     bounds, corners = np.empty((len(centres), 4), np.int64), np.empty((8, 3))
     for part, centre in enumerate(centres):
         _lay_corners(centre, turns[part], halves[part], corners)
