@@ -53,23 +53,22 @@ class Picture:
 
     def shows(self, body: int) -> bool:
         """Whether enough of a body is visible for a box."""
-        return bool(np.any((self.bodies == body) & (self.pixels >= MIN_PIXELS)))
+        return bool(((self.bodies == body) & (self.pixels >= MIN_PIXELS)).any())
 
 
 def sights_of(pictures: Sequence[Picture], labels: Mapping[int, int]) -> Sights:
     """What the unimpaired camera detector reports of pictures, one a camera of the rig: a box for every body that
     `labels` maps to a class and that shows enough pixels.
     """
-    rows, bodies = [np.empty((0, len(ImageDetections.COLUMNS)))], [np.empty(0, np.int64)]
+    rows, bodies = [], []
     for camera, picture in enumerate(pictures):
-        known = np.array([body in labels for body in picture.bodies.tolist()], dtype=bool)
-        seen = known & (picture.pixels >= MIN_PIXELS)
-        bodies.append(picture.bodies[seen])
-        classes = np.array([labels[body] for body in bodies[-1].tolist()], dtype=np.int64)
-        pixels, zeros = picture.pixels[seen], np.zeros(len(classes))
-        confidences = pixels / (pixels + FULL_CONFIDENCE)
-        rows.append(np.column_stack([classes, confidences, picture.boxes[seen], zeros + camera, zeros, zeros]))
-    return Sights(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(bodies))
+        columns = picture.bodies.tolist(), picture.boxes.tolist(), picture.pixels.tolist()
+        for body, box, pixels in zip(*columns, strict=True):
+            if body in labels and pixels >= MIN_PIXELS:
+                rows.append((labels[body], pixels / (pixels + FULL_CONFIDENCE), *box, camera, 0.0, 0.0))
+                bodies.append(body)
+    table = np.array(rows, float).reshape(-1, len(ImageDetections.COLUMNS))
+    return Sights(ImageDetections.from_rows(table), np.array(bodies, np.int64))
 
 
 class CameraDetector:
@@ -101,8 +100,12 @@ class CameraDetector:
 
         `ranges` (n,) are the distances of the objects in metres, in their order.
         """
-        missed = np.isin(sights.objects, self._objects[self._misses.draw(ranges)])
-        rows = np.concatenate([sights.detections.rows()[~missed], self._ghosts.draw().rows()])
+        missed, ghosts = self._misses.draw(ranges), self._ghosts.draw()
+        rows = sights.detections.rows()
+        if missed.any():
+            rows = rows[~np.isin(sights.objects, self._objects[missed])]
+        if len(ghosts):
+            rows = np.concatenate([rows, ghosts.rows()])
         kept = rows[(rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))]
         surest_first = kept[np.lexsort((kept[:, 2], -kept[:, 1]))]
         return self._delay.newest(ImageDetections.from_rows(surest_first), heading)
