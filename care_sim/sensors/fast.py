@@ -43,7 +43,6 @@ class Fast:
         """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
         eye, axes = camera.stance(sensor)
         lens = camera.focal, camera.width / 2, camera.height / 2
-        looks = self._world.looks
-        meshes = (looks.corners, looks.faces, looks.edges, looks.starts, looks.owners)
-        ids: Integers = paint((eye, axes), lens, window, (NEAR_M, FAR_M), meshes, self._world.primitives.poses)
+        meshes, poses = self._world.looks.tables, self._world.primitives.poses
+        ids: Integers = paint((eye, axes), lens, window, (NEAR_M, FAR_M), meshes, poses)
         return ids

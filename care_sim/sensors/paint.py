@@ -16,15 +16,15 @@ NOTHING = -1
 
 
 @njit(cache=True, error_model="numpy")
-def paint(camera, lens, window, reach, looks, poses):  # type: ignore[no-untyped-def]
+def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untyped-def]
     """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NOTHING where none is.
 
     `camera` is its place in the world (3,) and its axes forward, left and up (3, 3); `lens` its focal length and
-    principal point in pixels; `reach` the least and the greatest depth drawn in metres; `looks` corners, faces,
-    edges, starts and owners of `care_sim.world.looks.Looks`; `poses` (m, 7) of bodies by id.
+    principal point in pixels; `reach` the least and the greatest depth drawn in metres; `meshes` the tables
+    of `care_sim.world.looks.Looks`; `poses` (m, 7) of bodies by id.
     """
     left, top, right, bottom = window
-    corners, faces, edges, starts, owners = looks
+    corners, faces, edges, starts, owners = meshes
     ids = np.full((bottom - top, right - left), NOTHING)
     inverse_depths = np.full(ids.shape, 1.0 / reach[1])
     for part, owner in enumerate(owners):
@@ -34,7 +34,7 @@ def paint(camera, lens, window, reach, looks, poses):  # type: ignore[no-untyped
         upper, lower = max(upper, top), min(lower, bottom)
         if upper < lower:
             planes = _planes(faces[begin[1] : end[1]], turn, shift, lens)
-            towards, outline = _outline(planes, edges[begin[2] : end[2]] - begin[1])
+            towards, outline = _outline(planes, edges[begin[2] : end[2]])
             for row in range(upper, lower):
                 first, last = _span(outline, row + 1.0, left, right)
                 for column in range(first, last):

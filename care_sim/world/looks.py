@@ -19,38 +19,51 @@ SAME_FACE = 9
 """Decimals to which two triangles of one face agree."""
 
 Integers = NDArray[np.int64]
+Mesh = tuple[Floats, Floats, Integers]
+Tables = tuple[Floats, Floats, Integers, Integers, Integers]
+
+_NOTHING: Mesh = np.empty((0, 3)), np.empty((0, 4)), np.empty((0, 2), np.int64)
 
 
 class Looks:
-    """Every part that cameras see, as a polyhedron in the frame of its body.
-
-    `corners` (c, 3) in metres; `faces` (f, 4) outward unit normals and distances from the body's origin in metres;
-    `edges` (e, 2) the two faces that meet in each. Part n owns the rows starts[n] to starts[n + 1] of the three, and
-    is one of body `owners`[n].
-    """
+    """Every part that cameras see, as a polyhedron in the frame of its body."""
 
     def __init__(self) -> None:
-        self.corners, self.faces = np.empty((0, 3)), np.empty((0, 4))
-        self.edges = np.empty((0, 2), np.int64)
-        self.starts = np.zeros((1, 3), np.int64)
-        self.owners = np.empty(0, np.int64)
+        self._owners: list[int] = []
+        self._meshes: list[Mesh] = []
+        self._tables: Tables | None = None
 
     def add(self, body: int, parts: Sequence[Part]) -> None:
         """Take in what is seen of a body, its parts in its own frame."""
-        for part in parts:
-            corners, faces, edges = polyhedron(part.shape, part.size)
-            centre = np.array(part.centre)
-            shifted = np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre])
-            self.corners = np.vstack([self.corners, corners + centre])
-            self.edges = np.vstack([self.edges, edges + len(self.faces)])
-            self.faces = np.vstack([self.faces, shifted])
-            self.starts = np.vstack([self.starts, [len(self.corners), len(self.faces), len(self.edges)]])
-            self.owners = np.append(self.owners, body)
+        self._owners += [body] * len(parts)
+        self._meshes += map(_mesh, parts)
+        self._tables = None
+
+    @property
+    def tables(self) -> Tables:
+        """All parts in one: corners (c, 3) in metres; faces (f, 4) outward unit normals and distances from the body's
+        origin in metres; edges (e, 2) the two faces that meet in each, counted within the part; (k + 1, 3) where the
+        rows of each part begin in these three; (k,) body ids.
+        """
+        if self._tables is None:
+            lengths = np.array([[len(column) for column in mesh] for mesh in self._meshes], np.int64).reshape(-1, 3)
+            starts = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(lengths, axis=0)])
+            corners, faces, edges = (np.concatenate(column) for column in zip(_NOTHING, *self._meshes, strict=True))
+            self._tables = corners, faces, edges, starts, np.array(self._owners, np.int64)
+        return self._tables
 
 
 @cache
-def polyhedron(shape: str, size: tuple[float, float, float]) -> tuple[Floats, Floats, Integers]:
-    """Corners, faces and edges of a primitive about its centre; see `Looks`."""
+def _mesh(part: Part) -> Mesh:
+    """A part's polyhedron in the frame of its body."""
+    corners, faces, edges = polyhedron(part.shape, part.size)
+    centre = np.array(part.centre)
+    return corners + centre, np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre]), edges
+
+
+@cache
+def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
+    """Corners, faces and edges of a primitive about its centre; see `Looks.tables`."""
     corners = _corners(shape, np.array(size))
     hull = ConvexHull(corners)
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
