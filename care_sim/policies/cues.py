@@ -93,7 +93,6 @@ class Cues:
         """(N,) whether a far point in the direction of a cell lies in a picture."""
         covered = np.zeros(self.rig.grid.size, bool)
         for camera in self.rig.cameras:
-            pixels, depths = camera.project(self.rig.grid.directions * self.rig.grid.range_m)
-            inside = (pixels >= 0) & (pixels <= (camera.width, camera.height))
-            covered |= (depths > 0) & inside.all(axis=1)
+            pixels, _ = camera.project(self.rig.grid.directions * self.rig.grid.range_m)
+            covered |= ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
         return covered

@@ -78,6 +78,16 @@ def test_weights_that_do_not_fit_are_refused_with_what_they_are(saved, kind, rig
     assert "\n" not in str(refusal.value)
 
 
+class Trap:
+    """Makes a file when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (self.path,)
+
+
 def pickled(path: Path) -> None:
     np.savez(path, card=np.array([print], object))
 
@@ -150,6 +160,14 @@ def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
     with pytest.raises(InvalidInput, match=r"spoilt\.npz: not a file of weights, or damaged") as refusal:
         load(path)
     assert "\n" not in str(refusal.value)
+
+
+def test_what_would_run_when_it_is_unpickled_does_not_run(tmp_path):
+    card, sprung = np.frombuffer(CARD.to_json().encode(), np.uint8), tmp_path / "sprung"
+    np.savez(tmp_path / "w.npz", card=card, weight=np.array([Trap(sprung)], object))
+    with pytest.raises(InvalidInput, match="allow_pickle=False"):
+        load(tmp_path / "w.npz")
+    assert not sprung.exists()
 
 
 def test_a_missing_file_is_named(tmp_path):
