@@ -75,6 +75,11 @@ class Parity:
     """Hold the engine fast against Bullet: rays of random scenes and of every keyframe, pictures, whole episodes."""
 
 
+@dataclass(frozen=True)
+class Train:
+    """Train a learned policy: learned-scorer."""
+
+
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
@@ -91,6 +96,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "scenarios": Scenarios,
     "bench": Bench,
     "parity": Parity,
+    "train": Train,
 }
 
 MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig"}
@@ -120,8 +126,16 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 def _command(arguments: list[str]) -> int:
     if arguments and arguments[0] in MEASURES:
         return _measure(*arguments)
+    if arguments[:1] == ["train"]:
+        commands = importlib.import_module("care_sim.training").COMMANDS
+        return _chosen_of(commands, "care-sim train", Train.__doc__, arguments[1:])
+    return _chosen_of(COMMANDS, "care-sim", ABOUT, arguments)
+
+
+def _chosen_of(commands: dict[str, Callable[..., Any]], prog: str, about: str | None, arguments: list[str]) -> int:
+    """Run the command that the arguments name."""
     command = _in_one_line(
-        lambda: tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="care-sim", description=ABOUT, args=arguments)
+        lambda: tyro.extras.subcommand_cli_from_dict(commands, prog=prog, description=about, args=arguments)
     )
     return int(command())
 

@@ -27,8 +27,9 @@ SESSION = uuid4().hex
 
 
 def code_digest() -> str:
-    """Hash of the package's sources, so that no row of an edited program passes for a new one."""
-    return _content_digest(Path(care_sim.__file__).parent, "*.py")
+    """Hash of the package's sources and weights, so that no row of an edited program passes for a new one."""
+    root = Path(care_sim.__file__).parent
+    return _combined(_content_digest(root, pattern) for pattern in ("*.py", "*.npz"))
 
 
 def policy_digest(policy: str) -> str | None:

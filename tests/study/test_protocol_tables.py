@@ -148,7 +148,7 @@ def test_statements_are_judged_at_the_papers_budgets():
     assert overall["care minus history"][5:] == ("-10.0 not met (+0.6)", "[-10.0,-10.0]")
     assert overall["care minus all-camera"][1] == "+0.0 undecided (-0.13)"
     assert table.notes[0] == "Of 27, each budget counted: 20 met, 1 not met, 6 undecided."
-    assert any("not played: uncertainty, beam-reduce, learned" in note for note in table.notes)
+    assert any("not played: uncertainty, beam-reduce, learned-scorer" in note for note in table.notes)
     assert "the paper's statements" not in tables(study(FOUND, budgets=(0.05,)))
     assert "the paper's statements" not in tables(study(FOUND, reserve_fraction=0.5))
 

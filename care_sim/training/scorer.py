@@ -1,0 +1,145 @@
+"""Train the learned scorer: `care-sim train learned-scorer` makes the shipped weights from nothing.
+
+The paper names no network and no loss. Both are the plainest that do: one hidden layer of rectified units for every
+cell by itself, and the weighted logistic loss of `care_sim.training.scorer_data`, whose best score orders the cells by
+the odds that they find an object. Adam runs a fixed number of steps over shuffled batches, its rate falling to 0 along
+a half cosine. One thread and fixed seeds: the same machine makes the same bytes.
+"""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.errors import check_whole
+from care_sim.extras import import_torch
+from care_sim.grid import AngularGrid
+from care_sim.policies.weights import Arrays, Card, machine, save, versions
+from care_sim.streets.street import CALIBRATION_SEEDS
+from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples
+
+UNITS = 16
+"""As many as score a keyframe within half a millisecond on one core."""
+BATCH = 4096
+RATE = 3e-3
+HELD_OUT = tuple(range(2000, 2004))
+"""Streets that belong neither to the calibration nor to the evaluation: the card tells the loss on them."""
+
+
+@dataclass(frozen=True)
+class TrainScorer:
+    """Train `learned-scorer` on the 20 calibration streets and write its weights; needs the extra `rl`."""
+
+    out: Path
+    """File to write."""
+    seed: int = 0
+    """Of the first weights and the order of the examples."""
+    steps: int = 4000
+    """Batches that are learned from."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        check_whole("seed", self.seed, 0)
+        check_whole("steps", self.steps, 1)
+        import_torch()
+        self.out.parent.mkdir(parents=True, exist_ok=True)
+        started = time.perf_counter()
+        learned, held_out = (_gathered(name, seeds) for name, seeds in _STREETS.items())
+        arrays, losses = train(learned, held_out, self.seed, self.steps)
+        save(self.out, arrays, _card(self, learned, losses))
+        told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
+        print(f"{self.out}: loss {told}; {time.perf_counter() - started:.0f} s")
+        return 0
+
+
+_STREETS = {"calibration": CALIBRATION_SEEDS, "held out": HELD_OUT}
+
+
+def train(learned: Examples, held_out: Examples, seed: int, steps: int) -> tuple[Arrays, dict[str, float]]:
+    """The weights, and the loss on both sets of examples (log 2 = 0.69 without any knowledge)."""
+    torch = import_torch()
+    with _one_thread(torch):
+        torch.manual_seed(seed)
+        network = torch.nn.Sequential(
+            torch.nn.Linear(learned.inputs.shape[1], UNITS), torch.nn.ReLU(), torch.nn.Linear(UNITS, 1, bias=False)
+        )
+        _descend(torch, network, learned, np.random.default_rng(seed), steps)
+        losses = {
+            name: _loss_of(torch, network, data) for name, data in zip(_STREETS, (learned, held_out), strict=True)
+        }
+    layer, bias, out = (parameter.detach().numpy() for parameter in network.parameters())
+    return {"layer": layer.T, "bias": bias, "out": out[0]}, losses
+
+
+def _descend(torch: Any, network: Any, learned: Examples, rng: np.random.Generator, steps: int) -> None:
+    optimizer = torch.optim.Adam(network.parameters(), lr=RATE)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
+    for rows in _batches(rng, len(learned), steps):
+        optimizer.zero_grad()
+        _loss(torch, network, learned, rows).backward()
+        optimizer.step()
+        schedule.step()
+
+
+def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArray[np.int64]]:
+    """Rows of so many batches; every example comes once before one comes again."""
+    size, order = min(BATCH, count), np.empty(0, np.int64)
+    for _ in range(steps):
+        if len(order) < size:
+            order = rng.permutation(count)
+        batch, order = np.split(order, [size])
+        yield batch
+
+
+def _loss(torch: Any, network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
+    """The weighted logistic loss over some examples."""
+    inputs, positive, weigh = (torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weigh))
+    scores = network(inputs)[:, 0]
+    return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weigh)
+
+
+def _loss_of(torch: Any, network: Any, data: Examples) -> float:
+    with torch.no_grad():
+        return float(_loss(torch, network, data, np.arange(len(data))))
+
+
+def _gathered(name: str, seeds: tuple[int, ...]) -> Examples:
+    plays: list[Examples] = []
+    for number, seed in enumerate(seeds, 1):
+        print(f"{name} street {number} of {len(seeds)}", end="\r", file=sys.stderr, flush=True)
+        plays += examples([seed])
+    return balanced(plays)
+
+
+def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Card:
+    budgets = ", ".join(f"{budget:g}" for budget in BUDGETS)
+    positive = int(learned.positive.sum())
+    return Card(
+        "learned-scorer",
+        asdict(AngularGrid()),
+        scenario="CARE-Street-v0",
+        data=f"{len(learned)} cells, {positive} of them positive, of generated streets under history at {budgets} of "
+        f"the cells, with six cameras and with the front one; {OTHERS} others a keyframe",
+        seeds={name: list(seeds) for name, seeds in _STREETS.items()} | {"training": made.seed},
+        steps=made.steps,
+        machine=machine(),
+        versions=versions("care-sim", "numpy", "torch"),
+        result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
+    )
+
+
+@contextmanager
+def _one_thread(torch: Any) -> Iterator[None]:
+    """Sums in one order, whatever the machine has."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)

@@ -1,0 +1,88 @@
+"""The training of the learned scorer: it learns, and makes the same bytes again."""
+
+import numpy as np
+import pytest
+
+from care_sim.cli import main
+from care_sim.policies.cues import CUES, OUTLOOKS
+from care_sim.policies.weights import load
+from care_sim.training import scorer
+from care_sim.training.scorer_data import Examples
+
+torch = pytest.importorskip("torch")
+INPUTS = CUES + len(OUTLOOKS)
+
+
+def drawn(seed, count=3000):
+    """Examples that are positive, mostly, where the first cue is."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.random((count, INPUTS)).astype(np.float32).round()
+    positive = (inputs[:, 0] > 0) != (rng.random(count) < 0.1)
+    return Examples(inputs, positive, np.ones(count, np.float32))
+
+
+def test_it_learns_what_there_is_to_learn():
+    """One label in ten is wrong: the loss cannot fall below 0.325, the entropy of that."""
+    arrays, losses = scorer.train(drawn(0), drawn(1), 0, 300)
+    assert {name: array.shape for name, array in arrays.items()} == {
+        "layer": (INPUTS, scorer.UNITS), "bias": (scorer.UNITS,), "out": (scorer.UNITS,),
+    }  # fmt: skip
+    assert losses["held out"] == pytest.approx(0.325, abs=0.06)
+    cues = np.zeros((2, INPUTS), np.float32)
+    cues[1, 0] = 1
+    less, more = np.maximum(cues @ arrays["layer"] + arrays["bias"], 0) @ arrays["out"]
+    assert more > less + 1
+
+
+def test_every_example_comes_once_before_one_comes_again(monkeypatch):
+    monkeypatch.setattr(scorer, "BATCH", 4)
+    batches = [rows.tolist() for rows in scorer._batches(np.random.default_rng(0), 12, 5)]
+    assert [len(rows) for rows in batches] == [4] * 5
+    assert sorted(batches[0] + batches[1] + batches[2]) == list(range(12))
+    assert batches[3] + batches[4] != batches[0] + batches[1]
+
+
+def test_training_does_not_depend_on_the_threads_and_gives_them_back():
+    before = torch.get_num_threads()
+    made = []
+    for threads in (1, 2):
+        torch.set_num_threads(threads)
+        made.append(scorer.train(drawn(0), drawn(1), 0, 20)[0])
+        assert torch.get_num_threads() == threads
+    torch.set_num_threads(before)
+    for name, array in made[0].items():
+        assert np.array_equal(array, made[1][name])
+    other, _ = scorer.train(drawn(0), drawn(1), 1, 20)
+    assert not np.array_equal(made[0]["layer"], other["layer"])
+
+
+def trained(path, monkeypatch, *options):
+    monkeypatch.setattr(scorer, "_STREETS", {"calibration": (2000,), "held out": (2001,)})
+    monkeypatch.setattr(scorer, "examples", lambda seeds: [drawn(seed) for seed in seeds])
+    with pytest.raises(SystemExit) as end:
+        main(["train", "learned-scorer", "--out", str(path), *options])
+    return end.value.code
+
+
+def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypatch, capsys):
+    for name in ("one.npz", "two.npz"):
+        assert trained(tmp_path / "new" / name, monkeypatch, "--steps", "20", "--seed", "3") == 0
+    one, two = (tmp_path / "new" / name for name in ("one.npz", "two.npz"))
+    assert one.read_bytes() == two.read_bytes()
+    card = load(one).card
+    assert (card.kind, card.steps, card.seeds["training"]) == ("learned-scorer", 20, 3)
+    assert card.versions["torch"] == torch.__version__
+    assert set(card.result) == {"loss calibration", "loss held out"}
+    assert f"{one}: loss calibration" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [(("--steps", "0"), "steps must be a whole number >= 1, got 0"), (("--sead", "0"), "--sead")],
+)
+def test_bad_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, options, message):
+    assert trained(tmp_path / "w.npz", monkeypatch, *options) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.startswith("care-sim: ")
+    assert error.count("\n") == 1

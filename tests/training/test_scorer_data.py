@@ -1,0 +1,84 @@
+"""What the learned scorer learns from, on a street that belongs to no list."""
+
+import numpy as np
+import pytest
+
+from care_sim.envs.open_loop import FilmEnv
+from care_sim.policies.cues import CUES, OUTLOOKS
+from care_sim.streets.recording import record
+from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
+from care_sim.training.scorer import HELD_OUT
+from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples, front_alone, untracked_cells
+
+
+@pytest.fixture(scope="module")
+def film():
+    return record(make_street(2000))
+
+
+def of_objects(shot, cells):
+    """How many of the cells lie on each annotated object within 50 m."""
+    in_range = np.hypot(shot.annotations.boxes[:, 0], shot.annotations.boxes[:, 1]) <= 50
+    return {
+        number: len(np.intersect1d(shot.cloud.cells[shot.cloud.objects == number], cells))
+        for number in shot.annotations.objects[in_range].tolist()
+    }
+
+
+def test_nobody_learns_from_the_streets_of_the_evaluation():
+    assert set(HELD_OUT).isdisjoint({*EVALUATION_SEEDS, *CALIBRATION_SEEDS})
+
+
+def test_before_the_first_scan_every_object_is_untracked_and_weighs_1(film):
+    env = FilmEnv(film, budget=0.1)
+    env.reset(seed=0)
+    cells, shares = untracked_cells(env.loop)
+    everywhere = of_objects(env.loop.shot, np.arange(env.rig.grid.size))
+    expected = {number: count for number, count in everywhere.items() if count >= 3}
+    assert {n: c for n, c in of_objects(env.loop.shot, cells).items() if c} == expected
+    assert len(cells) == sum(expected.values())
+    assert shares.sum() == pytest.approx(len(expected))
+
+
+def test_what_a_full_scan_found_is_tracked_and_only_what_is_new_is_not(film):
+    env = FilmEnv(film, budget=1.0)
+    env.reset(seed=0)
+    news = 0
+    for _ in range(6):
+        found = {n for n, count in of_objects(env.loop.shot, np.arange(env.rig.grid.size)).items() if count >= 3}
+        env.step(np.ones(env.rig.grid.shape, np.float32))
+        cells, _ = untracked_cells(env.loop)
+        new = {number for number, count in of_objects(env.loop.shot, cells).items() if count}
+        assert not new & found
+        news += len(new)
+    assert news
+
+
+def test_a_front_alone_sees_what_the_first_camera_saw(film):
+    front = front_alone(film)
+    assert front.cameras == film.cameras[:1]
+    for shown, shot in zip(front.shots, film.shots, strict=True):
+        first = shot.sights.detections.cameras == 0
+        assert not shown.sights.detections.cameras.any()
+        assert np.array_equal(shown.sights.detections.boxes, shot.sights.detections.boxes[first])
+        assert np.array_equal(shown.sights.objects, shot.sights.objects[first])
+    assert sum(len(shot.sights.objects) for shot in front.shots) > 0
+
+
+def test_positive_and_other_examples_weigh_the_same_and_1_on_average():
+    inputs, positive = np.zeros((4, 2), np.float32), np.array([True, False, False, False])
+    made = Examples(inputs, positive, np.array([0.2, 1, 1, 2], np.float32))
+    weigh = balanced([made, made]).weigh
+    assert weigh == pytest.approx([2, 0.5, 0.5, 1] * 2)
+
+
+@pytest.mark.slow
+def test_a_street_gives_the_same_examples_again():
+    once, again = ([*examples([2000])] for _ in range(2))
+    assert len(once) == 2 * len(BUDGETS)
+    for one, other in zip(once, again, strict=True):
+        assert one.inputs.shape == (len(one), CUES + len(OUTLOOKS))
+        assert np.array_equal(one.inputs, other.inputs)
+        assert np.array_equal(one.weigh, other.weigh)
+        assert 39 * OTHERS < (~one.positive).sum() <= 40 * OTHERS
+        assert one.positive.any()
