@@ -118,7 +118,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         if self._over:
             info["outcome"] = asdict(outcome(self.keyframes))
         reward = sum(self._weights[name] * value for name, value in terms.items())
-        return loop.belief.to_observation(), reward, terminated, truncated, info
+        return self.observed(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
