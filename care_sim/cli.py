@@ -75,6 +75,11 @@ class Parity:
     """Hold the ray engine fast against Bullet, in random scenes and every keyframe of every scenario."""
 
 
+@dataclass(frozen=True)
+class Train:
+    """Train a learned policy on an environment: `care-sim train --help` lists the learners."""
+
+
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
@@ -91,12 +96,15 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "scenarios": Scenarios,
     "bench": Bench,
     "parity": Parity,
+    "train": Train,
 }
 
 MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig"}
 """Commands of packages that are imported for them alone, and what they are told in."""
 STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
-"""Commands that keep what they have finished."""
+KEPT = dict.fromkeys(STUDIES, "; what is finished is kept, the same command goes on from there")
+KEPT["train"] = "; what is learned is kept, the same command with --resume goes on from there"
+"""What commands that keep what they have finished say when they are interrupted."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -113,16 +121,22 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
-        kept = "; what is finished is kept, the same command goes on from there"
-        _complain(f"interrupted{kept if arguments[:1] and arguments[0] in STUDIES else ''}", INTERRUPTED)
+        _complain(f"interrupted{KEPT.get(arguments[0], '') if arguments else ''}", INTERRUPTED)
 
 
 def _command(arguments: list[str]) -> int:
     if arguments and arguments[0] in MEASURES:
         return _measure(*arguments)
-    command = _in_one_line(
-        lambda: tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="care-sim", description=ABOUT, args=arguments)
-    )
+    if arguments[:1] == ["train"]:
+        from care_sim.training import COMMANDS as LEARNERS
+
+        return _one_of(LEARNERS, "care-sim train", Train.__doc__ or "", arguments[1:])
+    return _one_of(COMMANDS, "care-sim", ABOUT, arguments)
+
+
+def _one_of(commands: dict[str, Callable[..., Any]], prog: str, about: str, arguments: list[str]) -> int:
+    parser = tyro.extras.subcommand_cli_from_dict
+    command = _in_one_line(lambda: parser(commands, prog=prog, description=about, args=arguments))
     return int(command())
 
 

@@ -1,0 +1,9 @@
+"""Training of learned policies: `care-sim train`."""
+
+from collections.abc import Callable
+from typing import Any
+
+from care_sim.training.config import Ppo, RecurrentPpo, Sac
+
+COMMANDS: dict[str, Callable[..., Any]] = {"ppo": Ppo, "sac": Sac, "recurrent-ppo": RecurrentPpo}
+"""What can be trained, by name."""
