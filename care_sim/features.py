@@ -72,7 +72,7 @@ class GridFeatures:
     def _ego(self, belief: Belief) -> NDArray[np.float32]:
         ego = belief.ego
         values = [ego.speed, ego.yaw_rate, ego.acceleration, belief.budget / self.rig.grid.size]
-        return np.clip(np.array(values, np.float32) / EGO_SCALES, -1, 1)
+        return np.asarray(np.clip(np.array(values, np.float32) / EGO_SCALES, -1, 1))
 
     @cached_property
     def _rises(self) -> NDArray[np.float64]:

@@ -9,8 +9,8 @@ KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""
 
 WEIGHTS: dict[str, float] = {"delay": 1.0, "clearance": 1.0, "collision": 10.0, "braking": 0.1, "gain": 0.0}
-"""Default weight of every term. `gain` is off, and then not measured, which costs rays, but reads 0: the reward of these
-environments was published without it."""
+"""Default weight of every term. `gain` is off, since the reward of these environments was published without it;
+then it is not measured, which would cost rays, and reads 0."""
 
 
 def weights(changes: Mapping[str, float] | None) -> dict[str, float]:

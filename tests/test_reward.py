@@ -72,7 +72,12 @@ def test_nothing_is_lost_before_a_full_scan_would_detect_nor_when_it_is_found_at
 
 
 def test_what_is_lost_until_the_detection_is_the_share_of_the_bound():
-    assert losses((16.0, True, False), (12.0, True, False), (8.0, False, True), (4.0, True, False)) == [0, 0.25, 0.25, 0]
+    assert losses((16.0, True, False), (12.0, True, False), (8.0, False, True), (4.0, True, False)) == [
+        0,
+        0.25,
+        0.25,
+        0,
+    ]
 
 
 def test_all_is_lost_without_a_detection_by_the_end_and_nothing_where_none_was_possible():

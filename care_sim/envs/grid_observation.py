@@ -48,12 +48,13 @@ class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any]):
         super().__init__(env)
         self._sensing = sensing(env)
         self.features = GridFeatures(self._sensing.rig, columns, rows)
-        self.observation_space = spaces.Dict(
+        shown: spaces.Space[Any] = spaces.Dict(
             {
                 "grid": spaces.Box(0.0, 1.0, (int(np.prod(self.features.shape)),), np.float32),
                 "ego": spaces.Box(-1.0, 1.0, (len(EGO),), np.float32),
             }
         )
+        self.observation_space = shown
 
     def observation(self, observation: Any) -> Pictures:
         """The pictures of what the unwrapped environment shows now."""

@@ -2,7 +2,7 @@
 
 from os import PathLike
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import BrokenPolicy
 from care_sim.features import GridFeatures
 from care_sim.policies.base import Policy
 from care_sim.policies.score_map import ScoreMap
@@ -19,7 +19,7 @@ class Ppo(Policy):
 
     `path` is a file of weights that `care-sim train ppo` wrote; without, those named `weights` that come with the
     package. Raises InvalidInput for weights that are missing, damaged, of another kind, or made for another grid or
-    budget.
+    budget; BrokenPolicy when the package has no such weights.
     """
 
     name = "ppo"
@@ -29,7 +29,7 @@ class Ppo(Policy):
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None, weights: str = SHIPPED):
         super().__init__(rig)
         if path is None and not shipped(weights).is_file():
-            raise InvalidInput(f"policy ppo: no weights {weights!r} come with the package; give path=FILE")
+            raise BrokenPolicy(f"policy ppo: no weights {weights!r} come with the package; give path=FILE")
         file = load(path if path is not None else shipped(weights))
         file.check(self.name, rig, file.card.wrapper)
         wrapping = Wrapping.parse(file.card.wrapper)

@@ -48,7 +48,10 @@ class ScoreMap:
         channels, rows, columns = self._shape
         padded = np.zeros((channels, rows + 2 * MARGIN, columns + 2 * MARGIN), np.float32)
         padded[:, MARGIN:-MARGIN, MARGIN:-MARGIN] = grid.reshape(self._shape)
-        padded[:, :, :MARGIN], padded[:, :, -MARGIN:] = padded[:, :, -2 * MARGIN : -MARGIN], padded[:, :, MARGIN : 2 * MARGIN]
+        padded[:, :, :MARGIN], padded[:, :, -MARGIN:] = (
+            padded[:, :, -2 * MARGIN : -MARGIN],
+            padded[:, :, MARGIN : 2 * MARGIN],
+        )
         tall, wide = self._stride
         windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[:, ::tall, ::wide]
         return windows.transpose(1, 2, 0, 3, 4).reshape(-1, self._kernel.shape[0])

@@ -33,9 +33,7 @@ class Wrapping:
                 )
 
     def __str__(self) -> str:
-        return (
-            f"{self.action} {self.azimuths} x {self.elevations}, GridObservation {self.columns} x {self.rows}"
-        )
+        return f"{self.action} {self.azimuths} x {self.elevations}, GridObservation {self.columns} x {self.rows}"
 
     @classmethod
     def parse(cls, text: str | None) -> "Wrapping":

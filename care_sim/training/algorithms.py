@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
 
-def algorithm(name: str) -> "type[BaseAlgorithm]":
-    """The class of a learner. Raises MissingExtra for one that is not installed."""
+def algorithm(name: str) -> Any:
+    """The class of a learner, a `BaseAlgorithm`. Raises MissingExtra for one that is not installed."""
     try:
         if name == "recurrent-ppo":
             from sb3_contrib import RecurrentPPO
@@ -28,7 +28,7 @@ def make(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
     """A learner that has learned nothing yet."""
     policy, options = _settings(config)
     log = str(config.out / "tensorboard") if config.tensorboard else None
-    return algorithm(config.algorithm)(
+    learner: BaseAlgorithm = algorithm(config.algorithm)(
         policy=policy,
         env=envs,
         learning_rate=config.learning_rate,
@@ -38,6 +38,7 @@ def make(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
         tensorboard_log=log,
         **options,
     )
+    return learner
 
 
 def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:

@@ -21,8 +21,9 @@ class AgentConfig:
 
     env: str = "CARE-Dense-v0"
     """Environment id."""
-    budget: float = 0.03
-    """Share of the cells that may fire at a keyframe."""
+    budget: tuple[float, ...] = (0.03,)
+    """Share of the cells that may fire at a keyframe. Of several the environments take one each, in turn, and the
+    weights then fit any budget; the first is evaluated."""
     env_parameters: tuple[str, ...] = ()
     """Further arguments of the environment as NAME=VALUE, for example vehicles=5 false_negative_rate=0.2."""
     action: Literal["SectorReserve", "SectorScores"] = "SectorReserve"
@@ -69,6 +70,8 @@ class AgentConfig:
         check_number("learning_rate", self.learning_rate, 1e-8, 1)
         check_number("discount", self.discount, 0, 1)
         check_number("gain", self.gain, 0)
+        if not 0 < len(self.budget) <= self.environments:
+            raise InvalidInput(f"budget needs one value to {self.environments}, the environments; got {self.budget}")
         self.wrapping  # noqa: B018 (refuses what does not fit)
 
     @property
@@ -78,8 +81,8 @@ class AgentConfig:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Of the environment."""
-        return {"budget": self.budget, **dict(parameters(self.env_parameters))}
+        """Of the environment, besides the budget."""
+        return dict(parameters(self.env_parameters))
 
     def to_json(self) -> str:
         """As text that people can read."""

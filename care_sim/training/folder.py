@@ -4,7 +4,7 @@
 |---|---|
 | `config.json` | the effective configuration |
 | `curve.csv` | steps, seconds, return and detection distance at every evaluation |
-| `checkpoint.zip` | all that a run needs to go on, as Stable-Baselines3 writes it: loading it executes code, load your own |
+| `checkpoint.zip` | all that a run needs to go on, by Stable-Baselines3; loading it executes code: load your own |
 | `weights.npz` | the weights with the best return on the validation seeds; loading it executes nothing (`ppo` only) |
 """
 
@@ -82,7 +82,7 @@ class Folder:
         return Card(
             kind="ppo",
             grid=asdict(rig.grid),
-            budget=rig.budget,
+            budget=rig.budget if len(config.budget) == 1 else None,
             wrapper=str(config.wrapping),
             scenario=config.env,
             data="episodes of the environment",
@@ -104,4 +104,3 @@ class Folder:
             return []
         with self._curve.open(newline="") as file:
             return [[float(value or "nan") for value in row] for row in list(csv.reader(file))[1:]]
-

@@ -79,7 +79,9 @@ class Joined(BaseFeaturesExtractor):
     """(n, 4 + channels * rows * columns): the observation's vectors, one after the other."""
 
     def __init__(self, observation_space: spaces.Dict):
-        super().__init__(observation_space, sum(int(np.prod(space.shape or ())) for space in observation_space.values()))
+        super().__init__(
+            observation_space, sum(int(np.prod(space.shape or ())) for space in observation_space.values())
+        )
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         """Join them."""
@@ -104,14 +106,14 @@ class SectorPolicy(ActorCriticPolicy):
 
     def __init__(self, *args: Any, shape: tuple[int, int, int], hidden: int = 16, **kwargs: Any):
         self._shape, self._hidden = shape, hidden
-        super().__init__(*args, **kwargs, features_extractor_class=Joined)
+        super().__init__(*args, **kwargs | {"features_extractor_class": Joined})
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = Windows(self._shape, self._sectors, self._hidden)  # type: ignore[assignment]
+        self.mlp_extractor: Any = Windows(self._shape, self._sectors, self._hidden)
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
-        self.action_net = Score(self._hidden, int(np.prod(self._sectors)))  # type: ignore[assignment]
+        self.action_net: Any = Score(self._hidden, int(np.prod(self._sectors)))
         self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)  # type: ignore[call-arg]
 
     @property
@@ -121,17 +123,13 @@ class SectorPolicy(ActorCriticPolicy):
 
     def arrays(self) -> Arrays:
         """The actor's weights by the names of `care_sim.policies.score_map`."""
-        window, score = self.mlp_extractor.actor, self.action_net
-        named = {
-            "window.weight": window.window.weight,
-            "window.bias": window.window.bias,
-            "ego.weight": window.ego.weight,
-            "hidden.weight": window.hidden.weight[:, :, 0, 0],
-            "hidden.bias": window.hidden.bias,
-            "score.weight": score.weight,
-            "place": score.place.reshape(self._sectors),
+        named = {**self.mlp_extractor.actor.state_dict(), **self.action_net.state_dict()}
+        arrays: Arrays = {name: tensor.cpu().numpy().copy() for name, tensor in named.items()}
+        return arrays | {
+            "hidden.weight": arrays["hidden.weight"][:, :, 0, 0],
+            "score.weight": arrays.pop("weight"),
+            "place": arrays["place"].reshape(self._sectors),
         }
-        return {name: tensor.detach().cpu().numpy().copy() for name, tensor in named.items()}
 
 
 def _parts(features: Tensor) -> tuple[Tensor, Tensor]:

@@ -46,7 +46,7 @@ def train(config: AgentConfig) -> int:
 
 
 def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
-    model = algorithms.algorithm(config.algorithm).load(folder.checkpoint, env=envs, device="cpu")
+    model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(folder.checkpoint, env=envs, device="cpu")
     if model.num_timesteps >= config.steps:
         raise InvalidInput(f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with --steps")
     envs.seed(config.seed + model.num_timesteps)
@@ -62,16 +62,12 @@ def _tell_rules(config: AgentConfig) -> None:
 
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
     """Learn in stretches, with an evaluation after each."""
-    clock = Stopwatch(folder.seconds)
-    begun = model.num_timesteps
+    clock, begun = Stopwatch(folder.seconds), model.num_timesteps
     with bar(config.steps, "steps") if sys.stderr.isatty() else nullcontext(Lines(config.steps, "steps")) as show:
+        shown = _shower(show, config, clock, begun)
         while model.num_timesteps < config.steps:
-            ahead = min(config.evaluate_every, config.steps - model.num_timesteps)
-            try:
-                clock.run(lambda: _stretch(model, ahead, _shower(show, config, clock, begun)))
-            except KeyboardInterrupt:
-                folder.save(model)
-                raise
+            with clock:
+                _stretch(model, min(config.evaluate_every, config.steps - model.num_timesteps), shown, folder)
             score = evaluate(env, acting(model), validation_seeds(config.episodes))
             folder.keep(model, score, clock.seconds, env.unwrapped.rig)
             _say(f"{model.num_timesteps} steps: {score}")
@@ -79,14 +75,18 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
     _say(f"{rate:.0f} environment steps a second inside {config.algorithm}, learning included; kept in {folder.path}")
 
 
-def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None]) -> None:
+def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder) -> None:
     from stable_baselines3.common.callbacks import ConvertCallback
 
     def each(local: dict[str, Any], _: dict[str, Any]) -> bool:
         shown(local["self"].num_timesteps)
         return True
 
-    model.learn(steps, ConvertCallback(each), reset_num_timesteps=False)
+    try:
+        model.learn(steps, ConvertCallback(each), reset_num_timesteps=False)
+    except KeyboardInterrupt:
+        folder.save(model)
+        raise
 
 
 def _shower(show: Show, config: AgentConfig, clock: "Stopwatch", begun: int) -> Callable[[int], None]:
@@ -105,10 +105,10 @@ class Stopwatch:
         self._before, self._done = before, 0.0
         self._since: float | None = None
 
-    def run(self, work: Callable[[], None]) -> None:
-        """Time some work."""
+    def __enter__(self) -> None:
         self._since = time.monotonic()
-        work()
+
+    def __exit__(self, *_: object) -> None:
         self._done, self._since = self.here, None
 
     @property
