@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, fields
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, check_whole, unknown
 
 ACTIONS = ("SectorReserve", "SectorScores")
 _TEXT = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")
@@ -26,6 +26,8 @@ class Wrapping:
     def __post_init__(self) -> None:
         if self.action not in ACTIONS:
             raise unknown("action", self.action, ACTIONS)
+        for name in ("azimuths", "elevations", "columns", "rows"):
+            check_whole(name, getattr(self, name), 1)
         for blocks, sectors in (("columns", "azimuths"), ("rows", "elevations")):
             if getattr(self, blocks) % getattr(self, sectors):
                 raise InvalidInput(

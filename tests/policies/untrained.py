@@ -13,7 +13,6 @@ from care_sim.policies.score_map import MARGIN
 from care_sim.policies.weights import Card, save
 from care_sim.policies.wrapping import Wrapping
 
-
 USUAL = Wrapping()
 
 
