@@ -66,7 +66,7 @@ def test_hulls_that_overlap_count_a_cell_once():
 
 
 def test_the_nearest_return_of_a_block_and_the_share_fired():
-    drawn = pictures(belief(ranges=scan((0, 0, 20.0), (3, 7, 10.0), (1, 1, 50.0), (0, 8, 50.0))))
+    drawn = pictures(belief(ranges=scan((0, 0, 10.0), (3, 7, 20.0), (1, 1, 50.0), (0, 8, 50.0))))
     assert drawn["nearness"][0, 0] == pytest.approx(0.8)
     assert drawn["fired"][0, 0] == pytest.approx(3 / 32)
     assert (drawn["nearness"][0, 1], drawn["fired"][0, 1]) == (0, pytest.approx(1 / 32))

@@ -25,6 +25,9 @@ def test_the_best_come_first_ties_by_index_and_none_that_is_not_positive():
     ranked = QUARTERS.ranked(np.array([[0.2, -0.1], [0.9, 0.2]]), 16)
     assert [cells[0] for cells in ranked] == [8, 0, 10]
     assert QUARTERS.ranked(np.zeros((2, 2)), 16) == []
+    sectors = Tiling(AngularGrid())
+    equal = sectors.ranked(np.tile([0.5, 0.25], 64), 10**6)
+    assert np.array_equal(equal, np.concatenate([sectors.cells[::2], sectors.cells[1::2]]))
 
 
 def test_no_more_tiles_than_hold_enough():
