@@ -77,7 +77,7 @@ class Parity:
 
 @dataclass(frozen=True)
 class Train:
-    """Train a learned policy: learned-scorer."""
+    """Train a learned policy on an environment: `care-sim train --help` lists the learners."""
 
 
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
@@ -102,7 +102,9 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig"}
 """Commands of packages that are imported for them alone, and what they are told in."""
 STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
-"""Commands that keep what they have finished."""
+KEPT = dict.fromkeys(STUDIES, "; what is finished is kept, the same command goes on from there")
+KEPT["train"] = "; what is learned is kept, the same command with --resume goes on from there"
+"""What commands that keep what they have finished say when they are interrupted."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -119,8 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
-        kept = "; what is finished is kept, the same command goes on from there"
-        _complain(f"interrupted{kept if arguments[:1] and arguments[0] in STUDIES else ''}", INTERRUPTED)
+        _complain(f"interrupted{KEPT.get(arguments[0], '') if arguments else ''}", INTERRUPTED)
 
 
 def _command(arguments: list[str]) -> int:

@@ -38,6 +38,7 @@ class ClosedLoop:
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
+        self._min_returns = sensing.min_returns
         self._memory = TrackMemory(rig.keyframe_s)
         self._identities = Identities()
         length, width, _ = world.ego_kind.size
@@ -90,6 +91,14 @@ class ClosedLoop:
     def full_scan(self) -> Scan:
         """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
         return self._lidar.peek(self.sensor)
+
+    def detectable(self) -> bool:
+        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the reward alone."""
+        target = self.world.first_sighting
+        if target is None or target.label is None:
+            return False
+        (cells,) = self.rig.hulls(self._local_boxes(np.array([target.body], np.int64)))
+        return self._lidar.hits(target.body, cells, self.sensor) >= self._min_returns
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""

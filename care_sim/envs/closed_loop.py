@@ -40,8 +40,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
     ### Reward
-    A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision,
-    needless braking. Every term is at most 0, so is the best return.
+    A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision, needless braking, and,
+    with `reward_weights={"gain": ...}`, the first-detection distance against the full-scan bound. Every term is at
+    most 0, so is the best return.
 
     ### Episode end
     Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes). `info` has
@@ -99,6 +100,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self.close()
         world = self.scenario.build(np.random.default_rng(scenario))
         self._in_view = self._detected = False
+        self._potential = rewards.Potential()
         self.keyframes = []
         loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
         return self.begin(loop, floor), {"seed": entropy}
@@ -106,19 +108,20 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
         loop = self.loop
-        frame = loop.keyframe(self.chosen(action))
+        fired = self.chosen(action)
+        measured = bool(self._weights["gain"]) and self._potential.bound_m is None
+        detectable = measured and loop.detectable()
+        frame = loop.keyframe(fired)
         self.keyframes.append(frame)
-        self._in_view |= frame.in_view
-        self._detected |= frame.detected
-        terms = rewards.terms(frame, self._in_view, self._detected)
         terminated = frame.impact_speed_mps is not None
         truncated = loop.world.time >= self.scenario.duration_s - 1e-9
         self._over = terminated or truncated
+        terms = self._terms(frame, detectable)
         info = self._info(frame, terms)
         if self._over:
             info["outcome"] = asdict(outcome(self.keyframes))
         reward = sum(self._weights[name] * value for name, value in terms.items())
-        return loop.belief.to_observation(), reward, terminated, truncated, info
+        return self.observed(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
@@ -133,6 +136,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         if self._running is not None:
             self._running.world.close()
             self._running = None
+
+    def _terms(self, frame: Keyframe, detectable: bool) -> dict[str, float]:
+        self._in_view |= frame.in_view
+        self._detected |= frame.detected
+        lost = self._potential.lost(frame, detectable, self._over) if self._weights["gain"] else 0.0
+        return rewards.terms(frame, self._in_view, self._detected, lost)
 
     def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         return {

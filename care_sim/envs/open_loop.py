@@ -115,7 +115,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         if self._over:
             info["outcome"] = asdict(self.score.tally())
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
-        return loop.belief.to_observation(), reward, False, self._over, info
+        return self.observed(), reward, False, self._over, info
 
 
 class FilmEnv(OpenLoopEnv):

@@ -11,12 +11,13 @@ from care_sim.allocation import budget_cells, fired_cells
 from care_sim.conditions import Conditions
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.envs.truth import EpisodeTruth, Loop
+from care_sim.errors import InvalidInput
 from care_sim.floor import Floor
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import dead_cells
 from care_sim.truth import Truth
-from care_sim.types import Action, Rig
+from care_sim.types import Action, Belief, Rig
 
 Observed = dict[str, NDArray[np.float32]]
 
@@ -73,7 +74,19 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """Start an episode over a loop and a floor; its first observation."""
         self._running, self._over = loop, False
         self._floor = Floor(floor, self.conditions.floor_seed, self.rig.grid.size)
-        return loop.belief.to_observation()
+        return self.observed()
+
+    def observed(self) -> Observed:
+        """The observation of the coming keyframe."""
+        self._observation = self.loop.belief.to_observation()
+        return self._observation
+
+    @property
+    def belief(self) -> Belief:
+        """What the last observation says, for wrappers. Raises gymnasium.error.ResetNeeded before the first reset."""
+        if self._running is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
+        return Belief.from_observation(self._observation)
 
     def chosen(self, action: Action) -> Cells:
         """The cells that `action` fires at the coming keyframe.
@@ -98,3 +111,11 @@ def conditions_of(parameters: dict[str, Any]) -> Conditions:
     """The conditions among keyword arguments, which lose them. Raises InvalidInput for a value not allowed."""
     names = [name for name in parameters if name in Conditions.__dataclass_fields__]
     return Conditions(**{name: parameters.pop(name) for name in names})
+
+
+def sensing(env: gymnasium.Env[Any, Any]) -> SensingEnv[Any]:
+    """The environment under the wrappers. Raises InvalidInput for one that is none of CARE-Sim."""
+    inner = env.unwrapped
+    if not isinstance(inner, SensingEnv):
+        raise InvalidInput(f"wrappers of CARE-Sim need one of its environments, got {env}")
+    return inner

@@ -17,6 +17,7 @@ from care_sim.policies.history_uniform import HistoryUniform
 from care_sim.policies.installed import ENTRY_POINTS, entries, load
 from care_sim.policies.learned_scorer import LearnedScorer
 from care_sim.policies.parameters import Maker, check_parameters, is_privileged
+from care_sim.policies.ppo import Ppo
 from care_sim.policies.random import Random
 from care_sim.policies.random_points import RandomPoints
 from care_sim.policies.uncertainty import Uncertainty
@@ -40,6 +41,7 @@ BUILT_IN: dict[str, Maker] = {
         RandomPoints,
         FarthestPoints,
         LearnedScorer,
+        Ppo,
     )
 }
 

@@ -37,6 +37,11 @@ class Lidar:
         ranges, _ = self._engine.cast(sensor, cells)
         return Scan(cells, np.where(self._dead, np.inf, ranges))
 
+    def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
+        """How many of `cells` would hit a body, before noise and dropout, which stay undrawn."""
+        _, bodies = self._engine.cast(sensor, cells)
+        return int(np.count_nonzero((bodies == body) & ~self._dead[cells]))
+
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """Fire `cells` from the frame `sensor`.
 

@@ -1,8 +1,15 @@
-"""Training of the learned policies whose weights come with the package: the commands of `care-sim train`."""
+"""Training of learned policies: `care-sim train`."""
 
 from collections.abc import Callable
 from typing import Any
 
+from care_sim.training.config import Ppo, RecurrentPpo, Sac
 from care_sim.training.scorer import TrainScorer
 
-COMMANDS: dict[str, Callable[..., Any]] = {"learned-scorer": TrainScorer}
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "ppo": Ppo,
+    "sac": Sac,
+    "recurrent-ppo": RecurrentPpo,
+    "learned-scorer": TrainScorer,
+}
+"""What can be trained, by name."""

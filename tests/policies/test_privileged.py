@@ -6,6 +6,7 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
+from untrained import parameters
 
 import care_sim
 from care_sim.errors import InvalidInput, MissingExtra
@@ -54,7 +55,7 @@ def knows(policy):
 def used(name, environment, encounter):
     """A policy that has acted a few times."""
     environment.reset(seed=0)
-    policy = care_sim.make_policy(name, environment)
+    policy = care_sim.make_policy(name, environment, **parameters(name))
     for observation in encounter[:3]:
         policy(observation)
     return policy

@@ -1,0 +1,64 @@
+"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration; imported when one is trained."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from care_sim.errors import MissingExtra
+from care_sim.features import CHANNELS
+from care_sim.training.config import AgentConfig, Ppo, RecurrentPpo, Sac
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
+
+def algorithm(name: str) -> Any:
+    """The class of a learner, a `BaseAlgorithm`. Raises MissingExtra for one that is not installed."""
+    try:
+        if name == "recurrent-ppo":
+            from sb3_contrib import RecurrentPPO
+
+            return RecurrentPPO
+        from stable_baselines3 import PPO, SAC
+    except ImportError as error:
+        raise MissingExtra(f"{name} needs the extra 'rl': pip install 'care-sim[rl]' ({error})") from error
+    return {"ppo": PPO, "sac": SAC}[name]
+
+
+def make(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
+    """A learner that has learned nothing yet."""
+    policy, options = _settings(config)
+    log = str(config.out / "tensorboard") if config.tensorboard else None
+    learner: BaseAlgorithm = algorithm(config.algorithm)(
+        policy=policy,
+        env=envs,
+        learning_rate=config.learning_rate,
+        gamma=config.discount,
+        seed=config.seed,
+        device="cpu",
+        tensorboard_log=log,
+        **options,
+    )
+    return learner
+
+
+def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
+    """The policy, and the options that are the learner's own."""
+    from care_sim.training.networks import Sectored, SectorPolicy
+
+    shape = len(CHANNELS), config.rows, config.columns
+    own = {
+        "features_extractor_class": Sectored,
+        "features_extractor_kwargs": {"shape": shape, "sectors": (config.elevations, config.azimuths)},
+    }
+    if isinstance(config, Ppo):
+        kwargs = {"shape": shape, "hidden": config.hidden, "log_std_init": math.log(config.noise)}
+        return SectorPolicy, _on_policy(config) | {"policy_kwargs": kwargs}
+    if isinstance(config, RecurrentPpo):
+        kwargs = own | {"log_std_init": math.log(config.noise)}
+        return "MultiInputLstmPolicy", _on_policy(config) | {"policy_kwargs": kwargs}
+    assert isinstance(config, Sac)
+    return "MultiInputPolicy", {"buffer_size": config.memory, "batch_size": config.batch, "policy_kwargs": own}
+
+
+def _on_policy(config: Ppo | RecurrentPpo) -> dict[str, Any]:
+    return {"n_steps": config.rollout, "batch_size": config.batch, "n_epochs": config.epochs, "gae_lambda": 0.9}

@@ -1,0 +1,149 @@
+"""What is trained, on what, and how long."""
+
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from care_sim.errors import InvalidInput, check_number, check_whole
+from care_sim.policies.wrapping import Wrapping
+from care_sim.study.options import parameters
+
+HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
+"""Fields in which a run that is resumed may differ."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentConfig:
+    """Fields that all learners share; see `care_sim.training.seeds` for which seeds are trained and tested on."""
+
+    algorithm: ClassVar[str]
+
+    env: str = "CARE-Dense-v0"
+    """Environment id."""
+    budget: tuple[float, ...] = (0.03,)
+    """Share of the cells that may fire at a keyframe. Of several the environments take one each, in turn, and the
+    weights then fit any budget; the first is evaluated."""
+    env_parameters: tuple[str, ...] = ()
+    """Further arguments of the environment as NAME=VALUE, for example vehicles=5 false_negative_rate=0.2."""
+    action: Literal["SectorReserve", "SectorScores"] = "SectorReserve"
+    """What the action scores: sectors for the reserve alone, or for everything."""
+    azimuths: int = 32
+    """Sectors round the car."""
+    elevations: int = 4
+    """Sectors from top to bottom."""
+    columns: int = 64
+    """Blocks of the observation round the car."""
+    rows: int = 8
+    """Blocks of the observation from top to bottom."""
+    gain: float = 10.0
+    """Weight of the reward's term `gain`, in the closed loop; the others keep theirs."""
+    steps: int = 200_000
+    """Environment steps in all."""
+    seed: int = 0
+    """Of the weights, the exploration and the episodes trained on."""
+    environments: int = 8
+    """Environments side by side."""
+    processes: bool = False
+    """Give every environment a process of its own."""
+    threads: int = 1
+    """Threads of PyTorch."""
+    learning_rate: float = 1e-3
+    """Step size of Adam."""
+    discount: float = 0.9
+    """What a reward is worth a keyframe later."""
+    evaluate_every: int = 20_000
+    """Environment steps between evaluations; each also writes a checkpoint."""
+    episodes: int = 20
+    """Held-out episodes an evaluation."""
+    out: Path = Path("runs/train")
+    """Folder of configuration, weights, checkpoint and learning curve."""
+    resume: bool = False
+    """Go on from the checkpoint in `out`."""
+    tensorboard: bool = False
+    """Write a log for TensorBoard beside the weights; needs the package tensorboard."""
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "environments", "threads", "evaluate_every", "episodes"):
+            check_whole(name, getattr(self, name), 1)
+        check_whole("seed", self.seed, 0)
+        check_number("learning_rate", self.learning_rate, 1e-8, 1)
+        check_number("discount", self.discount, 0, 1)
+        check_number("gain", self.gain, 0)
+        if not 0 < len(self.budget) <= self.environments:
+            raise InvalidInput(f"budget needs one value to {self.environments}, the environments; got {self.budget}")
+        self.wrapping  # noqa: B018 (refuses what does not fit)
+
+    @property
+    def wrapping(self) -> Wrapping:
+        """The wrappers. Raises InvalidInput for numbers that do not fit each other."""
+        return Wrapping(self.action, self.azimuths, self.elevations, self.columns, self.rows)
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Of the environment, besides the budget."""
+        return dict(parameters(self.env_parameters))
+
+    def to_json(self) -> str:
+        """As text that people can read."""
+        plain = {"algorithm": self.algorithm} | asdict(self) | {"out": str(self.out)}
+        return json.dumps(plain, indent=1) + "\n"
+
+    def check_same(self, text: str) -> None:
+        """Raise InvalidInput, with the first difference, unless the run of that configuration can be gone on with."""
+        before, now = json.loads(text), json.loads(self.to_json())
+        for name in ("algorithm", *(field.name for field in fields(self) if field.name not in HOW_LONG)):
+            if before.get(name) != now[name]:
+                raise InvalidInput(f"{self.out}: trained with {name} {before.get(name)!r}, asked is {now[name]!r}")
+
+    def __call__(self) -> int:
+        """Train it."""
+        from care_sim.training.run import train
+
+        return train(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ppo(AgentConfig):
+    """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
+
+    algorithm = "ppo"
+
+    rollout: int = 128
+    """Steps an environment between two updates."""
+    batch: int = 256
+    """Steps a gradient."""
+    epochs: int = 4
+    """Times that every step is learned from."""
+    hidden: int = 16
+    """Width of the network that slides over the sectors."""
+    noise: float = 0.3
+    """Standard deviation of the scores at the start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecurrentPpo(AgentConfig):
+    """Train an allocator with a memory (an LSTM) by proximal policy optimisation; needs the package sb3-contrib."""
+
+    algorithm = "recurrent-ppo"
+
+    rollout: int = 128
+    """Steps an environment between two updates."""
+    batch: int = 256
+    """Steps a gradient."""
+    epochs: int = 4
+    """Times that every step is learned from."""
+    noise: float = 0.3
+    """Standard deviation of the scores at the start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sac(AgentConfig):
+    """Train an allocator by soft actor-critic."""
+
+    algorithm = "sac"
+
+    memory: int = 20_000
+    """Steps that are remembered and learned from; 25 kB each."""
+    batch: int = 256
+    """Steps a gradient."""

@@ -1,0 +1,55 @@
+"""The environments of a training run, wrapped."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import cycle, islice
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+
+import care_sim
+from care_sim.envs import CLOSED_LOOP
+from care_sim.envs.grid_observation import GridObservation
+from care_sim.envs.sector_actions import SectorReserve, SectorScores
+from care_sim.errors import unknown
+from care_sim.training.config import AgentConfig
+from care_sim.training.seeds import TrainingSeeds
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.vec_env import VecEnv
+
+ACTIONS = {"SectorReserve": SectorReserve, "SectorScores": SectorScores}
+
+
+def bare(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
+    """The environment without wrappers, for the rules; with the first budget, unless given.
+
+    Raises InvalidInput for an unknown one or a wrong argument.
+    """
+    known = care_sim.envs.IDS
+    if config.env not in known:
+        raise unknown("environment", config.env, known)
+    reward: dict[str, Any] = {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
+    arguments = {"budget": config.budget[0] if budget is None else budget} | reward | config.arguments
+    return gymnasium.make(f"care_sim:{config.env}", disable_env_checker=True, **arguments)
+
+
+def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
+    """As the learner acts and sees."""
+    acting = ACTIONS[config.action](bare(config, budget), config.azimuths, config.elevations)
+    return GridObservation(acting, config.columns, config.rows)
+
+
+def training(config: AgentConfig, budget: float) -> gymnasium.Env[Any, Any]:
+    """The same over training seeds."""
+    return TrainingSeeds(wrapped(config, budget))
+
+
+def side_by_side(config: AgentConfig) -> "VecEnv":
+    """The training environments as one, watched."""
+    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
+
+    budgets = islice(cycle(config.budget), config.environments)
+    makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [partial(training, config, budget) for budget in budgets]
+    envs: VecEnv = SubprocVecEnv(makers, start_method="spawn") if config.processes else DummyVecEnv(makers)
+    return VecMonitor(envs)

@@ -1,0 +1,80 @@
+"""Episodes of validation seeds, without exploration."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+import care_sim
+
+Choose = Callable[[Any, bool], NDArray[np.float32]]
+"""The action for an observation; and whether the episode begins with it."""
+
+
+class Learner(Protocol):
+    """What acts: of Stable-Baselines3 any algorithm."""
+
+    def predict(self, observation: Any, state: Any, episode_start: Any, deterministic: bool) -> tuple[Any, Any]:
+        """Action and memory."""
+        ...
+
+
+@dataclass(frozen=True)
+class Score:
+    """Means over episodes: the return, and the distance at which the first-sighting actor was detected, metres (0 where
+    it never was; None in the open loop).
+    """
+
+    episodes: int
+    mean_return: float
+    distance_m: float | None
+
+    def __str__(self) -> str:
+        seen = "" if self.distance_m is None else f", first detection at {self.distance_m:.2f} m"
+        return f"return {self.mean_return:.2f}{seen}"
+
+
+def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> Score:
+    """Play an episode a seed."""
+    played = [_episode(env, choose, seed) for seed in seeds]
+    distances = [outcome["detection_distance_m"] or 0.0 for _, outcome in played if "detection_distance_m" in outcome]
+    returns = float(np.mean([total for total, _ in played]))
+    return Score(len(played), returns, float(np.mean(distances)) if distances else None)
+
+
+def acting(learner: Learner) -> Choose:
+    """The learner's choice, with its memory from keyframe to keyframe."""
+    memory = None
+
+    def choose(observation: Any, begins: bool) -> NDArray[np.float32]:
+        nonlocal memory
+        begin = np.array([begins])
+        action, memory = learner.predict(observation, None if begins else memory, begin, deterministic=True)
+        return np.asarray(action)
+
+    return choose
+
+
+def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
+    """The choice of a policy by name."""
+    policy = care_sim.make_policy(name, env)
+
+    def choose(observation: Any, begins: bool) -> NDArray[np.float32]:
+        if begins:
+            policy.reset()
+        return policy(observation)
+
+    return choose
+
+
+def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int) -> tuple[float, dict[str, Any]]:
+    observation, _ = env.reset(seed=seed)
+    total, begins, over = 0.0, True, False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(choose(observation, begins))
+        total, begins, over = total + float(reward), False, terminated or truncated
+    outcome: dict[str, Any] = info["outcome"]
+    return total, outcome

@@ -1,0 +1,136 @@
+"""The network of `care_sim.policies.score_map` in PyTorch, as a policy of Stable-Baselines3."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import Tensor, nn
+from torch.nn.functional import pad
+
+from care_sim.features import EGO
+from care_sim.policies.score_map import MARGIN
+from care_sim.policies.weights import Arrays
+
+
+class Window(nn.Module):
+    """(n, hidden, sectors) from what every sector sees: its blocks, one more on each side, and the car's motion.
+
+    `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths).
+    """
+
+    def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
+        super().__init__()
+        self.shape = shape
+        stride = shape[1] // sectors[0], shape[2] // sectors[1]
+        self.window = nn.Conv2d(shape[0], hidden, (stride[0] + 2 * MARGIN, stride[1] + 2 * MARGIN), stride)
+        self.ego = nn.Linear(len(EGO), hidden, bias=False)
+        self.hidden = nn.Conv2d(hidden, hidden, 1)
+
+    def forward(self, ego: Tensor, grid: Tensor) -> Tensor:
+        """From ego (n, 4) and grid (n, channels * rows * columns)."""
+        wrapped = pad(grid.view(-1, *self.shape), (MARGIN, MARGIN, 0, 0), mode="circular")
+        seen = self.window(pad(wrapped, (0, 0, MARGIN, MARGIN))) + self.ego(ego)[:, :, None, None]
+        return torch.relu(self.hidden(torch.relu(seen))).flatten(2)
+
+
+class Windows(nn.Module):
+    """One window for the actor, another for the critic, whose sectors are pooled into mean and maximum."""
+
+    def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
+        super().__init__()
+        self.actor, self.critic = Window(shape, sectors, hidden), Window(shape, sectors, hidden)
+        self.valued = nn.Sequential(nn.Linear(2 * hidden + len(EGO), 2 * hidden), nn.ReLU())
+        self.latent_dim_pi, self.latent_dim_vf = hidden, 2 * hidden
+
+    def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
+        """Both."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: Tensor) -> Tensor:
+        """(n, hidden, sectors)."""
+        result: Tensor = self.actor(*_parts(features))
+        return result
+
+    def forward_critic(self, features: Tensor) -> Tensor:
+        """(n, 2 * hidden)."""
+        ego, grid = _parts(features)
+        seen = self.critic(ego, grid)
+        result: Tensor = self.valued(torch.cat([seen.mean(2), seen.amax(2), ego], 1))
+        return result
+
+
+class Score(nn.Module):
+    """(n, sectors) from -1 to 1: one weight a feature, one number a sector."""
+
+    def __init__(self, hidden: int, sectors: int):
+        super().__init__()
+        self.weight = nn.Parameter(0.1 * torch.randn(hidden))
+        self.place = nn.Parameter(torch.zeros(sectors))
+
+    def forward(self, seen: Tensor) -> Tensor:
+        """From (n, hidden, sectors)."""
+        return torch.tanh(torch.einsum("nhs,h->ns", seen, self.weight) + self.place)
+
+
+class Joined(BaseFeaturesExtractor):
+    """(n, 4 + channels * rows * columns): the observation's vectors, one after the other."""
+
+    def __init__(self, observation_space: spaces.Dict):
+        super().__init__(
+            observation_space, sum(int(np.prod(space.shape or ())) for space in observation_space.values())
+        )
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        """Join them."""
+        return torch.cat([observation["ego"], observation["grid"]], 1)
+
+
+class Sectored(BaseFeaturesExtractor):
+    """(n, 4 + 4 * sectors): four features a sector and the car's motion, for learners with layers of their own."""
+
+    def __init__(self, observation_space: spaces.Dict, shape: tuple[int, int, int], sectors: tuple[int, int]):
+        super().__init__(observation_space, len(EGO) + 4 * sectors[0] * sectors[1])
+        self.window = Window(shape, sectors, 4)
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        """Look, and keep what is seen sector by sector."""
+        ego, grid = observation["ego"], observation["grid"]
+        return torch.cat([ego, self.window(ego, grid).flatten(1)], 1)
+
+
+class SectorPolicy(ActorCriticPolicy):
+    """The score map as actor; `shape` as of `Window`, `hidden` its width."""
+
+    def __init__(self, *args: Any, shape: tuple[int, int, int], hidden: int = 16, **kwargs: Any):
+        self._shape, self._hidden = shape, hidden
+        super().__init__(*args, **kwargs | {"features_extractor_class": Joined})
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor: Any = Windows(self._shape, self._sectors, self._hidden)
+
+    def _build(self, lr_schedule: Any) -> None:
+        super()._build(lr_schedule)
+        self.action_net: Any = Score(self._hidden, int(np.prod(self._sectors)))
+        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)  # type: ignore[call-arg]
+
+    @property
+    def _sectors(self) -> tuple[int, int]:
+        elevations, azimuths = self.action_space.shape or ()
+        return elevations, azimuths
+
+    def arrays(self) -> Arrays:
+        """The actor's weights by the names of `care_sim.policies.score_map`."""
+        named = {**self.mlp_extractor.actor.state_dict(), **self.action_net.state_dict()}
+        arrays: Arrays = {name: tensor.cpu().numpy().copy() for name, tensor in named.items()}
+        return arrays | {
+            "hidden.weight": arrays["hidden.weight"][:, :, 0, 0],
+            "score.weight": arrays.pop("weight"),
+            "place": arrays["place"].reshape(self._sectors),
+        }
+
+
+def _parts(features: Tensor) -> tuple[Tensor, Tensor]:
+    return features[:, : len(EGO)], features[:, len(EGO) :]

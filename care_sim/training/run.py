@@ -1,0 +1,134 @@
+"""A training run from the first step, or a checkpoint, to the last."""
+
+import sys
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.extras import import_torch
+from care_sim.study.progress import Lines, Show, bar, spoken
+from care_sim.training import algorithms
+from care_sim.training.config import AgentConfig
+from care_sim.training.environments import bare, side_by_side, wrapped
+from care_sim.training.evaluation import acting, evaluate, rule
+from care_sim.training.folder import Folder
+from care_sim.training.seeds import validation_seeds
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
+RULES = ("random", "history", "care")
+"""What the learner is held against at the start."""
+
+
+def train(config: AgentConfig) -> int:
+    """Train, and keep everything in `config.out`; see `care_sim.training.folder`.
+
+    Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
+    """
+    algorithms.algorithm(config.algorithm)
+    _check_tensorboard(config)
+    import_torch().set_num_threads(config.threads)
+    folder = Folder(config)
+    env = wrapped(config)
+    envs = side_by_side(config)
+    try:
+        model = _resumed(config, folder, envs) if config.resume else algorithms.make(config, envs)
+        folder.begin()
+        _tell_rules(config)
+        _learn(config, folder, model, env)
+    finally:
+        envs.close()
+        env.close()
+    return 0
+
+
+def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
+    model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(folder.checkpoint, env=envs, device="cpu")
+    if model.num_timesteps >= config.steps:
+        raise InvalidInput(f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with --steps")
+    envs.seed(config.seed + model.num_timesteps)
+    return model
+
+
+def _tell_rules(config: AgentConfig) -> None:
+    env = bare(config)
+    for name in RULES:
+        _say(f"{name}: {evaluate(env, rule(name, env), validation_seeds(config.episodes))}")
+    env.close()
+
+
+def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
+    """Learn in stretches, with an evaluation after each."""
+    clock, begun = Stopwatch(folder.seconds), model.num_timesteps
+    with bar(config.steps, "steps") if sys.stderr.isatty() else nullcontext(Lines(config.steps, "steps")) as show:
+        shown = _shower(show, config, clock, begun)
+        while model.num_timesteps < config.steps:
+            with clock:
+                _stretch(model, min(config.evaluate_every, config.steps - model.num_timesteps), shown, folder)
+            score = evaluate(env, acting(model), validation_seeds(config.episodes))
+            folder.keep(model, score, clock.seconds, env.unwrapped.rig)
+            _say(f"{model.num_timesteps} steps: {score}")
+    rate = (model.num_timesteps - begun) / clock.here
+    _say(f"{rate:.0f} environment steps a second inside {config.algorithm}, learning included; kept in {folder.path}")
+
+
+def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder) -> None:
+    from stable_baselines3.common.callbacks import ConvertCallback
+
+    def each(local: dict[str, Any], _: dict[str, Any]) -> bool:
+        shown(local["self"].num_timesteps)
+        return True
+
+    try:
+        model.learn(steps, ConvertCallback(each), reset_num_timesteps=False)
+    except KeyboardInterrupt:
+        folder.save(model)
+        raise
+
+
+def _shower(show: Show, config: AgentConfig, clock: "Stopwatch", begun: int) -> Callable[[int], None]:
+    def shown(steps: int) -> None:
+        rate = (steps - begun) / max(clock.here, 1e-9)
+        left = max(config.steps - steps, 0) / rate if rate else 0.0
+        show(min(steps, config.steps), f"{rate:.0f} steps/s, {spoken(left)} left")
+
+    return shown
+
+
+class Stopwatch:
+    """Seconds spent in learning; evaluations do not count."""
+
+    def __init__(self, before: float):
+        self._before, self._done = before, 0.0
+        self._since: float | None = None
+
+    def __enter__(self) -> None:
+        self._since = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        self._done, self._since = self.here, None
+
+    @property
+    def here(self) -> float:
+        """Of this program."""
+        return self._done + (time.monotonic() - self._since if self._since is not None else 0.0)
+
+    @property
+    def seconds(self) -> float:
+        """With those before it was resumed."""
+        return self._before + self.here
+
+
+def _check_tensorboard(config: AgentConfig) -> None:
+    if config.tensorboard:
+        try:
+            import tensorboard  # noqa: F401
+        except ImportError as error:
+            raise MissingExtra(f"--tensorboard needs it: pip install tensorboard ({error})") from error
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)

@@ -1,0 +1,38 @@
+"""Which seeds are for what, disjoint by construction.
+
+| seeds | for |
+|---|---|
+| 0 to 1,999 | the benchmark: tables, tests, the streets' evaluation (0 to 149) and calibration (1,000 to 1,019) |
+| 2,000 to 9,999 | validation: the learning curve, and which weights are kept |
+| 10,000 and up | training |
+
+No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a seed below 2,000.
+Where episodes differ by the recording and not by the seed (`CARE-Replay-v0`), hold out recordings.
+"""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+VALIDATION, TRAINING = 2_000, 10_000
+LAST = 2**31 - 1
+
+
+class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Every reset begins an episode of a training seed; a seed given to `reset` decides the sequence of them."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any]):
+        super().__init__(env)
+        self._rng = np.random.default_rng()
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin the next episode."""
+        if seed is not None:
+            self._rng = np.random.default_rng(seed)
+        return self.env.reset(seed=int(self._rng.integers(TRAINING, LAST)), options=options)
+
+
+def validation_seeds(episodes: int) -> range:
+    """The first `episodes` seeds of the validation."""
+    return range(VALIDATION, min(VALIDATION + episodes, TRAINING))

@@ -1,0 +1,152 @@
+"""Training from the command line: seeds apart, files kept, resumed, refused."""
+
+import csv
+import json
+import sys
+
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.cli import main
+from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.policies.weights import load
+from care_sim.training.algorithms import algorithm
+from care_sim.training.config import Ppo, Sac
+from care_sim.training.environments import bare, training
+from care_sim.training.evaluation import evaluate, rule
+from care_sim.training.seeds import TRAINING, VALIDATION, validation_seeds
+
+SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
+TINY = [*SHORT, "--rollout", "32", "--batch", "32", "--epochs", "1", "--hidden", "4"]
+
+
+def care(capsys, *arguments):
+    """Exit code, output and complaint of a command."""
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    return end.value.code, *capsys.readouterr()
+
+
+@pytest.fixture
+def libraries():
+    pytest.importorskip("stable_baselines3")
+    pytest.importorskip("torch")
+
+
+def test_training_never_meets_a_seed_that_is_held_out(monkeypatch):
+    monkeypatch.setattr("care_sim.training.seeds.LAST", TRAINING + 100_000)
+    env = training(Ppo(), 0.03)
+    seeds = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
+    again = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
+    other = [env.reset(seed=1 if n == 0 else None)[1]["seed"] for n in range(30)]
+    env.close()
+    assert min(seeds + other) >= TRAINING > max(validation_seeds(10**6))
+    assert min(validation_seeds(20)) >= VALIDATION
+    assert seeds == again
+    assert not set(seeds) & set(other)
+
+
+def test_an_evaluation_is_the_mean_of_its_episodes():
+    env = bare(Ppo())
+    care_rule, seeds = rule("care", env), [VALIDATION, VALIDATION + 1]
+    each = [evaluate(env, care_rule, [seed]) for seed in seeds]
+    both = evaluate(env, care_rule, seeds)
+    env.close()
+    assert both.mean_return == pytest.approx(np.mean([score.mean_return for score in each]))
+    assert both.distance_m == pytest.approx(np.mean([score.distance_m for score in each]))
+    assert both.distance_m > 10
+
+
+@pytest.mark.usefixtures("libraries")
+@pytest.mark.slow
+def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
+    out = tmp_path / "run"
+    command = ["train", "ppo", *TINY, "--out", out, "--evaluate-every", "64"]
+    code, said, _ = care(capsys, *command, "--steps", "128")
+    assert code == 0
+    assert [line.partition(":")[0] for line in said.splitlines()[:-1]] == [
+        "random", "history", "care", "64 steps", "128 steps",
+    ]  # fmt: skip
+    assert "environment steps a second inside ppo" in said.splitlines()[-1]
+    settings = json.loads((out / "config.json").read_text())
+    assert (settings["algorithm"], settings["budget"], settings["hidden"]) == ("ppo", [0.03], 4)
+
+    assert care(capsys, *command)[0] == 2
+    code, said, _ = care(capsys, *command, "--steps", "192", "--resume")
+    assert code == 0
+    rows = list(csv.DictReader((out / "curve.csv").open()))
+    assert [int(row["steps"]) for row in rows] == [64, 128, 192]
+    seconds = [float(row["seconds"]) for row in rows]
+    assert seconds == sorted(seconds)
+
+    weights = load(out / "weights.npz")
+    best = max(float(row["return"]) for row in rows)
+    assert weights.card.result["validation"]["mean_return"] == pytest.approx(best)
+    assert (weights.card.budget, weights.card.wrapper) == (492, "SectorReserve 32 x 4, GridObservation 64 x 8")
+    env = bare(Ppo())
+    care_sim.make_policy("ppo", env, path=out / "weights.npz")
+    env.close()
+
+    for changed, message in (
+        (["--azimuths", "16"], "trained with azimuths 32, asked is 16"),
+        (["--budget", "0.05"], "trained with budget [0.03], asked is [0.05]"),
+        (["--env", "CARE-Dartout-v0"], "trained with env 'CARE-Dense-v0', asked is 'CARE-Dartout-v0'"),
+        (["--steps", "192"], "192 steps are done"),
+    ):
+        code, _, complaint = care(capsys, *command, "--steps", "256", "--resume", *changed)
+        assert (code, complaint.count("\n")) == (2, 1)
+        assert message in complaint
+
+
+@pytest.mark.usefixtures("libraries")
+@pytest.mark.slow
+def test_weights_of_several_budgets_fit_any(capsys, tmp_path):
+    command = ["train", "ppo", *TINY, "--out", tmp_path, "--evaluate-every", "64", "--steps", "64"]
+    assert care(capsys, *command, "--budget", "0.05", "0.1")[0] == 0
+    assert load(tmp_path / "weights.npz").card.budget is None
+
+
+@pytest.mark.usefixtures("libraries")
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["sac", "recurrent-ppo"])
+def test_the_other_learners_by_name(capsys, tmp_path, name):
+    if name == "recurrent-ppo":
+        pytest.importorskip("sb3_contrib")
+    own = ["--memory", "500"] if name == "sac" else ["--rollout", "32", "--batch", "32"]
+    command = ["train", name, *SHORT, *own, "--out", tmp_path, "--evaluate-every", "128"]
+    assert care(capsys, *command, "--steps", "128")[0] == 0
+    assert care(capsys, *command, "--steps", "256", "--resume")[0] == 0
+    assert len((tmp_path / "curve.csv").read_text().splitlines()) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--env", "CARE-Moon-v0"], "unknown environment 'CARE-Moon-v0'; known: CARE-CutIn-v0"),
+        (["--azimuths", "24"], "azimuths must divide columns, got 24 and 64"),
+        (["--azimuths", "3", "--columns", "3"], "azimuths must divide the 512 of the grid"),
+        (["--budget", "2"], "budget must lie in (0, 1]"),
+        (["--steps", "0"], "steps must be a whole number >= 1"),
+        (["--env-parameters", "vehicles"], "parameters are given as NAME=VALUE"),
+        (["--env-parameters", "wheels=3"], "wheels"),
+        (["--resume"], "holds no run to be resumed"),
+    ],
+)
+@pytest.mark.usefixtures("libraries")
+def test_bad_input_is_one_line(capsys, tmp_path, options, message):
+    code, _, complaint = care(capsys, "train", "ppo", "--out", tmp_path / "out", *options)
+    assert (code, complaint.count("\n")) == (2, 1)
+    assert message in complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_library_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    with pytest.raises(MissingExtra, match=r"recurrent-ppo needs the extra 'rl'"):
+        algorithm("recurrent-ppo")
+
+
+def test_budgets_beyond_the_environments_are_refused():
+    with pytest.raises(InvalidInput, match="budget needs one value to 2"):
+        Sac(environments=2, budget=(0.1, 0.2, 0.3))
