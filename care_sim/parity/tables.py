@@ -55,4 +55,4 @@ def _outcomes(outcomes: dict[str, Any]) -> Table:
     counts = (outcomes[key] for key in ("episodes", "other_outcomes", "other_keyframes", "keyframes"))
     row = tuple(str(count if isinstance(count, int) else len(count)) for count in counts)
     differing = dict.fromkeys([*outcomes["other_outcomes"], *outcomes["other_keyframes"]])
-    return Table("Episodes of the paper's study under either engine", columns, (row,), tuple(differing))
+    return Table("Episodes of the paper's study under both engines", columns, (row,), tuple(differing))

@@ -12,7 +12,7 @@ from care_sim.parity.answers import Millimetres, aside
 from care_sim.parity.keyframes import Compared, compare_episode
 from care_sim.parity.outcomes import Outcomes
 from care_sim.parity.pictures import Pictures
-from care_sim.parity.run import unexplained
+from care_sim.parity.run import agree, unexplained
 from care_sim.parity.scenes import GRIDS, draw_bodies, draw_scene
 from care_sim.parity.tally import GROUPS, Tally, groups
 from care_sim.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
@@ -198,3 +198,23 @@ class Nearsighted:
     def cast(self, sensor, cells):
         ranges, ids = self.engine.cast(sensor, cells)
         return np.where(ranges < 5, ranges, np.inf), np.where(ranges < 5, ids, -1)
+
+
+def report_of(rays=0, box_px=1.0, outcomes=(), keyframes=()):
+    counts = {"references": {"Bullet in millimetres": {"boxes, upright": {"unexplained": rays}}}}
+    ended = {"other_outcomes": list(outcomes), "other_keyframes": list(keyframes)}
+    return {"scans": {"one": counts}, "pictures": {"dense": {"widest_px": box_px}}, "outcomes": ended}
+
+
+def test_engines_agree_when_nothing_is_left_to_explain():
+    assert agree(report_of())
+    assert agree({**report_of(), "pictures": {}})
+    for wrong in ({"rays": 1}, {"box_px": 2.0}, {"outcomes": ["a"]}, {"keyframes": ["a"]}):
+        assert not agree(report_of(**wrong))
+
+
+def test_a_folder_is_no_file_for_the_figures(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["parity", "--scenes", "0", "--episodes", "0", "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    assert "is a folder, a file is wanted" in capsys.readouterr().err
