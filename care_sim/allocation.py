@@ -1,17 +1,19 @@
 """Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
 
 from collections.abc import Iterable, Sequence
-from itertools import accumulate, islice
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import LARGEST, InvalidInput, check_number, is_number
+from care_sim.errors import InvalidInput, check_number, is_number
 from care_sim.grid import Cells, cell_indices
 from care_sim.types import Action, Demand
 
 RESERVE_FRACTION = 0.3
 """rho, the share of the budget kept for the reserve (paper, Remark 2)."""
+HIGHEST_CELL = 2**24
+"""A thousand times the cells of the paper's grid."""
 
 _NO_CELLS = np.empty(0, np.int64)
 
@@ -48,8 +50,8 @@ def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells
     cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
     ends = np.array([*accumulate(map(len, sets))], np.int64)
     lowest, highest, ascending = survey(cells, ends)
-    if highest - lowest > LARGEST:
-        raise InvalidInput(f"cells must lie in 0..{LARGEST}, got {lowest if lowest < 0 else highest}")
+    if highest - lowest > HIGHEST_CELL:
+        raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {lowest if lowest < 0 else highest}")
     if not ascending:
         cells = np.concatenate([np.sort(part) for part in np.split(cells, ends)])
     last_sets = np.array([*accumulate(map(len, stages))], np.int64)
@@ -59,9 +61,14 @@ def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells
 
 def _free(floor: Iterable[int], chosen: Cells, count: int) -> Cells:
     """The first `count` cells of the floor that are not chosen."""
-    taken = set(chosen.tolist())
-    free = (cell for cell in dict.fromkeys(map(int, floor)) if cell not in taken)
-    return np.fromiter(islice(free, count), np.int64)
+    taken, free = set(chosen.tolist()), list[int]()
+    for cell in map(int, floor):
+        if len(free) >= count:
+            break
+        if cell not in taken:
+            taken.add(cell)
+            free.append(cell)
+    return np.array(free, np.int64)
 
 
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:

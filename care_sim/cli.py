@@ -142,10 +142,9 @@ def _chosen_of(commands: dict[str, Callable[..., Any]], prog: str, about: str | 
 
 
 def _measure(name: str, *options: str) -> int:
-    package = importlib.import_module(f"care_sim.{name}")
-    config = getattr(package, MEASURES[name])
-    parsed = _in_one_line(lambda: tyro.cli(config, args=options, prog=f"care-sim {name}"))
-    return int(package.run(parsed))
+    config, run = (importlib.import_module(f"care_sim.{name}.{part}") for part in ("config", "run"))
+    parsed = _in_one_line(lambda: tyro.cli(getattr(config, MEASURES[name]), args=options, prog=f"care-sim {name}"))
+    return int(run.run(parsed))
 
 
 def _in_one_line(parse: Callable[[], Any]) -> Any:

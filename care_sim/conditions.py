@@ -91,7 +91,9 @@ class Sensing(CameraFaults, LidarFaults):
     ego_speed_sigma: float = 0.0
     """Gaussian noise on the car's own speed, as policy and controller read it, m/s."""
     engine: str = "fast"
-    """What casts the rays and draws the pictures: `fast`, compiled, or `bullet`, PyBullet's own, the reference."""
+    """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
+    reference.
+    """
     min_returns: int = MIN_RETURNS
     """Fired rays that must hit an object for it to be detected."""
     camera_confidence: float = CONFIDENCE

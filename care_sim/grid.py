@@ -64,6 +64,7 @@ class AngularGrid:
         azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
         elevations = np.linspace(self.top, self.bottom, self.rows)
         across, down = (np.stack([np.cos(angles), np.sin(angles)], axis=1) for angles in (azimuths, elevations))
+        across.flags.writeable = down.flags.writeable = False
         return across, down
 
     @cached_property

@@ -1,20 +1,20 @@
 """The pinhole model of cameras, compiled: points to pixels, pixels to rays, and what forecasts explain (Eq. 2).
 
 A lens is a tuple: its position (3,) and axes (3, 3) in the sensor frame, focal length () and centre (2,) in pixels.
-`lenses` holds the same of k cameras, each with an axis of k before it. Numba's cache notices a change in a compiled
-function's own file only, so no other file's compiled code calls these.
+`lenses` holds the same of k cameras, each with an axis of k before it.
 """
 
 import math
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 _BOX_POINTS = ((2, 2), (0, 0), (0, 1), (1, 0), (1, 1), (3, 0), (3, 1), (0, 3), (1, 3))
 """Points of an image box: which of low, high, middle and nearest to the principal point across, and which down."""
 
 
-@njit(cache=True)
+@compiled()
 def project(points, lens):  # type: ignore[no-untyped-def]
     """Pixels (n, 2) and depths (n,) of points (n, 3)."""
     pixels, depths = np.empty((len(points), 2)), np.empty(len(points))
@@ -23,7 +23,7 @@ def project(points, lens):  # type: ignore[no-untyped-def]
     return pixels, depths
 
 
-@njit(cache=True)
+@compiled()
 def rays(pixels, lens):  # type: ignore[no-untyped-def]
     """Directions (n, 3) through pixels (n, 2)."""
     directions = np.empty((len(pixels), 3))
@@ -32,7 +32,7 @@ def rays(pixels, lens):  # type: ignore[no-untyped-def]
     return directions
 
 
-@njit(cache=True)
+@compiled()
 def box_rays(boxes, cameras, lenses):  # type: ignore[no-untyped-def]
     """(n, 9, 3) rays through image boxes (n, 4) of `cameras` (n,); see `care_sim.pinhole.PinholeCamera.box_rays`."""
     bundles = np.empty((len(boxes), len(_BOX_POINTS), 3))
@@ -46,7 +46,7 @@ def box_rays(boxes, cameras, lenses):  # type: ignore[no-untyped-def]
     return bundles
 
 
-@njit(cache=True)
+@compiled()
 def matched(detections, forecasts, lenses):  # type: ignore[no-untyped-def]
     """(n,) which image boxes hold the centre of a same-class forecast (Eq. 2).
 
@@ -65,7 +65,7 @@ def matched(detections, forecasts, lenses):  # type: ignore[no-untyped-def]
     return found
 
 
-@njit(cache=True)
+@compiled()
 def rectangles(boxes, lens, nearest):  # type: ignore[no-untyped-def]
     """(n, 4) what 3D boxes (n, 7) span in the picture; see `care_sim.pinhole.PinholeCamera.project_boxes`."""
     spans, corners = np.empty((len(boxes), 4)), np.empty((8, 3))
@@ -84,7 +84,7 @@ def rectangles(boxes, lens, nearest):  # type: ignore[no-untyped-def]
     return spans
 
 
-@njit(cache=True)
+@compiled()
 def window_around(spans, width, height):  # type: ignore[no-untyped-def]
     """Left, top, right, bottom: the whole pixels of a picture that hold `spans` (n, 4), and one more on each side."""
     left, top, right, bottom = width, height, 0, 0
@@ -98,7 +98,7 @@ def window_around(spans, width, height):  # type: ignore[no-untyped-def]
     return (left, top, right, bottom) if left < right else (0, 0, 0, 0)
 
 
-@njit(cache=True)
+@compiled()
 def _lay_corners(box, lens, corners):  # type: ignore[no-untyped-def]
     """Fill `corners` (8, 3: depth, left, up): bit i of a corner's number says on which side of axis i it lies."""
     position, axes, _, _ = lens
@@ -111,7 +111,7 @@ def _lay_corners(box, lens, corners):  # type: ignore[no-untyped-def]
             corners[n, i] = _along(axes[i], x, y, box[2] + upward - position[2])
 
 
-@njit(cache=True)
+@compiled()
 def _widened(span, point, lens):  # type: ignore[no-untyped-def]
     """A span that holds the pixel of a point (depth, left, up) as well."""
     _, _, focal, centre = lens
@@ -119,14 +119,14 @@ def _widened(span, point, lens):  # type: ignore[no-untyped-def]
     return min(span[0], u), min(span[1], v), max(span[2], u), max(span[3], v)
 
 
-@njit(cache=True, boundscheck=True)
+@compiled(boundscheck=True)
 def _of(lenses, camera):  # type: ignore[no-untyped-def]
     """The lens of a camera. Raises IndexError for one that there is not."""
     positions, axes, focals, centres = lenses
     return positions[camera], axes[camera], focals[camera], centres[camera]
 
 
-@njit(cache=True)
+@compiled()
 def _pixel(x, y, z, lens):  # type: ignore[no-untyped-def]
     """Pixel and depth of a point; none, NaN, at or behind the image plane."""
     position, axes, focal, centre = lens
@@ -136,7 +136,7 @@ def _pixel(x, y, z, lens):  # type: ignore[no-untyped-def]
     return centre[0] - left * scale, centre[1] - up * scale, depth
 
 
-@njit(cache=True)
+@compiled()
 def _ray(u, v, lens):  # type: ignore[no-untyped-def]
     """Not normalised."""
     _, axes, focal, centre = lens
@@ -148,6 +148,6 @@ def _ray(u, v, lens):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled()
 def _along(axis, x, y, z):  # type: ignore[no-untyped-def]
     return axis[0] * x + axis[1] * y + axis[2] * z

@@ -1,15 +1,13 @@
-"""The cells of dilated angular rectangles, compiled: what hulls and wedges come down to (paper, Remark 2).
-
-Numba's cache notices a change in a compiled function's own file only, so no other file's compiled code calls these.
-"""
+"""The cells of dilated angular rectangles, compiled: what hulls and wedges come down to (paper, Remark 2)."""
 
 import math
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 
-@njit(cache=True)
+@compiled()
 def silhouettes(boxes):  # type: ignore[no-untyped-def]
     """What of boxes (n, 7) bounds their hulls, seen from the origin, and which of them stand around it.
 
@@ -34,7 +32,7 @@ def silhouettes(boxes):  # type: ignore[no-untyped-def]
     return planar, upright, around
 
 
-@njit(cache=True)
+@compiled()
 def sectors(azimuths, elevations, azimuth_margins, elevation_margin, lattice):  # type: ignore[no-untyped-def]
     """The cells of n rectangles one after the other, each ascending, and (n,) where each ends.
 
@@ -56,7 +54,7 @@ def sectors(azimuths, elevations, azimuth_margins, elevation_margin, lattice):  
     return cells, ends
 
 
-@njit(cache=True)
+@compiled()
 def _columns(azimuths, margin, lattice):  # type: ignore[no-untyped-def]
     """First column, on the grid, and the one after the last, up to a turn beyond it."""
     columns, _, width, _, _ = lattice
@@ -69,7 +67,7 @@ def _columns(azimuths, margin, lattice):  # type: ignore[no-untyped-def]
     return first % columns, first % columns + max(0, min(last - first + 1, columns))
 
 
-@njit(cache=True)
+@compiled()
 def _rows(elevations, margin, lattice):  # type: ignore[no-untyped-def]
     """First row and the one after the last."""
     _, rows, _, top, height = lattice
@@ -79,7 +77,7 @@ def _rows(elevations, margin, lattice):  # type: ignore[no-untyped-def]
     return first, max(first, min(lower + 1, rows))
 
 
-@njit(cache=True)
+@compiled()
 def _lay(cells, place, bounds, columns):  # type: ignore[no-untyped-def]
     """Write a rectangle's cells from `place` on, in every row those beyond the seam first; the place after them."""
     first, stop, upper, lower = bounds

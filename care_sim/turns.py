@@ -1,13 +1,11 @@
-"""The round-robin of Algorithm 1, compiled.
-
-Numba's cache notices a change in a compiled function's own file only, so no other file's compiled code calls these.
-"""
+"""The round-robin of Algorithm 1, compiled."""
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 
-@njit(cache=True)
+@compiled()
 def survey(cells, ends):  # type: ignore[no-untyped-def]
     """Lowest (at most 0) and highest (at least 0) of the cells, and whether every set, as below, is ascending."""
     lowest = highest = start = 0
@@ -20,13 +18,13 @@ def survey(cells, ends):  # type: ignore[no-untyped-def]
     return lowest, highest, ascending
 
 
-@njit(cache=True)
+@compiled()
 def in_turns(cells, ends, stages, limits, span):  # type: ignore[no-untyped-def]
     """The cells taken, in order of selection.
 
     Sets of `cells` lie one after the other, set s ending at `ends[s]`, stages of sets likewise, stage k ending at set
-    `stages[k]`. A stage fills up to `limits[k]` cells in all. `span` is of the cells the
-    lowest, at most 0, and the highest.
+    `stages[k]`. A stage fills up to `limits[k]` cells in all. `span` is the lowest of the cells, at most 0, and the
+    highest.
     """
     lowest, highest = span
     taken = np.zeros(highest - lowest + 1, np.bool_)
@@ -41,7 +39,7 @@ def in_turns(cells, ends, stages, limits, span):  # type: ignore[no-untyped-def]
     return chosen[:count]
 
 
-@njit(cache=True)
+@compiled()
 def _round_robin(sets, waiting, mask, selection):  # type: ignore[no-untyped-def]
     """One cell a set and round, until the limit or until all sets have run dry; how many are chosen then."""
     cells, places, ends = sets

@@ -112,7 +112,7 @@ def test_sets_in_any_order_and_below_zero_are_taken_as_they_are():
 
 
 def test_cells_further_apart_than_any_grid_are_refused():
-    with pytest.raises(InvalidInput, match=r"cells must lie in 0..2147483647, got 1099511627776"):
+    with pytest.raises(InvalidInput, match=r"cells must lie in 0..16777216, got 1099511627776"):
         allocate(Demand([[3, 2**40]]), 1, 0.0)
 
 

@@ -27,15 +27,20 @@ class BenchConfig:
     """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
     resets: int = 2000
     """Episodes begun in the worker whose memory is watched."""
+    seeds: int = 5
+    """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it out."""
     out: Path | None = None
     """File for the figures as JSON; the growth curves are drawn beside it, as PNG and SVG."""
 
     def __post_init__(self) -> None:
         if not self.seconds > 0:
             raise InvalidInput(f"seconds must be positive, got {self.seconds}")
+        if self.out is not None and self.out.suffix in (".png", ".svg"):
+            raise InvalidInput(f"out must be a file for JSON, got {self.out}; the figure is drawn beside it")
         check_whole("repeats", self.repeats, 1)
         check_whole("samples", self.samples, 1)
         check_whole("resets", self.resets, 1)
+        check_whole("seeds", self.seeds, 0)
 
     @property
     def episode(self) -> EpisodeConfig:

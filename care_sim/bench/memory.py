@@ -10,7 +10,7 @@ Memory = dict[str, float]
 
 
 def worker_memory(config: BenchConfig) -> Memory:
-    """Peak memory in MB of a worker: `imported` when it has its libraries, `early_mb` after a tenth of the resets,
+    """Peak memory in MB of a worker: `begun_mb` when it has begun one, `early_mb` after a tenth of the resets,
     `peak_mb` after all of them, `resets` in number. A step follows every reset.
     """
     with processes(1) as pool:
@@ -18,11 +18,13 @@ def worker_memory(config: BenchConfig) -> Memory:
 
 
 def _resets(config: EpisodeConfig, resets: int) -> Memory:
-    memory = {"resets": float(resets), "imported_mb": peak_rss_mb()}
+    memory = {"resets": float(resets)}
     with driven(config) as env:
         for number in range(resets):
             env.reset(seed=config.seed + number)
             env.step(0)
+            if number == 0:
+                memory["begun_mb"] = peak_rss_mb()
             if number == resets // 10:
                 memory["early_mb"] = peak_rss_mb()
     return {**memory, "peak_mb": peak_rss_mb()}

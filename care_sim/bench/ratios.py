@@ -11,7 +11,7 @@ from care_sim.bench.steps import DRIVING, REACHING
 Report = dict[str, Any]
 FAST = "fast"
 
-OVER_DRIVING, OVER_REACHING = f"steps/s over {DRIVING}", f"steps/s over {REACHING}"
+OVER_DRIVING, OVER_REACHING = f"steps a CPU second over {DRIVING}", f"steps a CPU second over {REACHING}"
 TWO_OVER_ONE = "steps/s, two processes over one"
 
 
@@ -36,7 +36,9 @@ def ratios(report: Report) -> dict[str, float]:
     one, two = (middle(values) for values in report["vectorised"].values())
     return {
         **{
-            f"steps/s over {peer}": steps[report["main"]] / steps[peer] for peer in (DRIVING, REACHING) if peer in steps
+            name: steps[report["main"]] / steps[peer]
+            for name, peer in ((OVER_DRIVING, DRIVING), (OVER_REACHING, REACHING))
+            if peer in steps
         },
         **{over(mine, other): scan[other] / scan[mine] for other in scan if other != mine},
         **{same_on_grid(engine): curve[0] / curve[-1] for engine, curve in curves.items() if engine == mine},

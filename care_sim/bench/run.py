@@ -1,6 +1,9 @@
 """`care-sim bench`: measure, print, write."""
 
 import json
+import sys
+from contextlib import nullcontext
+from functools import partial
 
 from rich.console import Console
 
@@ -9,18 +12,18 @@ from care_sim.bench.figure import growth_figure
 from care_sim.bench.measure import measure
 from care_sim.bench.tables import tables
 from care_sim.study.figures import save
+from care_sim.study.files import replacing
 
 
 def run(config: BenchConfig) -> int:
     """Measure, print the tables, write JSON and figure; 0 whether or not the targets are met."""
+    with nullcontext() if config.out is None else replacing(config.out) as out:
+        report = measure(config, partial(print, "measuring", file=sys.stderr))
+        console = Console(highlight=False)
+        for table in tables(report):
+            console.print(table.rich())
+        if out is not None:
+            out.write_text(json.dumps(report, indent=2) + "\n")
     if config.out is not None:
-        config.out.parent.mkdir(parents=True, exist_ok=True)
-        config.out.touch()
-    report = measure(config)
-    console = Console(highlight=False)
-    for table in tables(report):
-        console.print(table.rich())
-    if config.out is not None:
-        config.out.write_text(json.dumps(report, indent=2) + "\n")
         save(growth_figure(report), config.out)
     return 0

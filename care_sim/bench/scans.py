@@ -18,7 +18,7 @@ BODIES = 30
 """Bodies of the scan that the targets speak of."""
 REFERENCE = "bullet"
 SAME_M = 0.001
-"""Ranges this close are the same: the parity that issue and engines are held to."""
+"""Ranges this close are the same."""
 
 
 def scans(config: BenchConfig) -> tuple[dict[str, Any], list[str]]:

@@ -51,8 +51,9 @@ def _row(group: str, counts: dict[str, float]) -> tuple[str, ...]:
 
 
 def _outcomes(outcomes: dict[str, Any]) -> Table:
-    columns = ("episodes", "another outcome", "another keyframe", "keyframes")
-    counts = (outcomes[key] for key in ("episodes", "other_outcomes", "other_keyframes", "keyframes"))
+    columns = ("episodes", "another outcome", "also than in millimetres", "another keyframe", "keyframes")
+    keys = ("episodes", "other_outcomes", "other_than_exact", "other_keyframes", "keyframes")
+    counts = (outcomes[key] for key in keys)
     row = tuple(str(count if isinstance(count, int) else len(count)) for count in counts)
     differing = dict.fromkeys([*outcomes["other_outcomes"], *outcomes["other_keyframes"]])
-    return Table("Episodes of the paper's study under either engine", columns, (row,), tuple(differing))
+    return Table("Episodes of the paper's study under both engines", columns, (row,), tuple(differing))

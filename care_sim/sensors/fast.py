@@ -18,7 +18,7 @@ class Fast:
     """
 
     def __init__(self, world: BulletWorld, grid: AngularGrid):
-        self._world = world
+        self._world, self._cells = world, grid.size
         self._rays = (grid.fan, float(grid.range_m))
         self._lattice = (grid.columns, grid.rows, float(grid.top), float(grid.row_height))
 
@@ -28,15 +28,16 @@ class Fast:
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])
             return ranges[np.argsort(order)], ids[np.argsort(order)]
+        cells = np.require(cells, np.int64, ("C", "W"))
+        if len(cells) and not 0 <= cells[0] <= cells[-1] < self._cells:
+            raise IndexError(f"cells must lie in 0..{self._cells - 1}, got {cells[0]} to {cells[-1]}")
         world, parts = self._world, self._world.primitives
         stance = np.array((sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.roll, sensor.pitch), float)
         up, centres, turns, windows = seen_from(
             stance, (parts.halves, parts.offsets, parts.owners), parts.poses, self._lattice
         )
         road, solids = (up, float(sensor.z), world.ground), (parts.shapes, parts.halves, parts.owners)
-        result: tuple[Floats, Integers] = scan(
-            np.ascontiguousarray(cells), *self._rays, road, solids, (centres, turns), windows
-        )
+        result: tuple[Floats, Integers] = scan(cells, *self._rays, road, solids, (centres, turns), windows)
         return result
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:

@@ -4,18 +4,18 @@ A ray through pixel (u, v), one metre long along the optical axis, meets the pla
 the inverse depth (n . ray) / h, which is linear in u and v. What is seen of a polyhedron lies at the least of these
 among its faces towards the camera; its outline is where a face towards the camera meets one that is turned away.
 PyBullet's renderer samples column i at u = i and row j at v = j + 1, outlines included, and so does this.
-Numba's cache notices a change in a compiled function's own file only, so no other file's compiled code calls these.
 """
 
 import math
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 NOTHING = -1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untyped-def]
     """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NOTHING where none is.
 
@@ -45,7 +45,7 @@ def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untype
     return ids
 
 
-@njit(cache=True)
+@compiled()
 def tally(ids):  # type: ignore[no-untyped-def]
     """(n, 6) the bodies in a picture of ids in ascending order: id, left, top, right, bottom of the box that holds all
     its pixels, and their number.
@@ -65,7 +65,7 @@ def tally(ids):  # type: ignore[no-untyped-def]
     return found[found[:, 5] > 0]
 
 
-@njit(cache=True)
+@compiled()
 def _seen_from(camera, pose):  # type: ignore[no-untyped-def]
     """Turn (3, 3) and shift (3,) from the frame of a body at `pose` to that of the camera."""
     place, axes = camera
@@ -77,7 +77,7 @@ def _seen_from(camera, pose):  # type: ignore[no-untyped-def]
     return turn, shift
 
 
-@njit(cache=True)
+@compiled()
 def _turn(x, y, z, w):  # type: ignore[no-untyped-def]
     """The axes that the unit quaternion (x, y, z, w) gives a body, in the world."""
     return (
@@ -87,7 +87,7 @@ def _turn(x, y, z, w):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled()
 def _rows(corners, turn, shift, lens, nearest):  # type: ignore[no-untyped-def]
     """First row of a polyhedron and the one after its last; all rows when it reaches through the image plane."""
     focal, _, middle = lens
@@ -106,7 +106,7 @@ def _rows(corners, turn, shift, lens, nearest):  # type: ignore[no-untyped-def]
     return math.floor(min(max(high, 0.0), 2 * middle)) - 1, math.ceil(max(min(low, 2 * middle), 0.0))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _planes(faces, turn, shift, lens):  # type: ignore[no-untyped-def]
     """(f, 4) what is added a column and a row to the inverse depth of each face, what that is at pixel (0, 0), and the
     distance of the face before the camera, negative where it is turned towards it.
@@ -122,7 +122,7 @@ def _planes(faces, turn, shift, lens):  # type: ignore[no-untyped-def]
     return planes
 
 
-@njit(cache=True)
+@compiled()
 def _outline(planes, edges):  # type: ignore[no-untyped-def]
     """The planes that are turned towards the camera, and the outline: lines (m, 3) that are positive inside."""
     lines, count = np.empty((len(edges), 3)), 0
@@ -134,7 +134,7 @@ def _outline(planes, edges):  # type: ignore[no-untyped-def]
     return planes[planes[:, 3] < 0.0], lines[:count]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _span(outline, v, left, right):  # type: ignore[no-untyped-def]
     """The first column inside an outline in the row at `v` and the one after the last."""
     first, last = float(left), right - 1.0
@@ -149,7 +149,7 @@ def _span(outline, v, left, right):  # type: ignore[no-untyped-def]
     return (math.ceil(first), math.floor(last) + 1) if first <= last else (left, left)
 
 
-@njit(cache=True)
+@compiled()
 def _surface(towards, u, v):  # type: ignore[no-untyped-def]
     """The inverse depth of a polyhedron at a pixel inside its outline."""
     inverse = math.inf
@@ -158,6 +158,6 @@ def _surface(towards, u, v):  # type: ignore[no-untyped-def]
     return inverse
 
 
-@njit(cache=True)
+@compiled()
 def _dot(one, other):  # type: ignore[no-untyped-def]
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

@@ -1,21 +1,21 @@
 """Rays of a scan against the road and the parts of bodies, boxes, cylinders and spheres, compiled.
 
 A box is cut out by three slabs (Kay and Kajiya 1986), a cylinder by a tube and a slab. A ray that starts inside a
-solid does not enter it: Bullet's rays answer the same. Numba's cache notices a change in a compiled function's own
-file only, so no other file's compiled code calls these.
+solid does not enter it: Bullet's rays answer the same.
 """
 
 import math
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 NOTHING = -1
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.primitives.SHAPES`."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-untyped-def]
     """Ranges (n,) of ascending `cells`, inf beyond `reach`, and body ids (n,), NOTHING there.
 
@@ -44,7 +44,7 @@ def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-u
     return ranges, ids
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _road(cells, starts, fan, reach, road):  # type: ignore[no-untyped-def]
     """What the rays meet in a world of road alone."""
     up, height, ground = road
@@ -58,7 +58,7 @@ def _road(cells, starts, fan, reach, road):  # type: ignore[no-untyped-def]
     return ranges, ids
 
 
-@njit(cache=True)
+@compiled()
 def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
     """(rows + 1,) where each row begins among ascending `cells`."""
     starts = np.zeros(rows + 1, np.int64)
@@ -67,7 +67,7 @@ def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
     return starts
 
 
-@njit(cache=True)
+@compiled()
 def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
     """The first place in low..high of ascending `cells` that holds `cell` or a later one, else `high`."""
     while low < high:
@@ -79,26 +79,26 @@ def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
     return low
 
 
-@njit(cache=True)
+@compiled()
 def _ray(fan, row, column):  # type: ignore[no-untyped-def]
     """The direction of a cell."""
     across, down = fan
     return down[row, 0] * across[column, 0], down[row, 0] * across[column, 1], down[row, 1]
 
 
-@njit(cache=True)
+@compiled()
 def _triple(row):  # type: ignore[no-untyped-def]
     """The numbers of an array (3,): passing views on would count references, ray by ray."""
     return row[0], row[1], row[2]
 
 
-@njit(cache=True)
+@compiled()
 def _start(turn, centre):  # type: ignore[no-untyped-def]
     """The sensor in the frame of a part."""
     return -_dot(turn[0], centre), -_dot(turn[1], centre), -_dot(turn[2], centre)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _entry(solid, ray):  # type: ignore[no-untyped-def]
     """Distance along a unit ray of the sensor's frame to a solid, inf without an entry."""
     shape, turn, half, (u, v, w) = solid
@@ -112,12 +112,12 @@ def _entry(solid, ray):  # type: ignore[no-untyped-def]
     return near if 0.0 <= near <= far else math.inf
 
 
-@njit(cache=True)
+@compiled()
 def _common(one, other):  # type: ignore[no-untyped-def]
     return max(one[0], other[0]), min(one[1], other[1])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slab(start, along, half):  # type: ignore[no-untyped-def]
     """The stretch of a ray between the planes at -half and half."""
     if along == 0.0:
@@ -126,7 +126,7 @@ def _slab(start, along, half):  # type: ignore[no-untyped-def]
     return min(one, other), max(one, other)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _tube(u, v, x, y, radius):  # type: ignore[no-untyped-def]
     """The stretch of a ray within `radius` of the z axis, from (u, v) along (x, y) in the plane across it."""
     speed, cross = x * x + y * y, u * y - v * x
@@ -137,7 +137,7 @@ def _tube(u, v, x, y, radius):  # type: ignore[no-untyped-def]
     return middle - half, middle + half
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _ball(u, v, w, x, y, z, radius):  # type: ignore[no-untyped-def]
     """The stretch of a ray from (u, v, w) along (x, y, z) within `radius` of the origin."""
     middle = -(u * x + v * y + w * z)
@@ -148,11 +148,11 @@ def _ball(u, v, w, x, y, z, radius):  # type: ignore[no-untyped-def]
     return middle - math.sqrt(inside), middle + math.sqrt(inside)
 
 
-@njit(cache=True)
+@compiled()
 def _all_or_nothing(everything):  # type: ignore[no-untyped-def]
     return (-math.inf, math.inf) if everything else (math.inf, -math.inf)
 
 
-@njit(cache=True)
+@compiled()
 def _dot(one, other):  # type: ignore[no-untyped-def]
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

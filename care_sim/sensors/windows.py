@@ -1,18 +1,16 @@
-"""Where the parts of bodies stand around a sensor, and the cells that each can cover, compiled.
-
-Numba's cache notices a change in a compiled function's own file only, so no other file's compiled code calls these.
-"""
+"""Where the parts of bodies stand around a sensor, and the cells that each can cover, compiled."""
 
 import math
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 MARGIN = 1
 """Cells around a window, against rounding."""
 
 
-@njit(cache=True)
+@compiled()
 def seen_from(sensor, parts, poses, lattice):  # type: ignore[no-untyped-def]
     """Parts in the frame of a sensor at `sensor`: x, y, z, yaw, roll, pitch of a `care_sim.frames.Frame`.
 
@@ -26,7 +24,7 @@ def seen_from(sensor, parts, poses, lattice):  # type: ignore[no-untyped-def]
     return up, centres, turns, _windows(centres, turns, halves, lattice)
 
 
-@njit(cache=True)
+@compiled()
 def _placed(sensor, offsets, owners, poses):  # type: ignore[no-untyped-def]
     """Centres, axes and up."""
     centres, turns = np.empty((len(owners), 3)), np.empty((len(owners), 3, 3))
@@ -43,7 +41,7 @@ def _placed(sensor, offsets, owners, poses):  # type: ignore[no-untyped-def]
     return centres, turns, np.array((axes[0][2], axes[1][2], axes[2][2]))
 
 
-@njit(cache=True)
+@compiled()
 def _windows(centres, turns, halves, lattice):  # type: ignore[no-untyped-def]
     bounds, corners = np.empty((len(centres), 4), np.int64), np.empty((8, 3))
     for part, centre in enumerate(centres):
@@ -57,7 +55,7 @@ def _windows(centres, turns, halves, lattice):  # type: ignore[no-untyped-def]
     return bounds
 
 
-@njit(cache=True)
+@compiled()
 def _sensor_axes(yaw, roll, pitch):  # type: ignore[no-untyped-def]
     """Forward, left and up of a frame with these angles, in the world."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
@@ -69,7 +67,7 @@ def _sensor_axes(yaw, roll, pitch):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled()
 def _body_axes(x, y, z, w):  # type: ignore[no-untyped-def]
     """The axes that the unit quaternion (x, y, z, w) gives a body, in the world."""
     return (
@@ -79,7 +77,7 @@ def _body_axes(x, y, z, w):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled()
 def _lay_corners(centre, axes, half, corners):  # type: ignore[no-untyped-def]
     """Fill `corners` (8, 3): bit i of a corner's number says on which side of axis i it lies."""
     for n in range(8):
@@ -89,7 +87,7 @@ def _lay_corners(centre, axes, half, corners):  # type: ignore[no-untyped-def]
                 corners[n, j] += (half[i] if n >> i & 1 else -half[i]) * axes[i, j]
 
 
-@njit(cache=True)
+@compiled()
 def _spread(centre, corners):  # type: ignore[no-untyped-def]
     """Azimuth of a centre, and how far its corners reach to the right (negative) and left of it, radians."""
     rightmost, leftmost, least, most = (1.0, 0.0), (1.0, 0.0), 0.0, 0.0
@@ -104,7 +102,7 @@ def _spread(centre, corners):  # type: ignore[no-untyped-def]
     return math.atan2(centre[1], centre[0]), right, left
 
 
-@njit(cache=True)
+@compiled()
 def _order(along, across):  # type: ignore[no-untyped-def]
     """Grows from -2 to 2 as the direction of (along, across) turns from -pi to pi, at less cost than the angle."""
     size = abs(along) + abs(across)
@@ -112,7 +110,7 @@ def _order(along, across):  # type: ignore[no-untyped-def]
     return share if along >= 0.0 else math.copysign(2.0, across) - share
 
 
-@njit(cache=True)
+@compiled()
 def _columns(right, left, columns):  # type: ignore[no-untyped-def]
     width = 2.0 * math.pi / columns
     first = math.floor((right + math.pi) / width) - MARGIN
@@ -120,7 +118,7 @@ def _columns(right, left, columns):  # type: ignore[no-untyped-def]
     return first % columns, first % columns + min(last - first, columns - 1)
 
 
-@njit(cache=True)
+@compiled()
 def _rows(corners, surrounds, lattice):  # type: ignore[no-untyped-def]
     _, rows, top, row_height = lattice
     near, far = (0.0 if surrounds else _nearest(corners)), 0.0
@@ -133,7 +131,7 @@ def _rows(corners, surrounds, lattice):  # type: ignore[no-untyped-def]
     return max(0, math.ceil(upper) - MARGIN), min(rows - 1, math.floor(lower) + MARGIN)
 
 
-@njit(cache=True)
+@compiled()
 def _nearest(corners):  # type: ignore[no-untyped-def]
     """Distance in the x, y plane from the origin to a box that does not surround it: to the nearest of its edges."""
     least = math.inf
@@ -144,7 +142,7 @@ def _nearest(corners):  # type: ignore[no-untyped-def]
     return math.sqrt(least)
 
 
-@njit(cache=True)
+@compiled()
 def _to_edge(one, other):  # type: ignore[no-untyped-def]
     """Squared distance in the x, y plane from the origin to the stretch between two corners."""
     x, y = one[0], one[1]
@@ -154,6 +152,6 @@ def _to_edge(one, other):  # type: ignore[no-untyped-def]
     return (x + share * along) ** 2 + (y + share * across) ** 2
 
 
-@njit(cache=True)
+@compiled()
 def _dot(one, other):  # type: ignore[no-untyped-def]
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

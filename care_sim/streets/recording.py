@@ -78,12 +78,12 @@ class _Stage:
         poses = self._street.poses[keyframe]
         apart = np.hypot(poses[:, 0] - sensor.x, poses[:, 1] - sensor.y) - np.hypot(*self._sizes[:, :2].T) / 2
         (near,) = np.nonzero(apart < SIGHT_M)
-        for number in {*near.tolist(), *self._bodies}:
+        placed = np.array([*self._bodies], np.int64)
+        moved = placed[np.any(poses[placed] != self._street.poses[keyframe - 1, placed], axis=1)]
+        self._world.move_all(np.array([self._bodies[number] for number in moved.tolist()], np.int64), poses[moved])
+        for number in set(near.tolist()) - set(self._bodies):
             x, y, yaw = poses[number].tolist()
-            if number not in self._bodies:
-                self._bodies[number] = self._world.add(CATALOGUE[self._street.kinds[number]], (x, y, yaw))
-            elif not np.array_equal(poses[number], self._street.poses[keyframe - 1, number]):
-                self._world.move(self._bodies[number], (x, y, yaw))
+            self._bodies[number] = self._world.add(CATALOGUE[self._street.kinds[number]], (x, y, yaw))
         return near
 
     def _boxes(self, keyframe: int, numbers: Cells) -> Floats:

@@ -112,9 +112,10 @@ def _one_line(text: str) -> str:
 
 def peak_rss_mb() -> float:
     """The most memory this process has held, in MB."""
-    status = Path("/proc/self/status")
-    if status.exists():  # getrusage would count what the parent held when it started this process
-        (peak,) = (line.split()[1] for line in status.read_text().splitlines() if line.startswith("VmHWM:"))
-        return int(peak) * KIB_MB
+    status = Path("/proc/self/status")  # getrusage would count what the parent held when it started this process
+    lines = status.read_text().splitlines() if status.exists() else []
+    peaks = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+    if peaks:
+        return peaks[0] * KIB_MB
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return held / (1e6 if sys.platform == "darwin" else 1e3)

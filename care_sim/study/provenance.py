@@ -17,9 +17,9 @@ from care_sim.perception.registry import entries as detector_entries
 from care_sim.policies import BUILT_IN
 from care_sim.policies.installed import entries
 
-LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numpy", "pyarrow", "pybullet", "scipy")
-EXTRAS = ("open3d", "open3d-cpu", "torch")
-"""Libraries of detectors and policies that may be there."""
+LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numba", "numpy", "pyarrow", "pybullet", "scipy")
+EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
+"""Libraries of detectors, policies and measurements that may be there."""
 
 
 SESSION = uuid4().hex

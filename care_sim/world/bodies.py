@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Triple = tuple[float, float, float]
+Shape = Literal["box", "cylinder", "sphere"]
 
 
 @dataclass(frozen=True)
 class Part:
     """One primitive of a compound: full extents `size` (for a cylinder or sphere its bounding box)."""
 
-    shape: Literal["box", "cylinder", "sphere"]
+    shape: Shape
     size: Triple
     centre: Triple
     colour: Triple

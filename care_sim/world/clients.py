@@ -6,11 +6,15 @@ _free: list[int] = []
 
 
 def borrow() -> int:
-    """An empty client."""
-    return _free.pop() if _free else int(pybullet.connect(pybullet.DIRECT))
+    """An empty client. One that somebody else has closed or filled meanwhile is no trouble."""
+    while _free:
+        client = _free.pop()
+        if pybullet.isConnected(client):
+            pybullet.resetSimulation(physicsClientId=client)
+            return client
+    return int(pybullet.connect(pybullet.DIRECT))
 
 
 def give_back(client: int) -> None:
-    """Empty a client, for whoever borrows the next one."""
-    pybullet.resetSimulation(physicsClientId=client)
+    """Leave a client to whoever borrows the next one."""
     _free.append(client)

@@ -1,10 +1,8 @@
 """The boxes of the bodies of a world, and which of them can be close to each other."""
 
-import math
-
 import numpy as np
 
-from care_sim.frames import Pose
+from care_sim.frames import Floats, Pose
 from care_sim.world.bodies import Triple
 from care_sim.world.bullet import Integers
 
@@ -22,15 +20,15 @@ class Footprints:
         self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
         self._halves = np.vstack([self._halves, np.full((missing, 2), np.nan)])
         self.boxes[body, 2:6] = size[2] / 2, *size
-        self.move(body, pose)
+        self.move_all(np.array([body]), np.array([pose]))
 
-    def move(self, body: int, pose: Pose) -> None:
-        """Put a body at a pose."""
-        box, half = self.boxes[body], self._halves[body]
-        box[0], box[1], box[6] = pose
-        length, width = box[3:5].tolist()
-        cos, sin = abs(math.cos(pose[2])), abs(math.sin(pose[2]))
-        half[0], half[1] = (length * cos + width * sin) / 2, (length * sin + width * cos) / 2
+    def move_all(self, bodies: Integers, poses: Floats) -> None:
+        """Put bodies (n,) at poses (n, 3): x, y, heading."""
+        boxes = self.boxes[bodies]
+        boxes[:, :2], boxes[:, 6] = poses[:, :2], poses[:, 2]
+        self.boxes[bodies] = boxes
+        (length, width), cos, sin = boxes[:, 3:5].T, np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
+        self._halves[bodies] = np.stack([length * cos + width * sin, length * sin + width * cos], axis=1) / 2
 
     def near(self, body: int, within: float) -> Integers:
         """Ids of the other bodies that may be within `within` metres of one: all but those further from it by the

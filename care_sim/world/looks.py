@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +30,13 @@ class Looks:
 
     def __init__(self) -> None:
         self._owners: list[int] = []
-        self._meshes: list[Mesh] = []
+        self._parts: list[Part] = []
         self._tables: Tables | None = None
 
     def add(self, body: int, parts: Sequence[Part]) -> None:
         """Take in what is seen of a body, its parts in its own frame."""
         self._owners += [body] * len(parts)
-        self._meshes += map(_mesh, parts)
+        self._parts += parts
         self._tables = None
 
     @property
@@ -46,14 +46,13 @@ class Looks:
         rows of each part begin in these three; (k,) body ids.
         """
         if self._tables is None:
-            lengths = np.array([[len(column) for column in mesh] for mesh in self._meshes], np.int64).reshape(-1, 3)
-            starts = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(lengths, axis=0)])
-            corners, faces, edges = (np.concatenate(column) for column in zip(_NOTHING, *self._meshes, strict=True))
+            meshes = [_NOTHING, *map(_mesh, self._parts)]
+            starts = np.cumsum([[len(column) for column in mesh] for mesh in meshes], axis=0)
+            corners, faces, edges = (np.concatenate(column) for column in zip(*meshes, strict=True))
             self._tables = corners, faces, edges, starts, np.array(self._owners, np.int64)
         return self._tables
 
 
-@cache
 def _mesh(part: Part) -> Mesh:
     """A part's polyhedron in the frame of its body."""
     corners, faces, edges = polyhedron(part.shape, part.size)
@@ -61,7 +60,7 @@ def _mesh(part: Part) -> Mesh:
     return corners + centre, np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre]), edges
 
 
-@cache
+@lru_cache(maxsize=256)
 def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
     """Corners, faces and edges of a primitive about its centre; see `Looks.tables`."""
     corners = _corners(shape, np.array(size))

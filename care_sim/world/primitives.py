@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.world.bodies import Part
+from care_sim.world.bodies import Part, Shape
 
-SHAPES = ("box", "cylinder", "sphere")
+SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")
 """Round parts stand along their own z; a shape's number is its place here."""
 
 

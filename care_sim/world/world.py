@@ -135,14 +135,11 @@ class World:
             event()
         self._events = [(due, event) for due, event in self._events if due > self.time]
         self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / STEP_S)
-        self._move(self.ego_body, self.ego.pose)
-        for actor in self._moving:
-            self._move(actor.body, actor.pose_at(self.time))
+        bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])
+        poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
+        self.bullet.move_all(bodies, poses)
+        self._footprints.move_all(bodies, poses)
         return self._passage()
-
-    def _move(self, body: int, pose: Pose) -> None:
-        self.bullet.move(body, pose)
-        self._footprints.move(body, pose)
 
     def _passage(self) -> Passage:
         near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()

@@ -1,5 +1,6 @@
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,4 +24,9 @@ def test_what_the_parent_holds_is_not_counted():
 def test_a_worker_grows_by_its_episodes_alone():
     memory = worker_memory(BenchConfig(resets=20))
     assert memory["resets"] == 20
-    assert 50 < memory["imported_mb"] < memory["early_mb"] < memory["peak_mb"] + COUNTED_LATE_MB < 1000
+    assert 50 < memory["begun_mb"] < memory["early_mb"] < memory["peak_mb"] + COUNTED_LATE_MB < 1000
+
+
+def test_a_system_that_does_not_tell_the_peak_is_asked_otherwise(monkeypatch):
+    monkeypatch.setattr(Path, "read_text", lambda _path: "VmRSS:\t1 kB\n")
+    assert 50 < peak_rss_mb() < 100_000

@@ -12,7 +12,7 @@ from care_sim.parity.answers import Millimetres, aside
 from care_sim.parity.keyframes import Compared, compare_episode
 from care_sim.parity.outcomes import Outcomes
 from care_sim.parity.pictures import Pictures
-from care_sim.parity.run import unexplained
+from care_sim.parity.run import agree, unexplained
 from care_sim.parity.scenes import GRIDS, draw_bodies, draw_scene
 from care_sim.parity.tally import GROUPS, Tally, groups
 from care_sim.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
@@ -176,7 +176,8 @@ def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
     outcomes = Outcomes()
     outcomes.compare(EpisodeConfig(scenario, "care", 0.05, 7, **changes))
     assert outcomes.figures() == {
-        "episodes": 1, "keyframes": outcomes.keyframes, "other_outcomes": [], "other_keyframes": []
+        "episodes": 1, "keyframes": outcomes.keyframes, "other_outcomes": [], "other_keyframes": [],
+        "other_than_exact": [],
     }  # fmt: skip
     assert outcomes.keyframes > 20
 
@@ -186,7 +187,17 @@ def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
     monkeypatch.setitem(ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid)))
     config, outcomes = EpisodeConfig("dense", "care", 0.1, 0), Outcomes()
     outcomes.compare(config)
-    assert outcomes.other_outcomes == outcomes.other_keyframes == [config.changed(engine="fast").label]
+    label = config.changed(engine="fast").label
+    assert outcomes.other_outcomes == outcomes.other_keyframes == [label]
+    assert outcomes.other_than_exact == []
+
+
+def test_a_ray_that_bullet_alone_widens_is_decided_in_millimetres():
+    """The third ray that meets the person at keyframe 39 passes her head by less than Bullet's tolerance."""
+    outcomes = Outcomes()
+    outcomes.compare(EpisodeConfig("dense", "all-camera", 0.03, 25))
+    assert len(outcomes.other_outcomes) == 1
+    assert outcomes.other_than_exact == []
 
 
 class Nearsighted:
@@ -198,3 +209,23 @@ class Nearsighted:
     def cast(self, sensor, cells):
         ranges, ids = self.engine.cast(sensor, cells)
         return np.where(ranges < 5, ranges, np.inf), np.where(ranges < 5, ids, -1)
+
+
+def report_of(rays=0, box_px=1.0, than_exact=()):
+    counts = {"references": {"Bullet in millimetres": {"boxes, upright": {"unexplained": rays}}}}
+    ended = {"other_outcomes": ["a"], "other_keyframes": ["a"], "other_than_exact": list(than_exact)}
+    return {"scans": {"one": counts}, "pictures": {"dense": {"widest_px": box_px}}, "outcomes": ended}
+
+
+def test_engines_agree_when_nothing_is_left_to_explain():
+    assert agree(report_of())
+    assert agree({**report_of(), "pictures": {}})
+    for wrong in ({"rays": 1}, {"box_px": 2.0}, {"than_exact": ["a"]}):
+        assert not agree(report_of(**wrong))
+
+
+def test_a_folder_is_no_file_for_the_figures(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["parity", "--scenes", "0", "--episodes", "0", "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    assert "is a folder, a file is wanted" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from care_sim.parity.answers import Millimetres
 from care_sim.parity.random_scenes import random_scenes
 from care_sim.parity.verdicts import GRAZING, LOST, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
 from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.fast import Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NOTHING, BulletWorld
 
@@ -149,3 +150,9 @@ def test_from_within_a_solid_its_surface_is_not_met(bullet, shape):
 def test_an_edge_is_exact_to_a_nanometre(bullet, aside, met):
     bus = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
     assert (ahead(bullet, replace(SENSOR, z=3.47 + aside))[1] == bus) == met
+
+
+@pytest.mark.parametrize("cells", [[-1, 3], [3, 180 * 24]])
+def test_cells_that_the_grid_does_not_have_are_refused(bullet, cells):
+    with pytest.raises(IndexError, match=r"cells must lie in 0\.\.4319"):
+        Fast(bullet, AngularGrid(columns=180, rows=24)).cast(Frame(0.0, 0.0, 1.84, 0.0), np.array(cells))

@@ -6,6 +6,7 @@ from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NOTHING, BulletWorld
 from care_sim.world.clients import borrow, give_back
+from care_sim.world.quiet_pybullet import pybullet
 
 AHEAD = np.array([[1.0, 0.0, 0.0], [0.9, 0.0, -np.sqrt(0.19)]])
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -56,3 +57,15 @@ def test_closing_twice_gives_a_client_back_once():
     assert first != second
     give_back(first)
     give_back(second)
+
+
+def test_a_client_that_somebody_filled_or_closed_is_no_trouble():
+    filled, closed = borrow(), borrow()
+    give_back(filled)
+    give_back(closed)
+    pybullet.createMultiBody(0, physicsClientId=filled)
+    pybullet.disconnect(physicsClientId=closed)
+    first, second = BulletWorld(), BulletWorld()
+    assert first.ground == second.ground == 0
+    first.close()
+    second.close()

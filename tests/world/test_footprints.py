@@ -19,7 +19,7 @@ def footprints(*kinds_and_poses):
 
 def test_a_box_stands_on_the_ground_and_turns_with_its_body():
     made = footprints((BUS, (1.0, 2.0, 0.0)))
-    made.move(1, (3.0, 4.0, 0.5))
+    made.move_all(np.array([1]), np.array([[3.0, 4.0, 0.5]]))
     assert made.boxes[1].tolist() == [3.0, 4.0, 3.47 / 2, 11.19, 2.94, 3.47, 0.5]
     assert np.isnan(made.boxes[0]).all()
 

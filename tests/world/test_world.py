@@ -109,3 +109,15 @@ def test_a_driver_of_the_traffic_is_a_body_too(world):
     world.advance(0.0, 1.0)
     x, y, *_ = world.boxes([actor])[0]
     assert (x, y) == pytest.approx((22.0, 3.5), abs=0.1)
+
+
+def test_what_comes_later_is_at_once_where_it_belongs(world):
+    """Its box, and the hulls that collide."""
+    world.at(0.1, lambda: world.add("late", "bus", lambda time: (100.0 - 700 * time, 0.0, 0.0)))
+    assert world.advance(0.0, 0.05).impact_speed_mps is None
+    world.advance(0.0, 0.05)
+    (late,) = world.actors
+    assert world.boxes([late])[0, 0] == pytest.approx(30.0)
+    assert world.bullet.cast(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0, 0.0]]), 50.0)[0] == pytest.approx(
+        30.0 - late.kind.size[0] / 2, abs=0.01
+    )
