@@ -4,10 +4,11 @@ Numba's cache notices a change in a compiled function's own file only, so no oth
 """
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 
-@njit(cache=True)
+@compiled()
 def share(sets, ends, blocks, marks, out):  # type: ignore[no-untyped-def]
     """Add to `out` (3, B) a part for every cell of three groups of `sets`, a cell counting once a group.
 
@@ -24,7 +25,7 @@ def share(sets, ends, blocks, marks, out):  # type: ignore[no-untyped-def]
         start = end
 
 
-@njit(cache=True)
+@compiled()
 def look(fired, scan, blocks, marks, out):  # type: ignore[no-untyped-def]
     """Fill `out` (3, B) from the cells that fired: the nearness of the nearest return, and the shares of cells fired
     and of those with a return that stands above the road outside every hull, which `marks` has as its first group.

@@ -7,12 +7,13 @@ so no other file's compiled code calls these.
 import math
 
 import numpy as np
-from numba import njit
+
+from care_sim.compiled import compiled
 
 UNEXPLAINED, BOX, SMALL, EXPLAINED, HULL, FIRED, STANDING, NEAR_STANDING = (1 << bit for bit in range(8))
 
 
-@njit(cache=True)
+@compiled()
 def mark(codes, sizes, cells, ends, marks):  # type: ignore[no-untyped-def]
     """Give the cells of sets, which lie one after the other and end at `ends` (s,), the marks (s,) of their sets.
 
@@ -31,7 +32,7 @@ def mark(codes, sizes, cells, ends, marks):  # type: ignore[no-untyped-def]
         start = end
 
 
-@njit(cache=True)
+@compiled()
 def mark_scan(codes, nearnesses, ranges, heights, limits, margins):  # type: ignore[no-untyped-def]
     """Mark the cells that the last scan `ranges` (E, A) fired, what stood there, and its surroundings; write the
     `nearnesses` (N,) of returns, 1 at the sensor and 0 at the reach.
@@ -56,7 +57,7 @@ def mark_scan(codes, nearnesses, ranges, heights, limits, margins):  # type: ign
                         codes[near * columns + by % columns] |= NEAR_STANDING
 
 
-@njit(cache=True)
+@compiled()
 def score(seen, outlook, layers, out):  # type: ignore[no-untyped-def]
     """(N,) the output for every cell.
 
