@@ -1,6 +1,7 @@
 """Optional dependencies, imported where they are used; a missing one is named in one line."""
 
 import ctypes
+from importlib import import_module
 from types import ModuleType
 
 from care_sim.errors import MissingExtra
@@ -24,31 +25,24 @@ def import_open3d() -> ModuleType:
 
 def import_torch() -> ModuleType:
     """PyTorch. Raises MissingExtra with the extra to install."""
-    try:
-        import torch
-    except ImportError as error:
-        raise MissingExtra(f"PyTorch needs the extra 'rl': pip install 'care-sim[rl]' ({error})") from error
-    return torch
+    return _import("torch", "PyTorch", "rl")
 
 
 def import_mujoco() -> ModuleType:
     """MuJoCo. Raises MissingExtra with the extra to install."""
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingExtra(f"MuJoCo needs the extra 'bench': pip install 'care-sim[bench]' ({error})") from error
-    module: ModuleType = mujoco
-    return module
+    return _import("mujoco", "MuJoCo", "bench")
 
 
 def import_panda_gym() -> ModuleType:
     """panda-gym, which registers its environments. Raises MissingExtra with the extra to install."""
+    return _import("panda_gym", "panda-gym", "bench")
+
+
+def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
-        import panda_gym
+        return import_module(module)
     except ImportError as error:
-        raise MissingExtra(f"panda-gym needs the extra 'bench': pip install 'care-sim[bench]' ({error})") from error
-    module: ModuleType = panda_gym
-    return module
+        raise MissingExtra(f"{name} needs the extra '{extra}': pip install 'care-sim[{extra}]' ({error})") from error
 
 
 def _load_libusb() -> None:

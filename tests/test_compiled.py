@@ -1,5 +1,8 @@
 """Compiled code where it can be kept, and where it cannot."""
 
+import os
+import pty
+import select
 import subprocess
 import sys
 
@@ -21,3 +24,14 @@ def test_the_package_alone_compiles_nothing():
     code = "import sys, care_sim; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_who_waits_at_a_terminal_for_the_first_use_is_told(tmp_path):
+    terminal, other_end = pty.openpty()
+    code = "import numpy as np; from care_sim.turns import survey; survey(np.array([3]), np.array([1]))"
+    heard = []
+    for _ in range(2):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+        subprocess.run([sys.executable, "-c", code], env=environment, stderr=other_end, check=True)
+        heard.append(os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else "")
+    assert heard == ["care_sim: compiling; this takes half a minute, once on a machine\r\n", ""]

@@ -13,7 +13,7 @@ from care_sim.study.episode import trace
 from care_sim.study.paper import configurations
 from care_sim.types import Keyframe
 
-ENGINES = ("fast", "bullet")
+COMPARED = ("fast", "bullet")
 
 
 class Outcomes:
@@ -29,7 +29,7 @@ class Outcomes:
 
     def compare(self, config: EpisodeConfig) -> None:
         """Play an episode under both engines."""
-        (_, drawn), (_, expected) = (trace(config.changed(engine=engine)) for engine in ENGINES)
+        (_, drawn), (_, expected) = (trace(config.changed(engine=engine)) for engine in COMPARED)
         self.episodes += 1
         self.keyframes += len(expected)
         if outcome(drawn) != outcome(expected):

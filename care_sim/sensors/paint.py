@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from care_sim.compiled import compiled
-
-NOTHING = -1
+from care_sim.world.bullet import NOTHING
 
 
 @compiled(error_model="numpy")

@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from care_sim.compiled import compiled
+from care_sim.world.bullet import NOTHING
 
-NOTHING = -1
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.primitives.SHAPES`."""
 

@@ -183,7 +183,7 @@ def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
 
 
 def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
-    monkeypatch.setattr(parity_outcomes, "ENGINES", ("fast", "nearsighted"))
+    monkeypatch.setattr(parity_outcomes, "COMPARED", ("fast", "nearsighted"))
     monkeypatch.setitem(ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid)))
     config, outcomes = EpisodeConfig("dense", "care", 0.1, 0), Outcomes()
     outcomes.compare(config)
@@ -211,16 +211,16 @@ class Nearsighted:
         return np.where(ranges < 5, ranges, np.inf), np.where(ranges < 5, ids, -1)
 
 
-def report_of(rays=0, box_px=1.0, than_exact=()):
+def report_of(rays=0, box_px=1.0, outcomes=()):
     counts = {"references": {"Bullet in millimetres": {"boxes, upright": {"unexplained": rays}}}}
-    ended = {"other_outcomes": ["a"], "other_keyframes": ["a"], "other_than_exact": list(than_exact)}
+    ended = {"other_outcomes": list(outcomes), "other_keyframes": ["a"], "other_than_exact": []}
     return {"scans": {"one": counts}, "pictures": {"dense": {"widest_px": box_px}}, "outcomes": ended}
 
 
 def test_engines_agree_when_nothing_is_left_to_explain():
     assert agree(report_of())
     assert agree({**report_of(), "pictures": {}})
-    for wrong in ({"rays": 1}, {"box_px": 2.0}, {"than_exact": ["a"]}):
+    for wrong in ({"rays": 1}, {"box_px": 2.0}, {"outcomes": ["a"]}):
         assert not agree(report_of(**wrong))
 
 

@@ -9,9 +9,8 @@ from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA, Picture
 from care_sim.sensors.engines import Bullet
 from care_sim.sensors.fast import Fast
-from care_sim.sensors.paint import NOTHING
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
-from care_sim.world.bullet import BulletWorld
+from care_sim.world.bullet import NOTHING, BulletWorld
 from care_sim.world.looks import directions, polyhedron
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
