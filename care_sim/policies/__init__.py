@@ -17,7 +17,7 @@ from care_sim.policies.history_uniform import HistoryUniform
 from care_sim.policies.installed import ENTRY_POINTS, entries, load
 from care_sim.policies.learned_scorer import LearnedScorer
 from care_sim.policies.parameters import Maker, check_parameters, is_privileged
-from care_sim.policies.ppo import Ppo
+from care_sim.policies.ppo import Ppo, PpoDartout
 from care_sim.policies.random import Random
 from care_sim.policies.random_points import RandomPoints
 from care_sim.policies.uncertainty import Uncertainty
@@ -42,6 +42,7 @@ BUILT_IN: dict[str, Maker] = {
         FarthestPoints,
         LearnedScorer,
         Ppo,
+        PpoDartout,
     )
 }
 

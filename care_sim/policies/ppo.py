@@ -1,8 +1,8 @@
 """A learned allocator: sectors scored by a small network, trained by proximal policy optimisation."""
 
 from os import PathLike
+from typing import ClassVar
 
-from care_sim.errors import BrokenPolicy
 from care_sim.features import GridFeatures
 from care_sim.policies.base import Policy
 from care_sim.policies.score_map import ScoreMap
@@ -11,27 +11,24 @@ from care_sim.policies.wrapping import Wrapping
 from care_sim.tiling import Tiling, sector_demand
 from care_sim.types import Belief, Demand, Rig
 
-SHIPPED = "ppo-dense"
-
 
 class Ppo(Policy):
     """Does what the learner would behind its wrappers, without noise: the same scores, the same allocator.
 
-    `path` is a file of weights that `care-sim train ppo` wrote; without, those named `weights` that come with the
-    package. Raises InvalidInput for weights that are missing, damaged, of another kind, or made for another grid or
-    budget; BrokenPolicy when the package has no such weights.
+    `path` is a file of weights that `care-sim train ppo` wrote; without, those that come with the package, learned on
+    the dense street at all budgets of its tables. Raises InvalidInput for weights that are missing, damaged, of another
+    kind, or made for another grid or budget.
     """
 
     name = "ppo"
     tags = ("causal", "learned")
-    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3"
+    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on the dense street"
+    weights: ClassVar[str] = "ppo-dense"
 
-    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None, weights: str = SHIPPED):
+    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
-        if path is None and not shipped(weights).is_file():
-            raise BrokenPolicy(f"policy ppo: no weights {weights!r} come with the package; give path=FILE")
-        file = load(path if path is not None else shipped(weights))
-        file.check(self.name, rig, file.card.wrapper)
+        file = load(shipped(self.weights) if path is None else path)
+        file.check(Ppo.name, rig, file.card.wrapper)
         wrapping = Wrapping.parse(file.card.wrapper)
         self._reserve_alone = wrapping.action == "SectorReserve"
         self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
@@ -44,3 +41,11 @@ class Ppo(Policy):
         if self._reserve_alone:
             return sector_demand(belief, self.rig, self._sectors, scores)
         return Demand(layers=[[cells] for cells in self._sectors.ranked(scores, belief.budget)])
+
+
+class PpoDartout(Ppo):
+    """The same, learned on the dart-out."""
+
+    name = "ppo-dartout"
+    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on the dart-out"
+    weights = "ppo-dartout"

@@ -1,4 +1,4 @@
-"""Tables of a sweep: in every setting the levels of all policies, then what CARE has over each."""
+"""Tables of a sweep: in every setting the levels of all policies, then what CARE and the learned have over each."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from care_sim.study.entries import ends, interval, marked, percent, spread, tag_
 from care_sim.study.paper import Published, paper_cells, published
 from care_sim.study.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
 from care_sim.study.table import Table
-from care_sim.study.task import Row
+from care_sim.study.task import REFERENCE, Row
 
 COLUMNS = (
     "budget",
@@ -27,8 +27,6 @@ COLUMNS = (
 FILES_ONLY = ("pass m", "clearance m", "collisions", "interval", "as full")
 """Columns that 80 characters of a terminal leave no room for."""
 WHOLE = tuple(column for column in COLUMNS if column not in ("policy", "paper"))
-REFERENCE = "care"
-"""The policy that is compared with every other."""
 
 
 def sweep_tables(rows: Sequence[Row]) -> list[Table]:
@@ -53,35 +51,33 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
 
 
 def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
-    """CARE minus every other policy, policies by budgets, a block a measure; none unless CARE and another ran."""
-    budgets = sorted({cell.budget for cell in cells if cell.policy == REFERENCE})
-    tags = {cell.policy: cell.tags for cell in cells if cell.policy != REFERENCE}
-    if full_of(groups, setting):
-        tags["full"] = ()
-    if not (budgets and tags):
-        return []
-    measures = [DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])]
-    lines = [line for measure in measures for line in _block(measure, setting, tags, budgets, groups)]
-    columns = (f"{REFERENCE} minus", *map(percent, budgets))
-    title = f"{setting.label}: {REFERENCE} minus each policy"
-    return [Table(title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1])]
+    """CARE minus every other policy, then the same of every learned one; none for a policy that ran alone."""
+    tags = {cell.policy: cell.tags for cell in cells} | ({"full": ()} if full_of(groups, setting) else {})
+    learned = [policy for policy in tags if "learned" in tags[policy]]
+    named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
+    return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
 
 
-def _block(
-    measure: Measure, setting: Setting, tags: dict[str, tuple[str, ...]], budgets: Sequence[float], groups: Groups
-) -> list[tuple[str, ...]]:
-    lines = [
-        (marked(policy, tags[policy]), *(interval(_ahead(measure, (setting, policy, b), groups)) for b in budgets))
-        for policy in tags
-    ]
-    return [(f"{measure.name}, {measure.unit}",), *lines]
+def _contrast_table(
+    setting: Setting, reference: str, cells: Sequence[Cell], groups: Groups, tags: dict[str, tuple[str, ...]]
+) -> Table:
+    """The reference minus the others, policies by budgets, a block a measure."""
+    budgets = sorted({cell.budget for cell in cells if cell.policy == reference})
+    lines: list[tuple[str, ...]] = []
+    for measure in (DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])):
+        lines.append((f"{measure.name}, {measure.unit}",))
+        for policy in (policy for policy in tags if policy != reference):
+            pairs = [((setting, reference, budget), (setting, policy, budget)) for budget in budgets]
+            lines.append((marked(policy, tags[policy]), *(interval(_ahead(measure, *pair, groups)) for pair in pairs)))
+    columns = (f"{reference} minus", *map(percent, budgets))
+    title = f"{setting.label}: {reference} minus each policy"
+    return Table(title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1])
 
 
-def _ahead(measure: Measure, other: Key, groups: Groups) -> Contrast | None:
-    """What the reference has over another policy at the same budget, or over the full scan."""
-    setting, policy, budget = other
-    theirs = full_of(groups, setting) if policy == "full" else groups.get(other)
-    return contrast(measure, groups.get((setting, REFERENCE, budget)), theirs)
+def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
+    """What a policy has over another at the same budget, or over the full scan."""
+    setting, policy, _ = theirs
+    return contrast(measure, groups.get(ours), full_of(groups, setting) if policy == "full" else groups.get(theirs))
 
 
 def _published(cell: Cell) -> Published | None:

@@ -3,6 +3,7 @@
 | file | content |
 |---|---|
 | `config.json` | the effective configuration |
+| `rules.json` | what rules score on the same validation seeds |
 | `curve.csv` | steps, seconds, return and detection distance at every evaluation |
 | `checkpoint.zip` | all that a run needs to go on, by Stable-Baselines3; loading it executes code: load your own |
 | `weights.npz` | the weights with the best return on the validation seeds; loading it executes nothing (`ppo` only) |
@@ -11,6 +12,7 @@
 import csv
 import json
 import os
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -24,6 +26,7 @@ from care_sim.types import Rig
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
+CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
 COLUMNS = ("steps", "seconds", "return", "distance_m")
 
 
@@ -33,7 +36,7 @@ class Folder:
     def __init__(self, config: AgentConfig):
         self.config, self.path = config, config.out
         self.checkpoint, self.weights = self.path / "checkpoint.zip", self.path / "weights.npz"
-        self._settings, self._curve = self.path / "config.json", self.path / "curve.csv"
+        self._settings, self._curve = self.path / CONFIG, self.path / CURVE
         if config.resume:
             self._check_resumable()
         elif self._settings.exists():
@@ -43,6 +46,13 @@ class Folder:
         """Write the configuration down."""
         self.path.mkdir(parents=True, exist_ok=True)
         self._settings.write_text(self.config.to_json())
+
+    def rules(self, score: Callable[[], dict[str, Score]]) -> dict[str, Score]:
+        """What rules score: measured at the beginning of a run, read when it is resumed."""
+        path = self.path / RULES
+        if not path.exists():
+            path.write_text(json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n")
+        return {name: Score(**plain) for name, plain in json.loads(path.read_text()).items()}
 
     @property
     def seconds(self) -> float:

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from care_sim.errors import InvalidInput, MissingExtra
@@ -12,15 +13,15 @@ from care_sim.study.progress import Lines, Show, bar, spoken
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
 from care_sim.training.environments import bare, side_by_side, wrapped
-from care_sim.training.evaluation import acting, evaluate, rule
+from care_sim.training.evaluation import Score, acting, evaluate, rule
 from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
-RULES = ("random", "history", "care")
-"""What the learner is held against at the start."""
+RULES = {"random": None, "history": None, "care": None, "full": 1.0}
+"""What the learner is held against, with its budget where that is not the learner's."""
 
 
 def train(config: AgentConfig) -> int:
@@ -37,7 +38,8 @@ def train(config: AgentConfig) -> int:
     try:
         model = _resumed(config, folder, envs) if config.resume else algorithms.make(config, envs)
         folder.begin()
-        _tell_rules(config)
+        for name, score in folder.rules(partial(_rules, config)).items():
+            _say(f"{name}: {score}")
         _learn(config, folder, model, env)
     finally:
         envs.close()
@@ -53,11 +55,14 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     return model
 
 
-def _tell_rules(config: AgentConfig) -> None:
-    env = bare(config)
-    for name in RULES:
-        _say(f"{name}: {evaluate(env, rule(name, env), validation_seeds(config.episodes))}")
-    env.close()
+def _rules(config: AgentConfig) -> dict[str, Score]:
+    """What the rules score on the validation seeds."""
+    scores = {}
+    for name, budget in RULES.items():
+        env = bare(config, budget)
+        scores[name] = evaluate(env, rule(name, env), validation_seeds(config.episodes))
+        env.close()
+    return scores
 
 
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
