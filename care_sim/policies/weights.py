@@ -4,10 +4,8 @@ The file is an .npz of NumPy, read with `allow_pickle=False`; the card is JSON t
 """
 
 import json
-import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -123,16 +121,6 @@ def load(path: str | PathLike[str]) -> Weights:
 def shipped(name: str) -> Path:
     """Where the weights of that name lie that come with the package."""
     return Path(__file__).parent / "shipped" / f"{name}.npz"
-
-
-def machine() -> str:
-    """The machine in a few words, for a card."""
-    return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
-
-
-def versions(*packages: str) -> dict[str, str]:
-    """The versions of installed packages, for a card."""
-    return {package: version(package) for package in packages}
 
 
 def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:

@@ -1,7 +1,8 @@
 """What is trained, on what, and how long."""
 
 import json
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -89,12 +90,16 @@ class AgentConfig:
         plain = {"algorithm": self.algorithm} | asdict(self) | {"out": str(self.out)}
         return json.dumps(plain, indent=1) + "\n"
 
-    def check_same(self, text: str) -> None:
+    @property
+    def recipe(self) -> dict[str, Any]:
+        """What decides the weights, as plain data: all but where and how long."""
+        return {name: value for name, value in json.loads(self.to_json()).items() if name not in HOW_LONG}
+
+    def check_same(self, before: Mapping[str, Any]) -> None:
         """Raise InvalidInput, with the first difference, unless the run of that configuration can be gone on with."""
-        before, now = json.loads(text), json.loads(self.to_json())
-        for name in ("algorithm", *(field.name for field in fields(self) if field.name not in HOW_LONG)):
-            if before.get(name) != now[name]:
-                raise InvalidInput(f"{self.out}: trained with {name} {before.get(name)!r}, asked is {now[name]!r}")
+        for name, value in self.recipe.items():
+            if before.get(name) != value:
+                raise InvalidInput(f"{self.out}: trained with {name} {before.get(name)!r}, asked is {value!r}")
 
     def __call__(self) -> int:
         """Train it."""

@@ -1,5 +1,5 @@
 """Learning curves of training runs, read from their folders: runs that differ by their seed alone lie together."""
-import csv
+
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,25 +10,42 @@ import tyro
 
 from care_sim.errors import InvalidInput
 from care_sim.training.config import HOW_LONG
-from care_sim.training.folder import CONFIG, CURVE, RULES
+from care_sim.training.folder import CONFIG, CURVE, RULES, Evaluation, read_curve, read_json
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run: its configuration, what rules score on its validation seeds, and an evaluation a row. `measure` is the
-    column that is drawn: the distance of the first detection, or the return where there is none.
-    """
+    """A run: its configuration, what rules score on its validation seeds, and its evaluations."""
 
     config: Mapping[str, Any]
     rules: Mapping[str, Mapping[str, float]]
-    steps: Sequence[int]
-    values: Sequence[float]
-    measure: str
+    curve: Sequence[Evaluation]
 
     @property
     def task(self) -> str:
         """What runs that lie together share."""
         return json.dumps({name: self.config[name] for name in self.config if name not in ("seed", *HOW_LONG)})
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether a first detection has a distance; the return alone is measured otherwise."""
+        return all(distance is not None for *_, distance in self.curve)
+
+    @property
+    def marks(self) -> dict[str, float]:
+        """What the rules reach, measured as `values`."""
+        scores = self.rules.items()
+        return {name: s["mean_return"] if s["distance_m"] is None else s["distance_m"] for name, s in scores}
+
+    @property
+    def steps(self) -> list[int]:
+        """Of the evaluations."""
+        return [steps for steps, *_ in self.curve]
+
+    @property
+    def values(self) -> list[float]:
+        """What is drawn of the evaluations: metres of the first detection, or the return."""
+        return [value if distance is None else distance for _, _, value, distance in self.curve]
 
 
 @dataclass(frozen=True)
@@ -59,11 +76,7 @@ def read(folder: Path) -> Run:
     for name in (CONFIG, RULES, CURVE):
         if not (folder / name).is_file():
             raise InvalidInput(f"{folder} holds no evaluated training run: no {name}")
-    with (folder / CURVE).open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    measure = "distance_m" if all(row["distance_m"] for row in rows) else "return"
-    config, rules = (json.loads((folder / name).read_text()) for name in (CONFIG, RULES))
-    return Run(config, rules, [int(row["steps"]) for row in rows], [float(row[measure]) for row in rows], measure)
+    return Run(read_json(folder / CONFIG), read_json(folder / RULES), read_curve(folder / CURVE))
 
 
 def together(runs: Iterable[Run]) -> list[list[Run]]:

@@ -1,6 +1,7 @@
 """The figure of learning curves: what is reached on validation seeds against the steps trained."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +13,6 @@ from care_sim.training.curves import Run
 
 LEARNED = "#CC3311"
 """From the palette of Tol (2021); the learner is none of the rules."""
-AXIS = {"distance_m": "first detection (m; 0 if never)", "return": "return"}
-SCORE = {"distance_m": "distance_m", "return": "mean_return"}
 
 
 def curves_figure(groups: Sequence[Sequence[Run]]) -> Figure:
@@ -22,33 +21,43 @@ def curves_figure(groups: Sequence[Sequence[Run]]) -> Figure:
     panels = figure.subplots(1, len(groups), squeeze=False)[0]
     for axes, runs in zip(panels, groups, strict=True):
         _draw(axes, runs)
-        axes.set_ylabel(AXIS[runs[0].measure])
+        axes.set_ylabel("first detection (m; 0 if never)" if runs[0].closed_loop else "return")
     return figure
 
 
 def _draw(axes: Axes, runs: Sequence[Run]) -> None:
-    config, measure = runs[0].config, runs[0].measure
+    config, marks = runs[0].config, runs[0].marks
+    learner = config["algorithm"]
+    colours = {name: style.colour for name, style in styles((name, tags_of(name)) for name in marks).items()}
+    colours |= {"full": FULL.colour, learner: LEARNED}
+    for name, height in marks.items():
+        axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
         axes.plot(run.steps, run.values, color=LEARNED, linewidth=0.9, alpha=0.5 if len(runs) > 1 else 1.0)
     _mean(axes, runs)
-    names = [name for name in runs[0].rules if name != "full"]
-    drawn = styles((name, tags_of(name)) for name in names) | {"full": FULL}
-    for name, score in runs[0].rules.items():
-        axes.axhline(score[SCORE[measure]], color=drawn[name].colour, linestyle="--", linewidth=1.1, zorder=1)
-    heights = {name: score[SCORE[measure]] for name, score in runs[0].rules.items()}
-    heights[config["algorithm"]] = float(np.mean([run.values[-1] for run in runs]))
-    _name_lines(axes, heights, {name: style.colour for name, style in drawn.items()} | {config["algorithm"]: LEARNED})
-    seeds = f"{len(runs)} training seed{'s' if len(runs) > 1 else ''}"
-    axes.set_title(f"{config['env']} at {config['budget'][0]:.0%}, {seeds}", loc="left", fontsize=10)
-    axes.set_xlabel(f"environment steps\n{config['episodes']} validation episodes a point")
     axes.set_xlim(0, max(run.steps[-1] for run in runs))
+    if runs[0].closed_loop:
+        axes.set_ylim(bottom=0)
+    _name_lines(axes, marks | {learner: float(np.mean([run.values[-1] for run in runs]))}, colours)
+    _describe(axes, config, len(runs))
+
+
+def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
+    axes.set_title(
+        f"{config['algorithm']}, {config['env']}, {seeds} training seed{'s' * (seeds > 1)}", loc="left", size=10
+    )
+    trained = ", ".join(f"{budget:.3g}" for budget in config["budget"])
+    axes.set_xlabel(
+        f"environment steps, trained at budget {trained}\n"
+        f"a point is the mean of {config['episodes']} validation episodes at {config['budget'][0]:.3g}"
+    )
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.92")
 
 
 def _mean(axes: Axes, runs: Sequence[Run]) -> None:
-    shared = min(runs, key=lambda run: len(run.steps)).steps
-    if len(runs) > 1 and all(list(run.steps[: len(shared)]) == list(shared) for run in runs):
+    shared = min((run.steps for run in runs), key=len)
+    if len(runs) > 1 and all(run.steps[: len(shared)] == shared for run in runs):
         values = np.mean([run.values[: len(shared)] for run in runs], axis=0)
         axes.plot(shared, values, color=LEARNED, linewidth=2.2)
 

@@ -42,7 +42,7 @@ def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[A
 
 def training(config: AgentConfig, budget: float) -> gymnasium.Env[Any, Any]:
     """The same over training seeds."""
-    return TrainingSeeds(wrapped(config, budget))
+    return TrainingSeeds(wrapped(config, budget), config.seed)
 
 
 def side_by_side(config: AgentConfig) -> "VecEnv":

@@ -4,9 +4,12 @@
 |---|---|
 | `config.json` | the effective configuration |
 | `rules.json` | what rules score on the same validation seeds |
-| `curve.csv` | steps, seconds, return and detection distance at every evaluation |
-| `checkpoint.zip` | all that a run needs to go on, by Stable-Baselines3; loading it executes code: load your own |
+| `curve.csv` | steps, seconds, return and detection distance at every evaluation, before the first step too |
+| `checkpoint.zip` | the learner, by Stable-Baselines3; loading it executes code: load your own |
 | `weights.npz` | the weights with the best return on the validation seeds; loading it executes nothing (`ppo` only) |
+
+Every file is written beside and then put in its place: an interruption leaves the one before. The experience that SAC
+learns from is not kept (half a gigabyte): a resumed run gathers its own.
 """
 
 import csv
@@ -14,12 +17,14 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from care_sim.errors import InvalidInput
-from care_sim.policies.weights import Card, machine, save, versions
+from care_sim.policies.weights import Card, save
 from care_sim.training.config import AgentConfig
 from care_sim.training.evaluation import Score
+from care_sim.training.origin import machine, versions
 from care_sim.training.seeds import TRAINING, validation_seeds
 from care_sim.types import Rig
 
@@ -28,64 +33,68 @@ if TYPE_CHECKING:
 
 CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
 COLUMNS = ("steps", "seconds", "return", "distance_m")
+Evaluation = tuple[int, float, float, float | None]
+"""Of `COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open loop)."""
 
 
 class Folder:
-    """The folder of a configuration. Raises InvalidInput when it holds another run, or none to be resumed."""
+    """The folder of a configuration. Raises InvalidInput when it holds another run, none to be resumed, or a damaged
+    file.
+    """
 
     def __init__(self, config: AgentConfig):
         self.config, self.path = config, config.out
         self.checkpoint, self.weights = self.path / "checkpoint.zip", self.path / "weights.npz"
-        self._settings, self._curve = self.path / CONFIG, self.path / CURVE
         if config.resume:
             self._check_resumable()
-        elif self._settings.exists():
+        elif (self.path / CONFIG).exists():
             raise InvalidInput(f"{self.path} holds a run already; add --resume, or give another --out")
+        self._curve = read_curve(self.path / CURVE) if config.resume else []
 
-    def begin(self) -> None:
-        """Write the configuration down."""
+    def begin(self, model: "BaseAlgorithm") -> None:
+        """Write the configuration down, and the learner as it is: from here on the run can be resumed."""
         self.path.mkdir(parents=True, exist_ok=True)
-        self._settings.write_text(self.config.to_json())
+        self.save(model)
+        _put(self.path / CONFIG, lambda beside: beside.write_text(self.config.to_json()))
 
     def rules(self, score: Callable[[], dict[str, Score]]) -> dict[str, Score]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
         path = self.path / RULES
         if not path.exists():
-            path.write_text(json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n")
-        return {name: Score(**plain) for name, plain in json.loads(path.read_text()).items()}
+            text = json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
+            _put(path, lambda beside: beside.write_text(text))
+        return {name: Score(**plain) for name, plain in read_json(path).items()}
 
     @property
     def seconds(self) -> float:
-        """How long the run has taken by the last evaluation."""
-        return self._rows()[-1][1] if self._rows() else 0.0
+        """How long the run has learned by the last evaluation."""
+        return self._curve[-1][1] if self._curve else 0.0
 
-    @property
-    def best_return(self) -> float:
-        """The best return at an evaluation so far."""
-        return max((row[2] for row in self._rows()), default=float("-inf"))
+    def evaluated(self, model: "BaseAlgorithm") -> bool:
+        """Whether the learner has been evaluated as it is."""
+        return bool(self._curve) and self._curve[-1][0] >= model.num_timesteps
 
     def keep(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> None:
-        """Write an evaluation, a checkpoint and, when it is the best yet, the weights."""
-        if score.mean_return > self.best_return:
+        """Write an evaluation and, when it is the best yet, the weights."""
+        if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
-        new = not self._curve.exists()
-        with self._curve.open("a", newline="") as file:
-            lines = csv.writer(file)
-            lines.writerows([COLUMNS] if new else [])
-            lines.writerow([model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m])
-        self.save(model)
+        self._curve.append((model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m))
+        _put(self.path / CURVE, self._write_curve)
 
     def save(self, model: "BaseAlgorithm") -> None:
-        """Write a checkpoint; an interruption leaves the one before."""
-        beside = self.path / "checkpoint.new.zip"
-        model.save(beside)
-        os.replace(beside, self.checkpoint)
+        """Write a checkpoint."""
+        _put(self.checkpoint, model.save)
+
+    def _write_curve(self, path: Path) -> None:
+        with path.open("w", newline="") as file:
+            csv.writer(file).writerows([COLUMNS, *self._curve])
 
     def _export(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> None:
         from care_sim.training.networks import SectorPolicy
 
         if isinstance(model.policy, SectorPolicy):
-            save(self.weights, model.policy.arrays(), self._card(model, score, seconds, rig))
+            arrays, card = model.policy.arrays(), self._card(model, score, seconds, rig)
+            _put(self.weights, lambda beside: save(beside, arrays, card))
 
     def _card(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> Card:
         config, held_out = self.config, validation_seeds(score.episodes)
@@ -100,17 +109,38 @@ class Folder:
             steps=model.num_timesteps,
             machine=f"{machine()}, {round(seconds)} s",
             versions=versions("care-sim", "numpy", "stable-baselines3", "torch"),
-            result={"validation": asdict(score), "config": json.loads(config.to_json())},
+            result={"validation": asdict(score), "config": config.recipe},
         )
 
     def _check_resumable(self) -> None:
-        for file in (self._settings, self.checkpoint):
+        for file in (self.path / CONFIG, self.checkpoint):
             if not file.exists():
                 raise InvalidInput(f"{self.path} holds no run to be resumed: no {file.name}")
-        self.config.check_same(self._settings.read_text())
+        self.config.check_same(read_json(self.path / CONFIG))
 
-    def _rows(self) -> list[list[float]]:
-        if not self._curve.exists():
-            return []
-        with self._curve.open(newline="") as file:
-            return [[float(value or "nan") for value in row] for row in list(csv.reader(file))[1:]]
+
+def read_json(path: Path) -> Any:
+    """What a file of the folder says. Raises InvalidInput for a damaged one."""
+    try:
+        return json.loads(path.read_text())
+    except ValueError as error:
+        raise InvalidInput(f"{path} is damaged: {error}") from error
+
+
+def read_curve(path: Path) -> list[Evaluation]:
+    """The evaluations of a run, none yet included. Raises InvalidInput for a damaged file."""
+    if not path.exists():
+        return []
+    try:
+        with path.open(newline="") as file:
+            rows = [[row[name] for name in COLUMNS] for row in csv.DictReader(file)]
+        return [(int(n), float(s), float(r), float(d) if d else None) for n, s, r, d in rows]
+    except (ValueError, KeyError, TypeError) as error:
+        raise InvalidInput(f"{path} is damaged: {type(error).__name__} {error}") from error
+
+
+def _put(path: Path, write: Callable[[Path], object]) -> None:
+    """Write a file beside, then put it in its place."""
+    beside = path.with_name(f"new-{path.name}")
+    write(beside)
+    os.replace(beside, path)

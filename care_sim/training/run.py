@@ -37,7 +37,7 @@ def train(config: AgentConfig) -> int:
     envs = side_by_side(config)
     try:
         model = _resumed(config, folder, envs) if config.resume else algorithms.make(config, envs)
-        folder.begin()
+        folder.begin(model)
         for name, score in folder.rules(partial(_rules, config)).items():
             _say(f"{name}: {score}")
         _learn(config, folder, model, env)
@@ -66,16 +66,17 @@ def _rules(config: AgentConfig) -> dict[str, Score]:
 
 
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
-    """Learn in stretches, with an evaluation after each."""
+    """Evaluate and learn in turn, until the last step is evaluated."""
     clock, begun = Stopwatch(folder.seconds), model.num_timesteps
     with bar(config.steps, "steps") if sys.stderr.isatty() else nullcontext(Lines(config.steps, "steps")) as show:
         shown = _shower(show, config, clock, begun)
-        while model.num_timesteps < config.steps:
-            with clock:
-                _stretch(model, min(config.evaluate_every, config.steps - model.num_timesteps), shown, folder)
+        while not folder.evaluated(model):
             score = evaluate(env, acting(model), validation_seeds(config.episodes))
             folder.keep(model, score, clock.seconds, env.unwrapped.rig)
             _say(f"{model.num_timesteps} steps: {score}")
+            if (left := config.steps - model.num_timesteps) > 0:
+                with clock:
+                    _stretch(model, min(config.evaluate_every, left), shown, folder)
     rate = (model.num_timesteps - begun) / clock.here
     _say(f"{rate:.0f} environment steps a second inside {config.algorithm}, learning included; kept in {folder.path}")
 
@@ -89,9 +90,8 @@ def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], f
 
     try:
         model.learn(steps, ConvertCallback(each), reset_num_timesteps=False)
-    except KeyboardInterrupt:
+    finally:
         folder.save(model)
-        raise
 
 
 def _shower(show: Show, config: AgentConfig, clock: "Stopwatch", begun: int) -> Callable[[int], None]:

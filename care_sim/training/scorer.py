@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from care_sim.errors import check_whole
 from care_sim.extras import import_torch
 from care_sim.grid import AngularGrid
-from care_sim.policies.weights import Arrays, Card, machine, save, versions
+from care_sim.policies.weights import Arrays, Card, save
 from care_sim.streets.street import CALIBRATION_SEEDS
+from care_sim.training.origin import machine, versions
 from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples
 
 UNITS = 16

@@ -20,16 +20,20 @@ LAST = 2**31 - 1
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Every reset begins an episode of a training seed; a seed given to `reset` decides the sequence of them."""
+    """Every reset begins an episode of a training seed; the learner's seed and one given to `reset` decide the sequence
+    of them. Stable-Baselines3 counts the latter up from environment to environment: without the former, learners of
+    neighbouring seeds would share most of their episodes.
+    """
 
-    def __init__(self, env: gymnasium.Env[Any, Any]):
+    def __init__(self, env: gymnasium.Env[Any, Any], learner: int = 0):
         super().__init__(env)
+        self._learner = learner
         self._rng = np.random.default_rng()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin the next episode."""
         if seed is not None:
-            self._rng = np.random.default_rng(seed)
+            self._rng = np.random.default_rng((seed, self._learner))
         return self.env.reset(seed=int(self._rng.integers(TRAINING, LAST)), options=options)
 
 
