@@ -103,7 +103,11 @@ MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig"}
 """Commands of packages that are imported for them alone, and what they are told in."""
 STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 KEPT = dict.fromkeys(STUDIES, "; what is finished is kept, the same command goes on from there")
-KEPT["train"] = "; what is learned is kept, the same command with --resume goes on from there"
+LEARNERS = ("ppo", "sac", "recurrent-ppo")
+KEPT |= dict.fromkeys(
+    (f"train {name}" for name in LEARNERS),
+    "; what is learned is kept, the same command with --resume goes on from there",
+)
 """What commands that keep what they have finished say when they are interrupted."""
 
 
@@ -121,7 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
-        _complain(f"interrupted{KEPT.get(arguments[0], '') if arguments else ''}", INTERRUPTED)
+        words = 2 if arguments[:1] == ["train"] else 1
+        _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", INTERRUPTED)
 
 
 def _command(arguments: list[str]) -> int:

@@ -38,7 +38,8 @@ def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> 
     | `gain` | -`lost` | first-detection distance as a share of the full-scan bound, less 1: 0 down to -1 |
 
     Each is at most 0; with weights of 0 or more the best return is 0. Where a full scan too is late, as the first rays
-    that return lag behind the first pixels in view, `delay` stays below 0 and `gain` reaches 0.
+    that return lag behind the first pixels in view, `delay` stays below 0; `gain` reaches 0 there, but for faults of
+    the LiDAR, which the bound does not know.
     """
     closeness = 1.0 - min(max(frame.clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
     return {
@@ -57,7 +58,7 @@ class Potential:
     first-sighting actor. From then on, while it is undetected, 1 - distance / bound is lost, and at the end of an
     episode without a detection everything. The potential never falls, and `gain` is its difference from keyframe to
     keyframe (Ng, Harada and Russell 1999, with a discount of 1): the differences sum to the metric itself, however
-    they are spread over the episode.
+    they are spread over the episode. A learner that discounts more weighs early losses more.
     """
 
     def __init__(self) -> None:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from care_sim.errors import InvalidInput, check_whole
 from care_sim.grid import AngularGrid, Cells
-from care_sim.types import Action, Belief, Demand, Rig
 
 
 @dataclass(frozen=True)
@@ -54,18 +53,3 @@ class Tiling:
         flat = np.ravel(scores)
         many = min(np.count_nonzero(flat > 0), -(-enough // self.cells.shape[1]))
         return list(self.cells[np.argsort(-flat, kind="stable")[:many]])
-
-    def spread(self, scores: NDArray[np.floating]) -> Action:
-        """A score a cell (E, A) from 0 to 1: that of its tile, 0 for a negative one."""
-        rows, columns = self.tile_shape
-        positive = np.clip(scores, 0.0, 1.0).astype(np.float32, copy=False)
-        return np.repeat(np.repeat(positive, rows, axis=0), columns, axis=1)
-
-
-def sector_demand(belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]) -> Demand:
-    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best first.
-
-    Twice the budget is enough of them: at most one budget of cells lies in the hulls already.
-    """
-    layers = [[cells] for cells in sectors.ranked(scores, 2 * belief.budget)]
-    return Demand(rig.hulls(belief.tracks.boxes), layers)

@@ -5,14 +5,10 @@ from hypothesis import strategies as st
 
 from care_sim.errors import InvalidInput
 from care_sim.grid import AngularGrid
-from care_sim.tiling import Tiling, sector_demand
-from care_sim.types import Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.tiling import Tiling
 
 GRID = AngularGrid(columns=4, rows=4)
 QUARTERS = Tiling(GRID, 2, 2)
-NOTHING = Belief(
-    Ego(), 4, ImageDetections.from_rows(np.empty((0, 9))), Tracks.from_rows(np.empty((0, 13))), np.zeros((4, 4))
-)
 
 
 def test_tiles_are_counted_from_the_top_row_and_from_straight_behind():
@@ -34,24 +30,13 @@ def test_no_more_tiles_than_hold_enough():
     assert [len(QUARTERS.ranked(np.ones((2, 2)), cells)) for cells in (0, 1, 4, 5, 100)] == [0, 1, 1, 2, 4]
 
 
-def test_every_cell_gets_the_score_of_its_tile():
-    spread = QUARTERS.spread(np.array([[0.5, -1.0], [2.0, 0.0]]))
-    assert spread.tolist() == [[0.5, 0.5, 0, 0]] * 2 + [[1, 1, 0, 0]] * 2
-    assert spread.dtype == np.float32
-
-
-def test_sectors_become_layers_behind_the_hulls():
-    demand = sector_demand(NOTHING, Rig(GRID, budget=4), QUARTERS, np.array([[0.1, 0.2], [0.3, 0.4]]))
-    assert demand.exploitation == []
-    assert [[cells.tolist() for cells in layer] for layer in demand.layers] == [[[10, 11, 14, 15]], [[8, 9, 12, 13]]]
-
-
 @given(st.sampled_from([1, 2, 4, 8, 16, 512]), st.sampled_from([1, 2, 4, 32]))
 def test_the_tiles_part_the_grid(azimuths, elevations):
     tiling = Tiling(AngularGrid(), azimuths, elevations)
     assert np.array_equal(np.sort(tiling.cells.ravel()), np.arange(AngularGrid().size))
-    pictured = np.arange(azimuths * elevations).reshape(tiling.shape) / (azimuths * elevations)
-    assert np.array_equal(np.argsort(tiling.spread(pictured).ravel(), kind="stable"), tiling.cells.ravel())
+    tall, wide = tiling.tile_shape
+    rows, columns = np.divmod(tiling.cells, 512)
+    assert np.array_equal(rows // tall * azimuths + columns // wide, np.indices(tiling.cells.shape)[0])
 
 
 @pytest.mark.parametrize(("azimuths", "elevations"), [(3, 4), (0, 4), (32, 5), (32, 64), (1.5, 4)])

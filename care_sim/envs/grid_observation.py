@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from care_sim.envs.sensing import sensing
@@ -13,7 +14,7 @@ from care_sim.features import EGO, GridFeatures
 Pictures = dict[str, NDArray[np.float32]]
 
 
-class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any]):
+class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any], RecordConstructorArgs):
     """Shows the belief as six channels over `columns` x `rows` blocks of the angular grid, and the car's own motion.
 
     ### Observation
@@ -45,7 +46,8 @@ class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any]):
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], columns: int = 64, rows: int = 8):
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
+        gymnasium.ObservationWrapper.__init__(self, env)
         self._sensing = sensing(env)
         self.features = GridFeatures(self._sensing.rig, columns, rows)
         shown: spaces.Space[Any] = spaces.Dict(

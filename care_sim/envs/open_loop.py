@@ -142,7 +142,7 @@ class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
     The seed of `reset` draws the street (`care_sim.streets`) and everything else that is random. Seeds 0 to 149 are the
-    evaluation's, 1000 to 1019 the calibration's: train on others.
+    evaluation's: train on others. `learned-scorer` learned from 1000 to 1019, the calibration's.
     """
 
     __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"

@@ -5,23 +5,31 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from care_sim.allocation import allocate, scores_of
 from care_sim.envs.sensing import sensing
 from care_sim.envs.spaces import checked_scores
-from care_sim.tiling import Tiling, sector_demand
-from care_sim.types import Action
+from care_sim.sector_demand import reserve_demand, sector_demand
+from care_sim.tiling import Tiling
+from care_sim.types import Action, Demand
 
 
-class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action]):
+class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):
     """Scores a sector, from -1 to 1: the range in which learners are at home."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
+        gymnasium.ActionWrapper.__init__(self, env)
         self._sensing = sensing(env)
         self.sectors = Tiling(self._sensing.rig.grid, azimuths, elevations)
         self.action_space = spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
+
+    def _cells(self, demand: Demand) -> Action:
+        """Scores (E, A) of the cells that the shared allocator takes."""
+        rig = self._sensing.rig
+        return scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
 
 
 class SectorReserve(_Sectors):
@@ -53,13 +61,12 @@ class SectorReserve(_Sectors):
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
-        scores, rig, belief = checked_scores(action, self.sectors.shape), self._sensing.rig, self._sensing.belief
-        cells = allocate(sector_demand(belief, rig, self.sectors, scores), belief.budget, rig.reserve_fraction)
-        return scores_of(cells, rig.grid.shape)
+        scores = checked_scores(action, self.sectors.shape)
+        return self._cells(reserve_demand(self._sensing.belief, self._sensing.rig, self.sectors, scores))
 
 
 class SectorScores(_Sectors):
-    """The action scores everything: every cell gets the score of its sector, and the B highest fire.
+    """The action scores everything: sector after sector is fired whole, best first, up to the budget.
 
     ### Action
     `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest, azimuth 0 begins
@@ -67,7 +74,7 @@ class SectorScores(_Sectors):
 
     | score | what becomes of the sector |
     |---|---|
-    | above 0 | its cells fire before those of sectors scored lower, ties by ascending cell index |
+    | above 0 | its cells fire, ascending, before those of sectors scored lower; ties by ascending index |
     | 0 or less | left to the floor |
 
     ### Observation
@@ -78,5 +85,5 @@ class SectorScores(_Sectors):
     """
 
     def action(self, action: NDArray[np.float32]) -> Action:
-        """Scores (E, A) of the cells."""
-        return self.sectors.spread(checked_scores(action, self.sectors.shape))
+        """Scores (E, A) of the cells that the shared allocator takes."""
+        return self._cells(sector_demand(self._sensing.rig, self.sectors, checked_scores(action, self.sectors.shape)))

@@ -26,24 +26,35 @@ def road_plane(points: Floats, sensor_height_m: float) -> Floats:
     """(3,) a, b, c of the road z = a x + b y + c in the sensor frame.
 
     Least squares with Cauchy's loss over the points that could lie on the road; slope and offset are bounded, so
-    few or misleading points do little, and none give the level plane beneath the sensor.
+    few or misleading points do little, and none give the level plane beneath the sensor. The fit turns with the points.
     """
     level = np.array([0.0, 0.0, -sensor_height_m])
     low = points[_could_be_road(points, level)]
     if len(low) < len(level):
         return level
     design = np.column_stack([low[:, :2], np.ones(len(low))])
-    slack = np.array([STEEPEST, STEEPEST, SETTLING_M])
 
-    def misses(plane: Floats) -> Floats:
-        return np.asarray(design @ plane - low[:, 2])
+    def misses(free: Floats) -> Floats:
+        return np.asarray(design @ (level + _bounded(free)[0]) - low[:, 2])
 
-    def jacobian(_: Floats) -> Floats:
-        return design
+    def jacobian(free: Floats) -> Floats:
+        return np.asarray(design @ _bounded(free)[1])
 
-    bounds = (level - slack, level + slack)
-    fit = least_squares(misses, level, jacobian, bounds, loss="cauchy", f_scale=ROUGHNESS_M)
-    return np.asarray(fit.x)
+    fit = least_squares(misses, np.zeros(3), jacobian, loss="cauchy", f_scale=ROUGHNESS_M)
+    return level + _bounded(fit.x)[0]
+
+
+def _bounded(free: Floats) -> tuple[Floats, Floats]:
+    """(3,) a departure from the level plane, slope below STEEPEST whatever its direction and offset below SETTLING_M,
+    from three free numbers; and its derivatives (3, 3).
+    """
+    departure, derivatives = np.empty(3), np.zeros((3, 3))
+    for part, most in ((slice(2), STEEPEST), (slice(2, 3), SETTLING_M)):
+        u = free[part]
+        scale = np.sqrt(1 + u @ u)
+        departure[part] = most * u / scale
+        derivatives[part, part] = most * (np.eye(len(u)) / scale - np.outer(u, u) / scale**3)
+    return departure, derivatives
 
 
 def _could_be_road(points: Floats, level: Floats) -> NDArray[np.bool_]:

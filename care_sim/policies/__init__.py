@@ -70,9 +70,9 @@ def tags_of(name: str) -> tuple[str, ...]:
 def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
     """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its rig alone.
 
-    Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, or an environment
-    without a rig; BrokenPolicy for one that cannot be loaded or made; MissingExtra for one whose library is not
-    installed.
+    Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an environment without
+    a rig, or one behind wrappers that change what is seen or done; BrokenPolicy for one that cannot be loaded or made;
+    MissingExtra for one whose library is not installed.
     """
     check_policy(name)
     try:
@@ -80,6 +80,7 @@ def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
     except InvalidInput as error:
         raise BrokenPolicy(f"policy {name} cannot be loaded: {error}") from error
     given = [_of_environment(name, env, "rig")]
+    _check_bare(name, env)
     check_parameters(name, make, parameters)
     if is_privileged(make):
         given.append(_of_environment(name, env, "truth"))
@@ -103,6 +104,12 @@ def maker(name: str) -> Maker:
     if name not in entries():
         raise unknown("policy", name, policy_names())
     return load(entries()[name])
+
+
+def _check_bare(name: str, env: gymnasium.Env) -> None:
+    inner = env.unwrapped
+    if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
+        raise InvalidInput(f"policy {name} plays the environment itself, not behind its wrappers: give env.unwrapped")
 
 
 def _of_environment(name: str, env: gymnasium.Env, attribute: str) -> object:

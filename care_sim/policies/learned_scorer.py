@@ -5,6 +5,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.errors import InvalidInput
 from care_sim.grid import Cells
 from care_sim.policies.base import Policy
 from care_sim.policies.cues import CUES, MARKS, OUTLOOKS, Cues, Seen
@@ -14,7 +15,8 @@ from care_sim.types import Belief, Demand, Rig
 
 class LearnedScorer(Policy):
     """The learned scorer of the paper (Sec. 5.1): a small network scores every cell by what a policy can see of it
-    (`care_sim.policies.cues`), and the reserve, rho B cells, goes to the highest.
+    (`care_sim.policies.cues`), and the reserve asks for the rho B highest; of these, what exploitation has already goes
+    to the floor, as with `history-uniform`.
 
     `path` is a file of weights that `care-sim train learned-scorer` wrote; the shipped ones, unless given. They serve
     any budget and any cameras. Raises InvalidInput for a file of something else or made for another grid.
@@ -47,6 +49,8 @@ class CellNetwork:
         self._out = weights.array("out", units)
         hidden = outlooks @ layer[CUES:] + weights.array("bias", units)
         self._outlook = hidden, np.maximum(hidden, 0) @ self._out
+        if not np.isfinite(self._outlook[1]).all():
+            raise InvalidInput(f"weights {weights.path}: too large to score a cell")
         self._layers = _by_code(layer[: len(MARKS)]), *np.ascontiguousarray(layer[len(MARKS) : CUES])
 
     def scores(self, seen: Seen) -> NDArray[np.float32]:

@@ -8,7 +8,8 @@ from care_sim.policies.base import Policy
 from care_sim.policies.score_map import ScoreMap
 from care_sim.policies.weights import load, shipped
 from care_sim.policies.wrapping import Wrapping
-from care_sim.tiling import Tiling, sector_demand
+from care_sim.sector_demand import reserve_demand, sector_demand
+from care_sim.tiling import Tiling
 from care_sim.types import Belief, Demand, Rig
 
 
@@ -28,7 +29,7 @@ class Ppo(Policy):
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
         file = load(shipped(self.weights) if path is None else path)
-        file.check(Ppo.name, rig, file.card.wrapper)
+        file.check(Ppo.name, rig)
         wrapping = Wrapping.parse(file.card.wrapper)
         self._reserve_alone = wrapping.action == "SectorReserve"
         self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
@@ -39,8 +40,8 @@ class Ppo(Policy):
         """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the sectors alone."""
         scores = self._score_map(self._features(belief))
         if self._reserve_alone:
-            return sector_demand(belief, self.rig, self._sectors, scores)
-        return Demand(layers=[[cells] for cells in self._sectors.ranked(scores, belief.budget)])
+            return reserve_demand(belief, self.rig, self._sectors, scores)
+        return sector_demand(self.rig, self._sectors, scores)
 
 
 class PpoDartout(Ppo):

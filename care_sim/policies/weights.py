@@ -9,18 +9,19 @@ from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import ZipInfo
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, is_number
+from care_sim.grid import AngularGrid
 from care_sim.types import Rig
 
 FORMAT = "care-sim weights 1"
+LARGEST = 2**26
+"""Bytes that a file may hold when it is unpacked; the shipped ones hold some thousands."""
 _CARD = "card"
-_TYPES = {"kind": str, "grid": dict, "budget": int | None, "wrapper": str | None}
-"""Of what a file is checked by."""
 
 Arrays = dict[str, NDArray[np.float32]]
 
@@ -29,13 +30,13 @@ Arrays = dict[str, NDArray[np.float32]]
 class Card:
     """What a file of weights is, what it fits, and how it was made.
 
-    `kind` names the policy. `grid` are the fields of `AngularGrid`; `budget` the cells a keyframe and `wrapper` the
-    wrapper with its parameters in one text, None where any will do. `scenario`, `data`, `seeds`, `steps`, `machine`,
-    `versions` and `result` tell people how the weights were trained and what they reached.
+    `kind` names the policy. `grid` is the one that was trained on, `budget` the cells a keyframe, None where any will
+    do; `wrapper` are the wrappers that it was trained behind in one text, None without. `scenario`, `data`, `seeds`,
+    `steps`, `machine`, `versions` and `result` tell people how the weights were trained and what they reached.
     """
 
     kind: str
-    grid: Mapping[str, Any]
+    grid: AngularGrid
     budget: int | None = None
     wrapper: str | None = None
     scenario: str | None = None
@@ -58,10 +59,18 @@ class Card:
             raise ValueError(f"its card is not of the format {FORMAT!r}")
         if wrong := set(plain) ^ {column.name for column in fields(cls)}:
             raise ValueError(f"its card lacks or has too much: {', '.join(sorted(wrong))}")
-        for name, kinds in _TYPES.items():
-            if not isinstance(plain[name], kinds):
-                raise ValueError(f"its card says {name} {plain[name]!r}")
-        return cls(**plain)
+        for name, value in plain.items():
+            if not isinstance(value, _TYPES[name]) or isinstance(value, bool):
+                raise ValueError(f"its card says {name} {value!r}")
+        card = cls(**plain | {"grid": _grid(plain["grid"])})
+        if card.budget is not None and not 0 < card.budget <= card.grid.size:
+            raise ValueError(f"its card says budget {card.budget}")
+        return card
+
+
+_TYPES: dict[str, Any] = {column.name: str for column in fields(Card)}
+_TYPES |= {"grid": dict, "budget": int | None, "wrapper": str | None, "scenario": str | None, "steps": int}
+_TYPES |= dict.fromkeys(("seeds", "versions", "result"), dict)
 
 
 @dataclass(frozen=True)
@@ -72,14 +81,13 @@ class Weights:
     arrays: Arrays
     card: Card
 
-    def check(self, kind: str, rig: Rig, wrapper: str | None = None) -> None:
+    def check(self, kind: str, rig: Rig) -> None:
         """Raise InvalidInput, with what the file has and what is needed, unless the weights are of this kind and fit
-        this rig and wrapper.
+        this rig.
         """
         card = self.card
-        needed: dict[str, Any] = {"kind": kind, "grid": asdict(rig.grid)}
+        needed: dict[str, Any] = {"kind": kind, "grid": rig.grid}
         needed |= {"budget": rig.budget} if card.budget is not None else {}
-        needed |= {"wrapper": wrapper} if card.wrapper is not None else {}
         for name, value in needed.items():
             if getattr(card, name) != value:
                 has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
@@ -105,22 +113,39 @@ def save(path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], 
 
 
 def load(path: str | PathLike[str]) -> Weights:
-    """Read weights. Raises InvalidInput for a file that is missing, damaged or something else."""
+    """Read weights. Raises InvalidInput for a file that is missing, damaged or something else.
+
+    Whatever a spoilt archive provokes in its readers becomes that one line.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
+            _check_contents(file.zip.infolist())
             entries = {name: file[name] for name in file.files}
         card = Card.from_json(bytes(entries.pop(_CARD)).decode())
         return Weights(Path(path), _checked(entries), card)
     except FileNotFoundError as error:
         raise InvalidInput(f"weights {path}: no such file") from error
-    except (OSError, ValueError, KeyError, EOFError, TypeError, AttributeError, MemoryError, BadZipFile) as error:
-        reason = " ".join(str(error).split())
+    except Exception as error:
+        reason = " ".join((str(error) or type(error).__name__).split())
         raise InvalidInput(f"weights {path}: not a file of weights, or damaged ({reason})") from error
 
 
 def shipped(name: str) -> Path:
     """Where the weights of that name lie that come with the package."""
     return Path(__file__).parent / "shipped" / f"{name}.npz"
+
+
+def _check_contents(entries: list[ZipInfo]) -> None:
+    if len({entry.filename for entry in entries}) < len(entries):
+        raise ValueError("an entry comes twice")
+    if sum(entry.file_size for entry in entries) > LARGEST:
+        raise ValueError(f"unpacked it is larger than {LARGEST} bytes")
+
+
+def _grid(plain: dict[str, Any]) -> AngularGrid:
+    if set(plain) != {column.name for column in fields(AngularGrid)} or not all(map(is_number, plain.values())):
+        raise ValueError(f"its card says grid {plain!r}")
+    return AngularGrid(**plain)
 
 
 def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:
@@ -134,6 +159,6 @@ def _told(name: str, value: Any, rig: Rig) -> str:
     """A value of a card as a reader wants it."""
     if name == "budget":
         return f"{value} cells ({value / rig.grid.size:.4g})"
-    if name == "grid" and isinstance(value, Mapping):
-        return " ".join(f"{key} {number:.6g}" for key, number in value.items())
+    if isinstance(value, AngularGrid):
+        return " ".join(f"{key} {number:.6g}" for key, number in asdict(value).items())
     return repr(value)

@@ -96,7 +96,8 @@ class Reporter(Audience):
 def bar(total: int, unit: str) -> Iterator[Show]:
     """A bar on a terminal."""
     columns = (TextColumn(unit), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.fields[left]}"), console=Console(stderr=True)) as progress:
+    shared, left = sys.stdout.isatty(), TextColumn("{task.fields[left]}")
+    with Progress(*columns, left, console=Console(stderr=True), redirect_stdout=shared) as progress:
         task = progress.add_task("", total=total, left="")
         yield lambda done, left: progress.update(task, completed=done, left=left)
 

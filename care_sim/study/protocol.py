@@ -7,7 +7,7 @@ from care_sim.errors import InvalidInput, check_whole
 from care_sim.study.play_options import PlayOptions
 from care_sim.study.running import Running, in_turn, playable
 
-EIGHT = (
+PAPERS = (
     "history",
     "history-uniform",
     "all-camera",
@@ -16,8 +16,9 @@ EIGHT = (
     "random",
     "care",
     "care-sbf",
+    "learned-scorer",
 )
-"""Those of the paper's Sec. 5.1 that need no training, and the floor alone."""
+"""Those of the paper's Sec. 5.1, and the floor alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +27,7 @@ class Protocol(Running, PlayOptions):
 
     scenes: tuple[str, ...] = ()
     """One number: that many scenes, from the first. Else scenes by name. All of them, unless given."""
-    policies: tuple[str, ...] = (*EIGHT, "full")
+    policies: tuple[str, ...] = (*PAPERS, "full")
     """`care-sim policies` lists them; `all`. `full` always runs with budget 1.0. Allocations are compared with those of
     `care`, which is played for that in any case."""
     budgets: tuple[float, ...] = (0.1, 0.2, 0.35)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from care_sim.errors import MissingExtra
 from care_sim.features import CHANNELS
-from care_sim.training.config import AgentConfig, Ppo, RecurrentPpo, Sac
+from care_sim.training.config import AgentConfig, OnPolicy, Ppo, RecurrentPpo, Sac
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -60,5 +60,5 @@ def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
     return "MultiInputPolicy", {"buffer_size": config.memory, "batch_size": config.batch, "policy_kwargs": own}
 
 
-def _on_policy(config: Ppo | RecurrentPpo) -> dict[str, Any]:
+def _on_policy(config: OnPolicy) -> dict[str, Any]:
     return {"n_steps": config.rollout, "batch_size": config.batch, "n_epochs": config.epochs, "gae_lambda": 0.9}

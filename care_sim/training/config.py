@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 from care_sim.errors import InvalidInput, check_number, check_whole
 from care_sim.policies.wrapping import Wrapping
 from care_sim.study.options import parameters
+from care_sim.training.seeds import validation_seeds
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a run that is resumed may differ."""
@@ -67,13 +68,17 @@ class AgentConfig:
     def __post_init__(self) -> None:
         for name in ("steps", "environments", "threads", "evaluate_every", "episodes"):
             check_whole(name, getattr(self, name), 1)
+        for name in {"rollout", "batch", "epochs", "hidden", "memory"} & set(vars(self)):
+            check_whole(name, getattr(self, name), 2 if name == "batch" else 1)
+        check_number("noise", getattr(self, "noise", 1.0), 1e-3, 10)
         check_whole("seed", self.seed, 0)
+        validation_seeds(self.episodes)
         check_number("learning_rate", self.learning_rate, 1e-8, 1)
         check_number("discount", self.discount, 0, 1)
         check_number("gain", self.gain, 0)
         if not 0 < len(self.budget) <= self.environments:
             raise InvalidInput(f"budget needs one value to {self.environments}, the environments; got {self.budget}")
-        self.wrapping  # noqa: B018 (refuses what does not fit)
+        self.wrapping, self.arguments  # noqa: B018 (refuse what does not fit)
 
     @property
     def wrapping(self) -> Wrapping:
@@ -83,7 +88,11 @@ class AgentConfig:
     @property
     def arguments(self) -> dict[str, Any]:
         """Of the environment, besides the budget."""
-        return dict(parameters(self.env_parameters))
+        given = dict(parameters(self.env_parameters))
+        for name, option in (("budget", "--budget"), ("reward_weights", "--gain")):
+            if name in given:
+                raise InvalidInput(f"{name} is no env_parameter but set by {option}")
+        return given
 
     def to_json(self) -> str:
         """As text that people can read."""
@@ -109,10 +118,8 @@ class AgentConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ppo(AgentConfig):
-    """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
-
-    algorithm = "ppo"
+class OnPolicy(AgentConfig):
+    """What learners share that learn from the episodes that they just played."""
 
     rollout: int = 128
     """Steps an environment between two updates."""
@@ -120,26 +127,25 @@ class Ppo(AgentConfig):
     """Steps a gradient."""
     epochs: int = 4
     """Times that every step is learned from."""
-    hidden: int = 16
-    """Width of the network that slides over the sectors."""
     noise: float = 0.3
     """Standard deviation of the scores at the start."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecurrentPpo(AgentConfig):
-    """Train an allocator with a memory (an LSTM) by proximal policy optimisation; needs the package sb3-contrib."""
+class Ppo(OnPolicy):
+    """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
+
+    algorithm = "ppo"
+
+    hidden: int = 16
+    """Width of the network that slides over the sectors."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecurrentPpo(OnPolicy):
+    """Train an allocator with a memory (an LSTM) by proximal policy optimisation."""
 
     algorithm = "recurrent-ppo"
-
-    rollout: int = 128
-    """Steps an environment between two updates."""
-    batch: int = 256
-    """Steps a gradient."""
-    epochs: int = 4
-    """Times that every step is learned from."""
-    noise: float = 0.3
-    """Standard deviation of the scores at the start."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """The environments of a training run, wrapped."""
 
+import signal
 from collections.abc import Callable
 from functools import partial
 from itertools import cycle, islice
@@ -51,5 +52,12 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
 
     budgets = islice(cycle(config.budget), config.environments)
     makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [partial(training, config, budget) for budget in budgets]
-    envs: VecEnv = SubprocVecEnv(makers, start_method="spawn") if config.processes else DummyVecEnv(makers)
-    return VecMonitor(envs)
+    if config.processes:
+        return VecMonitor(SubprocVecEnv([partial(_undisturbed, maker) for maker in makers], start_method="spawn"))
+    return VecMonitor(DummyVecEnv(makers))
+
+
+def _undisturbed(make: Callable[[], gymnasium.Env[Any, Any]]) -> gymnasium.Env[Any, Any]:
+    """Make an environment in a process that leaves an interruption to the one that learns, which then ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return make()

@@ -100,7 +100,7 @@ class Folder:
         config, held_out = self.config, validation_seeds(score.episodes)
         return Card(
             kind="ppo",
-            grid=asdict(rig.grid),
+            grid=rig.grid,
             budget=rig.budget if len(config.budget) == 1 else None,
             wrapper=str(config.wrapping),
             scenario=config.env,

@@ -52,6 +52,8 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     if model.num_timesteps >= config.steps:
         raise InvalidInput(f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with --steps")
     envs.seed(config.seed + model.num_timesteps)
+    if config.algorithm == "sac":
+        model.learning_starts += model.num_timesteps  # type: ignore[attr-defined]
     return model
 
 

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +89,7 @@ def _descend(torch: Any, network: Any, learned: Examples, rng: np.random.Generat
 
 
 def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArray[np.int64]]:
-    """Rows of so many batches; every example comes once before one comes again."""
+    """Rows of so many batches; a pass is in random order, and what does not fill a batch is left out of it."""
     size, order = min(BATCH, count), np.empty(0, np.int64)
     for _ in range(steps):
         if len(order) < size:
@@ -123,7 +123,7 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
     positive = int(learned.positive.sum())
     return Card(
         "learned-scorer",
-        asdict(AngularGrid()),
+        AngularGrid(),
         scenario="CARE-Street-v0",
         data=f"{len(learned)} cells, {positive} of them positive, of generated streets under history at {budgets} of "
         f"the cells, with six cameras and with the front one; {OTHERS} others a keyframe",

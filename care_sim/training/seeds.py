@@ -15,6 +15,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from care_sim.errors import InvalidInput
+
 VALIDATION, TRAINING = 2_000, 10_000
 LAST = 2**31 - 1
 
@@ -38,5 +40,7 @@ class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def validation_seeds(episodes: int) -> range:
-    """The first `episodes` seeds of the validation."""
-    return range(VALIDATION, min(VALIDATION + episodes, TRAINING))
+    """The first `episodes` seeds of the validation. Raises InvalidInput for more than there are."""
+    if episodes > TRAINING - VALIDATION:
+        raise InvalidInput(f"episodes must be at most {TRAINING - VALIDATION}, the validation seeds, got {episodes}")
+    return range(VALIDATION, VALIDATION + episodes)

@@ -5,7 +5,6 @@ from itertools import product
 import gymnasium
 import numpy as np
 import pytest
-from untrained import parameters
 
 import care_sim
 from care_sim.allocation import allocate
@@ -56,7 +55,7 @@ def case(request):
 
 def test_within_the_budget_without_a_duplicate_finite_and_the_same_after_reset(case):
     env, name = case
-    policy = care_sim.make_policy(name, env, **parameters(name))
+    policy = care_sim.make_policy(name, env)
     first, again = (list(played(env, policy)) for _ in range(2))
     for (_, action, info), (_, same, _) in zip(first, again, strict=True):
         assert env.action_space.contains(action)
@@ -71,7 +70,7 @@ def test_within_the_budget_without_a_duplicate_finite_and_the_same_after_reset(c
 def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
     """Three fresh ones; the second is always shown something else in between."""
     env, name = case
-    one, disturbing, other = (care_sim.make_policy(name, env, **parameters(name)) for _ in range(3))
+    one, disturbing, other = (care_sim.make_policy(name, env) for _ in range(3))
     first = observation = driven_to_the_encounter(env)
     for _ in range(KEYFRAMES):
         action = one(observation)
@@ -108,7 +107,7 @@ def test_false_positives_leave_the_exploitation_cells_as_they_are(case, encounte
     rig = env.unwrapped.rig
     chosen = [[], []]
     for cells, change in zip(chosen, (haunted, dict), strict=True):
-        policy = care_sim.make_policy(name, env, **parameters(name))
+        policy = care_sim.make_policy(name, env)
         for observation in encounter[::4]:
             demand = policy.demand(Belief.from_observation(change(observation)))
             cells.append(allocate(care_sim.Demand(demand.exploitation), rig.budget, rig.reserve_fraction).tolist())

@@ -11,11 +11,13 @@ from untrained import shapes, untrained
 import care_sim
 from care_sim.envs.grid_observation import GridObservation
 from care_sim.envs.sector_actions import SectorReserve, SectorScores
-from care_sim.errors import BrokenPolicy, InvalidInput
+from care_sim.errors import InvalidInput
 from care_sim.features import CHANNELS
+from care_sim.grid import AngularGrid
 from care_sim.policies.score_map import ScoreMap
 from care_sim.policies.weights import Card, Weights, save
 from care_sim.policies.wrapping import Wrapping
+from care_sim.training.evaluation import evaluate, rule
 
 ACTIONS = {"SectorReserve": SectorReserve, "SectorScores": SectorScores}
 
@@ -90,7 +92,7 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
     config = Ppo(environments=2, rollout=32, batch=32, hidden=8)
     envs = side_by_side(config)
     model = make(config, envs).learn(128)
-    save(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", {}))
+    save(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
     numpy = ScoreMap(care_sim.policies.ppo.load(tmp_path / "w.npz"), config.wrapping)
     observations = envs.reset()
     for _ in range(20):
@@ -125,7 +127,7 @@ def test_it_acts_without_torch(tmp_path):
     ("card", "message"),
     [
         ({"budget": 819}, r"budget is 819 cells \(0.04999\), needed is 492"),
-        ({"grid": {"columns": 256}}, "grid is"),
+        ({"grid": AngularGrid(columns=256)}, "grid is columns 256"),
         ({"kind": "learned-scorer"}, "kind is 'learned-scorer', needed is 'ppo'"),
         ({"wrapper": "GridObservation"}, "wrapper 'GridObservation' is none of the form 'SectorReserve 32 x 4, Grid"),
         ({"wrapper": "SectorReserve 16 x 4, GridObservation 64 x 8"}, "array 'window.weight' has the shape"),
@@ -140,6 +142,21 @@ def test_weights_for_something_else_are_refused_in_one_line(tmp_path, env, card,
     assert "\n" not in str(error.value)
 
 
-def test_without_weights_of_that_name_in_the_package_it_is_left_out_of_all(env):
-    with pytest.raises(BrokenPolicy, match=r"no weights 'ppo-moon' come with the package; give path=FILE"):
-        care_sim.make_policy("ppo", env, weights="ppo-moon")
+@pytest.mark.parametrize("name", ["ppo", "ppo-dartout"])
+@pytest.mark.parametrize("budget", [0.03, 0.2])
+def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budget):
+    """Earlier on average than `history` by metres; nobody may be missed."""
+    distances = {}
+    for policy in (name, "history"):
+        env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=budget)
+        score = evaluate(env, rule(policy, env), range(3))
+        distances[policy] = score.distance_m
+        env.close()
+    assert distances[name] > distances["history"] + 2
+
+
+def test_it_is_no_policy_behind_wrappers_of_learners(env):
+    for wrapped in (SectorReserve(env), GridObservation(env), GridObservation(SectorScores(env))):
+        with pytest.raises(InvalidInput, match=r"policy ppo plays the environment itself.*: give env\.unwrapped"):
+            care_sim.make_policy("ppo", wrapped)
+    care_sim.make_policy("ppo", SectorReserve(env).unwrapped)

@@ -6,7 +6,6 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
-from untrained import parameters
 
 import care_sim
 from care_sim.errors import InvalidInput, MissingExtra
@@ -55,7 +54,7 @@ def knows(policy):
 def used(name, environment, encounter):
     """A policy that has acted a few times."""
     environment.reset(seed=0)
-    policy = care_sim.make_policy(name, environment, **parameters(name))
+    policy = care_sim.make_policy(name, environment)
     for observation in encounter[:3]:
         policy(observation)
     return policy

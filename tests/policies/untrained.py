@@ -1,10 +1,5 @@
 """Weights that have learned nothing: real files for the policy `ppo`, of any budget."""
 
-import tempfile
-from dataclasses import asdict
-from functools import cache
-from pathlib import Path
-
 import numpy as np
 
 from care_sim.features import CHANNELS, EGO
@@ -32,15 +27,5 @@ def shapes(wrapping, hidden=5):
 def untrained(path, wrapping=USUAL, seed=0, **card):
     rng = np.random.default_rng(seed)
     arrays = {name: rng.normal(0, 0.5, shape).astype(np.float32) for name, shape in shapes(wrapping).items()}
-    save(path, arrays, Card(**{"kind": "ppo", "grid": asdict(AngularGrid()), "wrapper": str(wrapping)} | card))
+    save(path, arrays, Card(**{"kind": "ppo", "grid": AngularGrid(), "wrapper": str(wrapping)} | card))
     return path
-
-
-@cache
-def _file():
-    return untrained(Path(tempfile.mkdtemp()) / "untrained.npz")
-
-
-def parameters(name):
-    """What a built-in policy cannot do without."""
-    return {"path": _file()} if name == "ppo" else {}

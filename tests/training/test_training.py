@@ -47,6 +47,16 @@ def test_training_never_meets_a_seed_that_is_held_out(monkeypatch):
     assert not set(seeds) & set(other)
 
 
+def test_learners_of_neighbouring_seeds_share_no_episode():
+    """Though Stable-Baselines3 seeds environment n of a learner with its seed + n."""
+    met = []
+    for learner, environment in ((0, 1), (1, 0)):
+        env = training(Ppo(seed=learner), 0.03)
+        met.append([env.reset(seed=learner + environment if n == 0 else None)[1]["seed"] for n in range(5)])
+        env.close()
+    assert not set(met[0]) & set(met[1])
+
+
 def test_an_evaluation_is_the_mean_of_its_episodes():
     env = bare(Ppo())
     care_rule, seeds = rule("care", env), [VALIDATION, VALIDATION + 1]
@@ -66,7 +76,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     code, said, _ = care(capsys, *command, "--steps", "128")
     assert code == 0
     assert [line.partition(":")[0] for line in said.splitlines()[:-1]] == [
-        "random", "history", "care", "64 steps", "128 steps",
+        "random", "history", "care", "full", "0 steps", "64 steps", "128 steps",
     ]  # fmt: skip
     assert "environment steps a second inside ppo" in said.splitlines()[-1]
     settings = json.loads((out / "config.json").read_text())
@@ -76,11 +86,13 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     code, said, _ = care(capsys, *command, "--steps", "192", "--resume")
     assert code == 0
     rows = list(csv.DictReader((out / "curve.csv").open()))
-    assert [int(row["steps"]) for row in rows] == [64, 128, 192]
+    assert [int(row["steps"]) for row in rows] == [0, 64, 128, 192]
     seconds = [float(row["seconds"]) for row in rows]
     assert seconds == sorted(seconds)
 
+    assert list(json.loads((out / "rules.json").read_text())) == ["random", "history", "care", "full"]
     weights = load(out / "weights.npz")
+    assert "out" not in weights.card.result["config"]
     best = max(float(row["return"]) for row in rows)
     assert weights.card.result["validation"]["mean_return"] == pytest.approx(best)
     assert (weights.card.budget, weights.card.wrapper) == (492, "SectorReserve 32 x 4, GridObservation 64 x 8")
@@ -117,7 +129,7 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
     command = ["train", name, *SHORT, *own, "--out", tmp_path, "--evaluate-every", "128"]
     assert care(capsys, *command, "--steps", "128")[0] == 0
     assert care(capsys, *command, "--steps", "256", "--resume")[0] == 0
-    assert len((tmp_path / "curve.csv").read_text().splitlines()) == 3
+    assert len((tmp_path / "curve.csv").read_text().splitlines()) == 4
 
 
 @pytest.mark.parametrize(
@@ -128,6 +140,13 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
         (["--azimuths", "3", "--columns", "3"], "azimuths must divide the 512 of the grid"),
         (["--budget", "2"], "budget must lie in (0, 1]"),
         (["--steps", "0"], "steps must be a whole number >= 1"),
+        (["--rollout", "0"], "rollout must be a whole number >= 1"),
+        (["--batch", "1"], "batch must be a whole number >= 2"),
+        (["--epochs", "0"], "epochs must be a whole number >= 1"),
+        (["--hidden", "0"], "hidden must be a whole number >= 1"),
+        (["--noise", "0"], "noise must"),
+        (["--episodes", "8001"], "episodes must be at most 8000"),
+        (["--env-parameters", "budget=0.1"], "budget is no env_parameter but set by --budget"),
         (["--env-parameters", "vehicles"], "parameters are given as NAME=VALUE"),
         (["--env-parameters", "wheels=3"], "wheels"),
         (["--resume"], "holds no run to be resumed"),
