@@ -133,10 +133,12 @@ def read_curve(path: Path) -> list[Evaluation]:
         return []
     try:
         with path.open(newline="") as file:
-            rows = [[row[name] for name in COLUMNS] for row in csv.DictReader(file)]
+            head, *rows = csv.reader(file)
+        if tuple(head) != COLUMNS:
+            raise ValueError(f"its columns are not {', '.join(COLUMNS)}")
         return [(int(n), float(s), float(r), float(d) if d else None) for n, s, r, d in rows]
-    except (ValueError, KeyError, TypeError) as error:
-        raise InvalidInput(f"{path} is damaged: {type(error).__name__} {error}") from error
+    except ValueError as error:
+        raise InvalidInput(f"{path} is damaged: {error}") from error
 
 
 def _put(path: Path, write: Callable[[Path], object]) -> None:

@@ -35,6 +35,9 @@ def test_stable_baselines3_and_gymnasium_find_nothing_to_complain_about(env, wra
         warnings.simplefilter("error")
         wrapped = wrap(env)
         checker.check_env(wrapped)
+        again = gymnasium.make(wrapped.spec, disable_env_checker=True)
+        assert (again.observation_space, again.action_space) == (wrapped.observation_space, wrapped.action_space)
+        again.close()
     observation, _ = wrapped.reset(seed=1)
     for _ in range(5):
         assert wrapped.observation_space.contains(observation)

@@ -73,6 +73,25 @@ def test_care_is_compared_with_every_policy_at_every_budget():
     assert found["Detected, points", "history"][0].startswith("+40 [0,80]")
 
 
+def test_what_is_learned_is_compared_with_every_policy_too():
+    learned = rows("learned-scorer", [14.0, 15.0, 16.0, 17.0, 18.0], changes={"tags": "causal+learned"})
+    found = {table.title: table for table in sweep_tables([*STUDY, *learned])}
+    assert [title for title in found if "minus" in title] == [
+        "dense: care minus each policy",
+        "dense: learned-scorer minus each policy",
+    ]
+    of_care, of_learned = (
+        {line[0]: line[1:] for line in reversed(found[f"dense: {name} minus each policy"].rows)}
+        for name in ("care", "learned-scorer")
+    )
+    assert of_care["learned-scorer"] != ("",)
+    assert of_learned["care"] == tuple(
+        entry.translate(str.maketrans("+-", "-+")) for entry in of_care["learned-scorer"]
+    )
+    assert "full" in of_learned
+    assert "learned-scorer" not in of_learned
+
+
 def test_detection_rates_are_compared_only_where_somebody_missed():
     assert ("Detected, points", "history") in blocks()
     everybody = [row for row in STUDY if row["policy"] != "history"]

@@ -113,6 +113,25 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
 
 @pytest.mark.usefixtures("libraries")
 @pytest.mark.slow
+@pytest.mark.parametrize("moment", ["care_sim.training.run.evaluate", "care_sim.training.run._stretch"])
+def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
+    """Whether the rules are being measured or the first steps were just learned."""
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    command = ["train", "ppo", *TINY, "--out", tmp_path / "run", "--evaluate-every", "64", "--steps", "64"]
+    with monkeypatch.context() as patch:
+        patch.setattr(moment, interrupt)
+        code, _, complaint = care(capsys, *command)
+    assert code == 130
+    assert "the same command with --resume goes on" in complaint
+    assert care(capsys, *command, "--resume")[0] == 0
+    assert len((tmp_path / "run" / "curve.csv").read_text().splitlines()) == 3
+
+
+@pytest.mark.usefixtures("libraries")
+@pytest.mark.slow
 def test_weights_of_several_budgets_fit_any(capsys, tmp_path):
     command = ["train", "ppo", *TINY, "--out", tmp_path, "--evaluate-every", "64", "--steps", "64"]
     assert care(capsys, *command, "--budget", "0.05", "0.1")[0] == 0

@@ -1,0 +1,93 @@
+"""The figure of learning curves, from folders as training writes them."""
+
+import json
+
+import pytest
+from matplotlib.colors import to_hex
+
+from care_sim.cli import main
+from care_sim.errors import InvalidInput
+from care_sim.training.config import Ppo, Sac
+from care_sim.training.curves import read, together
+from care_sim.training.curves_figure import LEARNED, curves_figure
+
+DISTANCES = (4.0, 10.0, 16.0)
+
+
+def folder(path, config, distances=DISTANCES):
+    """A run that was evaluated every hundred steps."""
+    path.mkdir()
+    (path / "config.json").write_text(config.to_json())
+    rules = {"random": 6.0, "care": 15.0, "full": 16.0}
+    measured = {
+        name: {"episodes": 2, "mean_return": -metres, "distance_m": metres if distances[0] is not None else None}
+        for name, metres in rules.items()
+    }
+    (path / "rules.json").write_text(json.dumps(measured))
+    lines = (f"{100 * n},{n}.5,{n - 9},{'' if metres is None else metres}" for n, metres in enumerate(distances))
+    (path / "curve.csv").write_text("\n".join(["steps,seconds,return,distance_m", *lines]) + "\n")
+    return path
+
+
+@pytest.fixture
+def folders(tmp_path):
+    configs = Ppo(seed=0), Ppo(seed=1), Ppo(env="CARE-Dartout-v0"), Sac()
+    return [folder(tmp_path / f"run-{n}", config) for n, config in enumerate(configs)]
+
+
+def learned(axes):
+    return [line for line in axes.lines if to_hex(line.get_color()).upper() == LEARNED]
+
+
+def test_runs_that_differ_by_their_seed_lie_together(folders):
+    assert [len(group) for group in together(map(read, folders))] == [2, 1, 1]
+
+
+def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
+    other = folder(tmp_path / "other", Ppo(seed=2), (4.0, 13.0, 16.0))
+    figure = curves_figure(together(map(read, [folders[0], other, folders[2]])))
+    both, alone = figure.axes
+    assert [line.get_ydata().tolist() for line in learned(both)] == [[4, 10, 16], [4, 13, 16], [4, 11.5, 16]]
+    assert [line.get_ydata().tolist() for line in learned(alone)] == [[4, 10, 16]]
+    assert learned(alone)[0].get_xdata().tolist() == [0, 100, 200]
+    assert both.get_title(loc="left") == "ppo, CARE-Dense-v0, 2 training seeds"
+    assert {text.get_text() for text in both.texts} == {"random", "care", "full", "ppo"}
+
+
+def test_without_a_distance_the_return_is_drawn(tmp_path):
+    run = read(folder(tmp_path / "street", Ppo(env="CARE-Street-v0"), (None, None)))
+    assert run.values == [-9.0, -8.0]
+    assert run.marks["random"] == -6.0
+    assert curves_figure([[run]]).axes[0].get_ylabel() == "return"
+
+
+def test_the_command_draws_both_forms(folders, tmp_path, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["train", "curves", *map(str, folders), "--out", str(tmp_path / "figures" / "curves.png")])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.strip().endswith("curves.png")
+    assert all((tmp_path / "figures" / f"curves{ending}").stat().st_size > 1000 for ending in (".png", ".svg"))
+
+
+@pytest.mark.parametrize("name", ["config.json", "rules.json", "curve.csv"])
+def test_a_folder_that_lacks_something_is_named(folders, name):
+    (folders[0] / name).unlink()
+    with pytest.raises(InvalidInput, match=f"run-0 holds no evaluated training run: no {name}"):
+        read(folders[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("config.json", "{"),
+        ("rules.json", ""),
+        ("curve.csv", "steps,seconds,return,distance_m\n100,2"),
+        ("curve.csv", "steps\n100"),
+        ("curve.csv", ""),
+    ],
+)
+def test_a_damaged_file_is_named(folders, name, text):
+    (folders[0] / name).write_text(text)
+    with pytest.raises(InvalidInput, match=f"{name} is damaged") as error:
+        read(folders[0])
+    assert "\n" not in str(error.value)
