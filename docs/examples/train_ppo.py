@@ -1,6 +1,6 @@
 """Proximal policy optimisation in one file: a learner that ranks sectors for the LiDAR's reserve.
 
-    python examples/train_ppo.py        # about five minutes on one core; needs the extra rl, for PyTorch
+    python docs/examples/train_ppo.py        # about five minutes on one core; needs the extra rl, for PyTorch
 
 Everything is here but the environment: the network, the rollout, the advantages, the update. `care-sim train ppo` does
 the same with Stable-Baselines3, keeps checkpoints, and makes the weights a policy of the benchmark.
