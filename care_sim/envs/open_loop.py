@@ -145,7 +145,7 @@ class StreetEnv(OpenLoopEnv):
     evaluation's, 1000 to 1019 the calibration's: train on others.
     """
 
-    __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
 
     def __init__(self, **parameters: Any):
         super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], KEYFRAME_S, **parameters)
@@ -168,7 +168,7 @@ class ReplayEnv(FilmEnv):
     `care_sim.InvalidInput` with its name. The seed of `reset` draws faults, noise and floor.
     """
 
-    __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
 
     def __init__(
         self,
