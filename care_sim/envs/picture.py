@@ -7,6 +7,7 @@ from PIL import Image, ImageDraw
 from care_sim.envs import drawing
 from care_sim.envs.drawing import FAINT, INK, NO_RETURN, NOT_FIRED, PAPER
 from care_sim.envs.scene import CHASE_CAMERA, CHASE_SIZE, METRE_MARKS, add_car, furnished
+from care_sim.grid import AngularGrid
 from care_sim.loop import ClosedLoop
 from care_sim.pinhole import PinholeCamera
 from care_sim.residual import explained
@@ -47,7 +48,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     draw.text((_CAMERA_AT[0], _PANELS + 8), "Front camera:", INK, drawing.font(14))
     draw.text((_CAMERA_AT[0] + 104, _PANELS + 8), "explained by a track", TRACKED, drawing.font(14))
     draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", UNEXPLAINED, drawing.font(14))
-    _draw_grid(canvas, draw, loop)
+    draw_grid(canvas, draw, loop.rig.grid, loop.belief.ranges)
     return np.asarray(canvas)
 
 
@@ -113,9 +114,10 @@ def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
     )
 
 
-def _draw_grid(canvas: Image.Image, draw: ImageDraw.ImageDraw, loop: ClosedLoop) -> None:
-    grid, (left, top) = loop.rig.grid, _GRID_AT
-    picture = drawing.grid_picture(grid, loop.belief.ranges, _ROW_PIXELS)
+def draw_grid(canvas: Image.Image, draw: ImageDraw.ImageDraw, grid: AngularGrid, ranges: NDArray[np.floating]) -> None:
+    """The angular grid with a scan (E, A), its directions and its colours, in the lower right of a picture."""
+    left, top = _GRID_AT
+    picture = drawing.grid_picture(grid, ranges, _ROW_PIXELS)
     canvas.paste(picture, _GRID_AT)
     bottom = top + picture.height
     draw.text((left, _PANELS + 8), "LiDAR: cells fired in the last scan, all around the car", INK, drawing.font(14))
