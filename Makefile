@@ -1,6 +1,7 @@
 # make setup      create .venv and install what the benchmark needs
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures
 # make test       set up with the development tools, run every test
+# make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
 # make official RESULTS=FILE DATA=FOLDER   score a file of `care-sim export` with the nuScenes devkit, which has an
 #                 environment of its own; SPLIT=val, VERSION=v1.0-trainval and OUT=FOLDER unless given otherwise
@@ -27,7 +28,7 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: setup reproduce test check lint official test-official clean
+.PHONY: setup reproduce test check docs lint official test-official clean
 
 setup: $(VENV)/.installed
 
@@ -47,6 +48,10 @@ reproduce: setup
 
 test: $(VENV)/.developing
 	$(BIN)/python -m pytest --numprocesses 2
+
+docs: $(VENV)/.developing
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "build/site/index.html; to search in it: $(BIN)/python -m http.server --directory build/site"
 
 lint: $(VENV)/.developing
 	$(BIN)/ruff format --check .

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import tyro
 
 from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.study.clip import Clip
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
 from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
@@ -84,6 +85,7 @@ ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sighti
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
     "run": Run,
+    "clip": Clip,
     "sweep": Sweep,
     "ablate": Ablate,
     "faults": Faults,

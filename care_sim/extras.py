@@ -38,6 +38,11 @@ def import_panda_gym() -> ModuleType:
     return _import("panda_gym", "panda-gym", "bench")
 
 
+def import_imageio_ffmpeg() -> ModuleType:
+    """FFmpeg, as imageio-ffmpeg brings it. Raises MissingExtra with the extra to install."""
+    return _import("imageio_ffmpeg", "A film as MP4", "video")
+
+
 def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
         return import_module(module)

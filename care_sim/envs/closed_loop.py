@@ -165,7 +165,7 @@ class DartoutEnv(ClosedLoopEnv):
     perception reports instead.
     """
 
-    __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "dartout"
 
 
@@ -176,7 +176,7 @@ class DenseEnv(ClosedLoopEnv):
     reckons why, cell by cell.
     """
 
-    __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "dense"
 
 
@@ -186,5 +186,5 @@ class CutInEnv(ClosedLoopEnv):
     A large vehicle returns enough points even when starved; the paper found no separation here.
     """
 
-    __doc__ = f"{__doc__}\n{ClosedLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "cutin"

@@ -8,6 +8,7 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.conditions import MIN_RETURNS
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
@@ -48,13 +49,14 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     `care_sim.evaluation.recall.Tally`. `env.unwrapped.score` then holds event by event what was found.
 
     ### Arguments
-    `budget` beta in (0, 1]; `detector` by name (`care_sim.perception.registry.detector_names`) and
-    `detector_parameters`; any field of `care_sim.conditions.Conditions` but those for which the scene would have to
-    be filmed anew: an error of the cameras' mount, the engine. `min_returns` is the `returns` detector's. A value
-    that is not allowed raises `care_sim.InvalidInput`.
+    `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `detector` by name
+    (`care_sim.perception.registry.detector_names`) and `detector_parameters`; any field of
+    `care_sim.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the
+    cameras' mount, the engine. `min_returns` is the `returns` detector's. A value that is not allowed raises
+    `care_sim.InvalidInput`.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012 (Gymnasium's interface)
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 (Gymnasium's interface)
 
     def __init__(
         self,
@@ -68,8 +70,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         render_mode: str | None = None,
         **parameters: Any,
     ):
-        if render_mode is not None:
-            raise InvalidInput(f"render_mode must be None, got {render_mode!r}")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
         for name in UNFILMED:
             if name in parameters:
                 raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
@@ -81,6 +83,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s)
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
         self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
+        self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
+        self.render_mode = render_mode
         self.exposures: list[Exposure] = []
         self._masks: list[matching.Mask] = []
 
@@ -117,6 +121,17 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
         return self.observed(), reward, False, self._over, info
 
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (H, W, 3) of the last keyframe from above: who was found, what returned, what fired."""
+        if self.render_mode is None:
+            return None
+        from care_sim.envs.plan import draw_plan
+
+        exposure = self.exposures[-1] if self.exposures else None
+        index = exposure.index if exposure else self.loop.index
+        found = self._masks[-1] if self._masks else np.zeros(len(self.loop.shot.annotations), bool)
+        return draw_plan(self.loop, index, exposure, found, self._sightings.appearing(index))
+
 
 class FilmEnv(OpenLoopEnv):
     """The open loop over a film that is there already; `care_sim.study` plays all policies of a scene so."""
@@ -145,7 +160,7 @@ class StreetEnv(OpenLoopEnv):
     evaluation's: train on others. `learned-scorer` learned from 1000 to 1019, the calibration's.
     """
 
-    __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
 
     def __init__(self, **parameters: Any):
         super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], KEYFRAME_S, **parameters)
@@ -168,7 +183,7 @@ class ReplayEnv(FilmEnv):
     `care_sim.InvalidInput` with its name. The seed of `reset` draws faults, noise and floor.
     """
 
-    __doc__ = f"{__doc__}\n{OpenLoopEnv.__doc__}"
+    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
 
     def __init__(
         self,

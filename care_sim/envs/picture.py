@@ -7,10 +7,12 @@ from PIL import Image, ImageDraw
 from care_sim.envs import drawing
 from care_sim.envs.drawing import FAINT, INK, NO_RETURN, NOT_FIRED, PAPER
 from care_sim.envs.scene import CHASE_CAMERA, CHASE_SIZE, METRE_MARKS, add_car, furnished
+from care_sim.grid import AngularGrid
 from care_sim.loop import ClosedLoop
+from care_sim.pinhole import PinholeCamera
 from care_sim.residual import explained
 from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.types import CLASSES, Keyframe
+from care_sim.types import CLASSES, Keyframe, Tracks
 
 WIDTH, HEIGHT = 960, 720
 _HEADER = 40
@@ -46,7 +48,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     draw.text((_CAMERA_AT[0], _PANELS + 8), "Front camera:", INK, drawing.font(14))
     draw.text((_CAMERA_AT[0] + 104, _PANELS + 8), "explained by a track", TRACKED, drawing.font(14))
     draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", UNEXPLAINED, drawing.font(14))
-    _draw_grid(canvas, draw, loop)
+    draw_grid(canvas, draw, loop.rig.grid, loop.belief.ranges)
     return np.asarray(canvas)
 
 
@@ -72,17 +74,24 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
         ground = np.array([metres, 1.6, -LIDAR_POSITION[2], 0.0, 0.0, 0.0, 0.0])
         if at := drawing.point_above(CHASE_CAMERA, ground):
             draw.text(at, f"{metres:.0f} m", INK, drawing.font(12), anchor="rm")
-    tracks = loop.belief.tracks
-    for box, number, misses in reversed(list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))):
-        colour = COASTING if misses else TRACKED
-        drawing.wireframe(draw, CHASE_CAMERA, box, colour, 1 if misses else 2)
-        if at := drawing.point_above(CHASE_CAMERA, box):
-            drawing.label(draw, at, CLASSES[number], colour)
-    _mark_first_sighting(draw, loop, frame)
+    mark_tracks(draw, CHASE_CAMERA, loop.belief.tracks)
+    mark_first_sighting(draw, CHASE_CAMERA, loop, frame)
     drawing.label(draw, (0, CHASE_SIZE[1]), _BOXES_MEAN, TRACKED)
 
 
-def _mark_first_sighting(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe | None) -> None:
+def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks) -> None:
+    """Tracks as wireframes with their classes, faint those that the last scan missed."""
+    for box, number, misses in reversed(list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))):
+        colour = COASTING if misses else TRACKED
+        drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
+        if at := drawing.point_above(camera, box):
+            drawing.label(draw, at, CLASSES[number], colour)
+
+
+def mark_first_sighting(
+    draw: ImageDraw.ImageDraw, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
+) -> None:
+    """An arrow at the first-sighting actor that says whether it is hidden, in view or detected."""
     target = loop.world.first_sighting
     if target is None:
         return
@@ -92,7 +101,7 @@ def _mark_first_sighting(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Key
     elif loop.picture.shows(target.body):
         state, colour = "in view", IN_VIEW
     (box,) = loop.sensor.boxes_to_local(loop.world.boxes([target]))
-    if at := drawing.point_above(CHASE_CAMERA, box):
+    if at := drawing.point_above(camera, box):
         drawing.arrow(draw, at, f"{target.name}: {state}", colour)
 
 
@@ -105,9 +114,10 @@ def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
     )
 
 
-def _draw_grid(canvas: Image.Image, draw: ImageDraw.ImageDraw, loop: ClosedLoop) -> None:
-    grid, (left, top) = loop.rig.grid, _GRID_AT
-    picture = drawing.grid_picture(grid, loop.belief.ranges, _ROW_PIXELS)
+def draw_grid(canvas: Image.Image, draw: ImageDraw.ImageDraw, grid: AngularGrid, ranges: NDArray[np.floating]) -> None:
+    """The angular grid with a scan (E, A), its directions and its colours, in the lower right of a picture."""
+    left, top = _GRID_AT
+    picture = drawing.grid_picture(grid, ranges, _ROW_PIXELS)
     canvas.paste(picture, _GRID_AT)
     bottom = top + picture.height
     draw.text((left, _PANELS + 8), "LiDAR: cells fired in the last scan, all around the car", INK, drawing.font(14))

@@ -86,6 +86,12 @@ class Sightings:
         start = sum(map(len, self.keyframes[:keyframe]))
         return self.in_range[start : start + len(self.keyframes[keyframe])]
 
+    def appearing(self, keyframe: int) -> NDArray[np.bool_]:
+        """(n,) which annotations of a keyframe are first sightings."""
+        appears = self.scored(keyframe).copy()
+        appears[appears] = np.isin(np.flatnonzero(self.frames.keyframes == keyframe), self.events)
+        return appears
+
 
 def _first_sightings(frames: ObjectFrames) -> Cells:
     _, first = np.unique(frames.objects, return_index=True)

@@ -35,6 +35,8 @@ class Run:
     """Draws scenario, camera faults, noise and floor."""
     picture: Path | None = None
     """PNG file for a picture of the first keyframe at which the brake is on."""
+    video: Path | None = None
+    """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its ending."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
     """Further conditions."""
 
@@ -42,6 +44,7 @@ class Run:
         """Run it."""
         from care_sim.study.config import grid
         from care_sim.study.episode import trace
+        from care_sim.study.filming import Filming
         from care_sim.study.photo import Photographer
         from care_sim.study.timeline import print_timeline
 
@@ -49,9 +52,10 @@ class Run:
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer = Photographer(self.picture)
-        print_timeline(config, *trace(config, photographer), console())
+        photographer, filming = Photographer(self.picture), Filming(self.video)
+        print_timeline(config, *trace(config, photographer, filming), console())
         photographer.report()
+        filming.write()
         return 0
 
 

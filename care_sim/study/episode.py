@@ -20,6 +20,7 @@ from care_sim.types import Keyframe, Observation
 from care_sim.world.world import World
 
 Answer = TypeVar("Answer")
+Watcher = Callable[[ClosedLoop, Keyframe], None]
 KIB_MB = 1024 / 1e6
 
 
@@ -50,12 +51,10 @@ def run_episode(config: EpisodeConfig) -> Row:
     return trace(config)[0]
 
 
-def trace(
-    config: EpisodeConfig, watch: Callable[[ClosedLoop, Keyframe], None] = lambda _loop, _frame: None
-) -> tuple[Row, list[Keyframe]]:
+def trace(config: EpisodeConfig, *watchers: Watcher) -> tuple[Row, list[Keyframe]]:
     """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
 
-    `watch` is called after every keyframe.
+    `watchers` are called after every keyframe.
     """
     started = time.perf_counter()
     seal = Seal()
@@ -67,7 +66,8 @@ def trace(
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
             seal.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
-            watch(env.unwrapped.loop, env.unwrapped.keyframes[-1])  # type: ignore[attr-defined]
+            for watch in watchers:
+                watch(env.unwrapped.loop, env.unwrapped.keyframes[-1])  # type: ignore[attr-defined]
             ended = terminated or truncated
         keyframes: list[Keyframe] = env.unwrapped.keyframes  # type: ignore[attr-defined]
     row = {

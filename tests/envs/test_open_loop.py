@@ -190,7 +190,7 @@ def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):
         ({"detector": "yolo"}, "unknown detector 'yolo'"),
         ({"detector_parameters": {"size": 3}}, "unknown parameter of detector returns 'size'"),
         ({"detector": "cluster", "min_returns": 5}, "min_returns is of the detector returns"),
-        ({"render_mode": "rgb_array"}, "render_mode must be None"),
+        ({"render_mode": "ansi"}, "render_mode must be None or 'rgb_array'"),
         ({"budget": 0.0}, "budget"),
     ],
 )

@@ -54,6 +54,13 @@ def test_when_an_object_is_first_sighted(path, distances, keyframe):
     assert events(path(*distances)) == ([] if keyframe is None else [(keyframe, 7)])
 
 
+def test_which_annotations_of_a_keyframe_are_first_sightings(shown):
+    start, here, far, new = (1, "car", 10, 0), (2, "car", 20, 0), (3, "car", 60, 0), (4, "car", 5, 5)
+    scene = Sightings.of("street", [shown(start), shown(far, here, start, new), shown(here, (3, "car", 40, 0))])
+    appearing = [scene.appearing(keyframe).tolist() for keyframe in range(3)]
+    assert appearing == [[False], [False, True, False, True], [False, True]]
+
+
 def test_an_event_says_what_was_seen_and_where(shown):
     scene = Sightings.of("left", [shown((1, "car", 10, 0)), shown((1, "car", 9, 0), (2, "bicycle", -3, 4))])
     event = scene.frames.take(scene.events)

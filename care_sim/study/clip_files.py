@@ -1,0 +1,68 @@
+"""Moving pictures as files: MP4 through FFmpeg, animated GIF, WebP and PNG through Pillow."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from care_sim.errors import unknown
+from care_sim.extras import import_imageio_ffmpeg
+
+GIF_COLOURS = 96
+"""Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file goes."""
+
+
+def check_clip(path: Path) -> None:
+    """Raise InvalidInput for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its library; make
+    the folder.
+    """
+    if path.suffix not in ENDINGS:
+        raise unknown("ending of a clip", path.suffix, ENDINGS)
+    if path.suffix == ".mp4":
+        import_imageio_ffmpeg()
+    path.parent.mkdir(parents=True, exist_ok=True)
+
+
+def write_clip(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
+    """Write pictures of one size, `picture_s` seconds each, the last for `hold_s`; an animation begins anew.
+
+    The ending of `path` decides the form, and the errors are those of `check_clip`.
+    """
+    check_clip(path)
+    ENDINGS[path.suffix](path, pictures, picture_s, hold_s)
+
+
+def _write_mp4(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
+    ffmpeg = import_imageio_ffmpeg()
+    film = ffmpeg.write_frames(str(path), pictures[0].size, fps=1 / picture_s, macro_block_size=2, quality=7)
+    film.send(None)
+    for picture in [*pictures, *[pictures[-1]] * (round(hold_s / picture_s) - 1)]:
+        film.send(picture.tobytes())
+    film.close()
+
+
+def _write_animation(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
+    durations = [round(1000 * picture_s)] * (len(pictures) - 1) + [round(1000 * hold_s)]
+    first, *others = pictures
+    first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
+
+
+def _write_gif(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
+    _write_animation(path, _in_few_colours(pictures), picture_s, hold_s)
+
+
+def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
+    """The pictures in the colours that serve a dozen of them best; undithered, what stands still is stored once."""
+    sample = np.concatenate([np.asarray(picture) for picture in pictures[:: max(1, len(pictures) // 12)]])
+    common = Image.fromarray(sample).quantize(GIF_COLOURS, Image.Quantize.MEDIANCUT)
+    return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
+
+
+ENDINGS: dict[str, Callable[[Path, Sequence[Image.Image], float, float], None]] = {
+    ".mp4": _write_mp4,
+    ".gif": _write_gif,
+    ".webp": _write_animation,
+    ".png": _write_animation,
+}
+"""How a clip is written, by the ending of its file."""
