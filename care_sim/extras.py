@@ -38,6 +38,11 @@ def import_panda_gym() -> ModuleType:
     return _import("panda_gym", "panda-gym", "bench")
 
 
+def import_rerun() -> ModuleType:
+    """Rerun. Raises MissingExtra with the extra to install."""
+    return _import("rerun", "Rerun", "viewer")
+
+
 def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
         return import_module(module)

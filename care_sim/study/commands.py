@@ -35,6 +35,10 @@ class Run:
     """Draws scenario, camera faults, noise and floor."""
     picture: Path | None = None
     """PNG file for a picture of the first keyframe at which the brake is on."""
+    record: Path | None = None
+    """File (.rrd) for a recording that `care-sim view FILE` plays (extra 'viewer')."""
+    export: Path | None = None
+    """Folder for every scan as a point cloud (PCD), with poses and boxes as JSON (extra 'open3d')."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
     """Further conditions."""
 
@@ -44,13 +48,15 @@ class Run:
         from care_sim.study.episode import trace
         from care_sim.study.photo import Photographer
         from care_sim.study.timeline import print_timeline
+        from care_sim.study.watchers import watched
 
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer = Photographer(self.picture)
-        print_timeline(config, *trace(config, photographer), console())
+        played = trace(config, photographer, lambda env, policy: watched(env, policy, self.record, self.export))
+        print_timeline(config, *played, console())
         photographer.report()
         return 0
 
