@@ -13,7 +13,7 @@ WEDGE_M = 30.0
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",
     "world/bodies": "boxes of all actors (truth), coloured by class, grey where perception reports none; world frame",
-    "world/first_sighting": "box of the first-sighting actor (truth): hidden, in view, or detected now; world frame",
+    "world/first_sighting": "box of the first-sighting actor (truth), coloured by `states/actor`; world frame",
     "world/ego": "box of the car; world frame",
     "world/driven": "the way of the car's centre so far, on the ground; world frame",
     "world/lidar": "the sensor frame in the world: x forward, y left, z up; metres. What is below it is in this frame",
@@ -40,7 +40,7 @@ ENTITIES = {
     "budget/reserve": "cells fired for the reserve, percent of the budget",
     "budget/floor": "cells that the random floor filled up, percent of the budget",
     "budget/chosen": "cells that a raw action scored, whose share is not known, percent of the budget",
-    "states/actor": "the first-sighting actor: hidden, in view of the unimpaired camera, detected by the LiDAR",
+    "states/actor": "the first-sighting actor: in or out of view of the unimpaired camera, or detected by this scan",
     "states/brake": "on or off",
     "events": "what changed, in words",
     "outcome": "the result of the episode, `care_sim.types.Outcome`",
@@ -54,9 +54,9 @@ NO_CLASS = (120, 124, 132)
 SHARE_COLOURS = ((38, 41, 48), (80, 200, 255), (255, 150, 30), (112, 116, 132), (170, 225, 110))
 """Not fired, exploitation, reserve, floor, chosen."""
 EXPLAINED, RESIDUAL, MISSED = (80, 200, 255), (255, 150, 30), (255, 80, 120)
-HIDDEN, IN_VIEW, DETECTED = (225, 225, 225), (255, 170, 40), (80, 230, 110)
+OUT_OF_VIEW, IN_VIEW, DETECTED = (225, 225, 225), (255, 170, 40), (80, 230, 110)
 EGO, COASTING, BRAKE, PATH = (200, 204, 212), (110, 130, 165), (255, 80, 70), (46, 54, 68)
-ACTOR_COLOURS = {"hidden": HIDDEN, "in view": IN_VIEW, "detected": DETECTED}
+ACTOR_COLOURS = {"out of view": OUT_OF_VIEW, "in view": IN_VIEW, "detected": DETECTED}
 LANES = ((170, 225, 110), (230, 120, 200), (240, 200, 70), (130, 160, 255), (255, 120, 90), (225, 225, 225))
 """Colours of the curves of episodes that are played side by side."""
 

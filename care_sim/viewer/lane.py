@@ -1,5 +1,6 @@
 """A lane of a recording: the entities of one episode, all below its name."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,8 @@ import rerun as rr
 from care_sim.frames import Floats
 from care_sim.viewer.entities import KEYFRAME, SECONDS
 
-UP = (0.0, 0.0, 1.0)
+THIN = -1.0
+"""Radius of lines; Rerun takes negative ones for points of the screen."""
 
 
 class Lane:
@@ -16,6 +18,7 @@ class Lane:
 
     def __init__(self, stream: rr.RecordingStream, name: str):
         self._stream, self.name = stream, name
+        self._counts: dict[str, int] = {}
 
     def at(self, keyframe: int, time_s: float) -> None:
         """What is logged from now on belongs to this keyframe."""
@@ -25,6 +28,17 @@ class Lane:
     def log(self, entity: str, *content: Any) -> None:
         """Log at the present keyframe."""
         self._stream.log(f"{self.name}/{entity}", *content)
+
+    def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
+        """Log a list of `count` things at the present keyframe, made by `make`; nothing if it was and is empty."""
+        if count or self._counts.get(entity) != 0:
+            self.log(entity, *make())
+        self._counts[entity] = count
+
+    def log_curve(self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats) -> None:
+        """Log a number a keyframe (n,) at once, which costs as much as logging one."""
+        times = rr.TimeColumn(KEYFRAME, sequence=keyframes), rr.TimeColumn(SECONDS, duration=times_s)
+        self._stream.send_columns(f"{self.name}/{entity}", times, rr.Scalars.columns(scalars=values))
 
     def fix(self, entity: str, *content: Any) -> None:
         """Log what holds for the whole episode."""

@@ -10,7 +10,7 @@ EYE_M, TARGET_M = (-11.0, 0.0, 6.0), (12.0, 0.0, -1.0)
 """Behind the car and above it, in the sensor frame."""
 ABOVE_M, BELOW_M = (14.0, -0.1, 42.0), (14.0, 0.0, 0.0)
 DARK = (24, 26, 30)
-FIRED = "fired cells: blue exploitation, orange reserve, grey floor; outlines: hulls white, wedges blue and orange"
+FIRED = "fired: blue exploitation, orange reserve, grey floor"
 
 
 def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
@@ -40,7 +40,7 @@ def _one(lane: str) -> rrb.Vertical:
 def _several(lanes: Sequence[str]) -> rrb.Vertical:
     columns = [rrb.Vertical(_chase(lane), _camera(lane), _grid(lane), row_shares=[4, 3, 1.3]) for lane in lanes]
     below = rrb.Horizontal(_states(lanes), *_plots(lanes))
-    return rrb.Vertical(rrb.Horizontal(*columns), below, row_shares=[4, 1.2])
+    return rrb.Vertical(rrb.Horizontal(*columns), below, row_shares=[4, 0.5 + 0.4 * len(lanes)])
 
 
 def _chase(lane: str) -> rrb.Spatial3DView:
@@ -55,7 +55,7 @@ def _chase(lane: str) -> rrb.Spatial3DView:
 
 
 def _camera(lane: str) -> rrb.Spatial2DView:
-    name = f"{lane}: camera, detections: blue explained, orange residual, red missed by fault"
+    name = f"{lane}: camera: blue explained, orange residual, red missed by fault"
     return rrb.Spatial2DView(origin=f"{lane}/world/lidar/camera", name=name)
 
 

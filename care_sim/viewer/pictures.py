@@ -1,5 +1,7 @@
 """What is logged in pictures: the camera's detections, and the cells of the angular grid."""
 
+from itertools import compress
+
 import numpy as np
 import rerun as rr
 
@@ -9,11 +11,12 @@ from care_sim.residual import wedges
 from care_sim.shares import SHARES
 from care_sim.types import CLASSES, ImageDetections, Rig
 from care_sim.viewer import entities as looks
-from care_sim.viewer.lane import Lane
+from care_sim.viewer.lane import THIN, Lane
 from care_sim.viewer.outlines import outlines
 
 CAMERA = "world/lidar/camera"
-THIN = rr.Radius.ui_points(1)
+COLOURS = {"explained": looks.EXPLAINED, "residual": looks.RESIDUAL, "missed": looks.MISSED}
+OUTLINES = {"hulls": looks.EGO, "wedges/explained": looks.EXPLAINED, "wedges/residual": looks.RESIDUAL}
 
 
 class Pictures:
@@ -33,6 +36,12 @@ class Pictures:
         lane.fix(CAMERA, place, lens)
         shares = [(n, name, colour) for n, (name, colour) in enumerate(zip(SHARES, looks.SHARE_COLOURS, strict=True))]
         lane.fix("grid", rr.AnnotationContext(shares))
+        for kind, colour in COLOURS.items():
+            # explained ones stand side by side: their names would overlap
+            names = rr.Points2D.from_fields(colors=[colour], radii=[0.0], show_labels=kind != "explained")
+            lane.fix(f"{CAMERA}/{kind}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]), names)
+        for entity, colour in OUTLINES.items():
+            lane.fix(f"grid/{entity}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]))
 
     def log(self, moment: Moment, photo: bytes) -> None:
         """A keyframe and the JPEG of its camera."""
@@ -43,35 +52,33 @@ class Pictures:
     def _log_detections(self, stance: Stance) -> None:
         seen = stance.belief.detections
         names = [f"false {name}" if false else name for name, false in zip(_names(seen), stance.false, strict=True)]
-        for kind, chosen, colour in (
-            ("explained", stance.known, looks.EXPLAINED),
-            ("residual", ~stance.known, looks.RESIDUAL),
-        ):
-            labels = [name for name, this in zip(names, chosen, strict=True) if this]
-            self._log_named(kind, seen.boxes[chosen], labels, colour)
-        missed = [f"missed {name}" for name in _names(stance.missed)]
-        self._log_named("missed", stance.missed.boxes, missed, looks.MISSED)
+        for kind, chosen in (("explained", stance.known), ("residual", ~stance.known)):
+            self._log_named(kind, seen.boxes[chosen], list(compress(names, chosen)))
+        self._log_named("missed", stance.missed.boxes, [f"missed {name}" for name in _names(stance.missed)])
 
-    def _log_named(self, kind: str, boxes: Floats, names: list[str], colour: tuple[int, int, int]) -> None:
+    def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:
         """Boxes, and their names as those of points, which the viewer does not break into lines."""
         below = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, 3]])
-        points = rr.Points2D(below, labels=names, colors=colour, radii=0.0)
-        self._lane.log(f"{CAMERA}/{kind}", _boxes(boxes, colour), points)
+        self._lane.log_list(f"{CAMERA}/{kind}", len(boxes), lambda: (_boxes(boxes), rr.Points2D(below, labels=names)))
 
     def _log_grid(self, moment: Moment) -> None:
-        belief, rig = moment.stance.belief, self._rig
+        belief, known, rig = moment.stance.belief, moment.stance.known, self._rig
         cells = np.repeat(moment.shares[:, ::-1], looks.ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
-        hulls = outlines(rig.hulls(belief.tracks.boxes), rig.grid)
-        self._lane.log("grid/hulls", _boxes(hulls, looks.EGO))
         sectors = wedges(belief.detections, rig)
-        for kind, wanted, colour in (("explained", True, looks.EXPLAINED), ("residual", False, looks.RESIDUAL)):
-            chosen = [cells for cells, known in zip(sectors, moment.stance.known, strict=True) if known == wanted]
-            self._lane.log(f"grid/wedges/{kind}", _boxes(outlines(chosen, rig.grid), colour))
+        for entity, chosen in (
+            ("hulls", rig.hulls(belief.tracks.boxes)),
+            ("wedges/explained", list(compress(sectors, known))),
+            ("wedges/residual", list(compress(sectors, ~known))),
+        ):
+            self._log_outlines(f"grid/{entity}", outlines(chosen, rig.grid))
+
+    def _log_outlines(self, entity: str, lines: Floats) -> None:
+        self._lane.log_list(entity, len(lines), lambda: [_boxes(lines)])
 
 
-def _boxes(boxes: Floats, colour: tuple[int, int, int]) -> rr.Boxes2D:
-    return rr.Boxes2D(array=boxes, array_format=rr.Box2DFormat.XYXY, colors=colour, radii=THIN)
+def _boxes(boxes: Floats) -> rr.Boxes2D:
+    return rr.Boxes2D(array=boxes, array_format=rr.Box2DFormat.XYXY)
 
 
 def _names(detections: ImageDetections) -> list[str]:

@@ -62,7 +62,7 @@ class Episode:
         """Log a keyframe that was played."""
         frame = moment.frame
         self._lane.at(frame.index, frame.time_s)
-        state = "detected" if frame.detected else "in view" if frame.in_view else "hidden"
+        state = "detected" if frame.detected else "in view" if frame.in_view else "out of view"
         self._space.log(moment, state)
         self._pictures.log(moment, self._photo)
         self._curves.log(moment, state)

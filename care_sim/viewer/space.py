@@ -10,11 +10,12 @@ from care_sim.moments import Moment, Stance
 from care_sim.residual import bundles
 from care_sim.types import CLASSES, Rig
 from care_sim.viewer import entities as looks
-from care_sim.viewer.lane import Lane, boxes
+from care_sim.viewer.lane import THIN, Lane, boxes
 
 PATH_M = 40.0
 CORNERS = (1, 2, 4, 3)
 """The corners of an image box among its rays, in turn."""
+SHARE_COLOURS = np.array(looks.SHARE_COLOURS, np.uint8)
 GLASSY = FillMode.TransparentFillMajorWireframe
 """People look through bodies at what they hide."""
 MARGIN_M = 0.15
@@ -22,7 +23,7 @@ MARGIN_M = 0.15
 
 
 class Space:
-    """Logs the 3D part of an episode. `ego_width_m` is that of the car."""
+    """Logs the 3D part of an episode whose car is `ego_width_m` wide."""
 
     def __init__(self, lane: Lane, rig: Rig, ego_width_m: float):
         self._lane, self._rig = lane, rig
@@ -31,54 +32,61 @@ class Space:
         width = ego_width_m + 2 * BrakingRules().side_margin_m
         strip = np.array([[PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, PATH_M, width, 0.02, 0.0]])
         lane.fix("world/lidar/path", boxes(strip, colors=looks.PATH, fill_mode=FillMode.Solid))
+        lane.fix("world/ego", rr.Boxes3D.from_fields(colors=[looks.EGO], fill_mode=FillMode.Solid))
+        lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=GLASSY))
+        lane.fix("world/driven", rr.LineStrips3D.from_fields(colors=[looks.EGO], radii=[THIN]))
+        lane.fix("world/lidar/returns", rr.Points3D.from_fields(radii=[2 * THIN]))
+        lane.fix("world/lidar/tracks", rr.Boxes3D.from_fields(show_labels=False))
+        lane.fix("world/lidar/velocities", rr.Arrows3D.from_fields(colors=[looks.EXPLAINED], radii=[0.08]))
+        for kind, colour in (("residual", (*looks.RESIDUAL, 200)), ("explained", (*looks.EXPLAINED, 50))):
+            lane.fix(f"world/lidar/wedges/{kind}", rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]))
 
     def log(self, moment: Moment, state: str) -> None:
         """A keyframe, with the state of the first-sighting actor."""
         stance = moment.stance
-        self._log_world(stance, state)
+        self._log_bodies(stance, state)
+        self._log_ego(stance)
         self._log_returns(moment)
         self._log_tracks(stance)
-        for name, chosen in (("residual", ~stance.known), ("explained", stance.known)):
-            self._log_wedges(stance, name, chosen)
+        for kind, chosen in (("residual", ~stance.known), ("explained", stance.known)):
+            self._log_wedges(kind, bundles(stance.belief.detections, self._rig)[chosen][:, CORNERS])
 
-    def _log_world(self, stance: Stance, state: str) -> None:
+    def _log_bodies(self, stance: Stance, state: str) -> None:
         colours = [looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]] for label in stance.labels]
-        bodies = boxes(stance.bodies, colors=colours, labels=stance.names, show_labels=False, fill_mode=GLASSY)
-        self._lane.log("world/bodies", bodies)
+        self._lane.log("world/bodies", boxes(stance.bodies, colors=colours, labels=stance.names))
         if stance.target is not None:
             around = stance.bodies[[stance.target]] + np.array([0, 0, 0, *[2 * MARGIN_M] * 3, 0])
             text = [f"{stance.names[stance.target]}: {state}"]
             self._lane.log("world/first_sighting", boxes(around, colors=looks.ACTOR_COLOURS[state], labels=text))
-        self._lane.log("world/ego", boxes(stance.ego[None], colors=looks.EGO, fill_mode=FillMode.Solid))
+
+    def _log_ego(self, stance: Stance) -> None:
+        self._lane.log("world/ego", boxes(stance.ego[None]))
         self._driven.append(np.array([*stance.ego[:2], 0.03]))
-        self._lane.log("world/driven", rr.LineStrips3D([self._driven], colors=looks.EGO, radii=rr.Radius.ui_points(1)))
+        self._lane.log("world/driven", rr.LineStrips3D([self._driven]))
+        sensor = stance.sensor
+        turn = rr.Quaternion(xyzw=sensor.rotation.as_quat())
+        self._lane.log("world/lidar", rr.Transform3D(translation=sensor.origin, quaternion=turn))
 
     def _log_returns(self, moment: Moment) -> None:
-        sensor = moment.stance.sensor
-        self._lane.log(
-            "world/lidar",
-            rr.Transform3D(translation=sensor.origin, quaternion=rr.Quaternion(xyzw=sensor.rotation.as_quat())),
-        )
         cells, points = moment.returned(self._rig.grid)
-        colours = np.array(looks.SHARE_COLOURS, np.uint8)[moment.shares.ravel()[cells]]
-        self._lane.log("world/lidar/returns", rr.Points3D(points, colors=colours, radii=rr.Radius.ui_points(2)))
+        colours = SHARE_COLOURS[moment.shares.ravel()[cells]]
+        self._lane.log("world/lidar/returns", rr.Points3D(points, colors=colours))
 
     def _log_tracks(self, stance: Stance) -> None:
         tracks = stance.belief.tracks
         colours = [looks.COASTING if misses else looks.EXPLAINED for misses in tracks.misses]
         names = [CLASSES[label] for label in tracks.classes]
-        self._lane.log("world/lidar/tracks", boxes(tracks.boxes, colors=colours, labels=names, show_labels=False))
         moves = np.column_stack([tracks.velocities, np.zeros(len(tracks))])
-        arrows = rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3], colors=looks.EXPLAINED, radii=0.08)
-        self._lane.log("world/lidar/velocities", arrows)
+        for entity, make in (
+            ("tracks", lambda: [boxes(tracks.boxes, colors=colours, labels=names)]),
+            ("velocities", lambda: [rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])]),
+        ):
+            self._lane.log_list(f"world/lidar/{entity}", len(tracks), make)
 
-    def _log_wedges(self, stance: Stance, name: str, chosen: np.ndarray) -> None:
-        rays = bundles(stance.belief.detections, self._rig)[chosen][:, CORNERS]
+    def _log_wedges(self, kind: str, rays: Floats) -> None:
         ends = looks.WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         strips = [strip for corners in ends for strip in _pyramid(corners)]
-        colour = (*looks.RESIDUAL, 200) if name == "residual" else (*looks.EXPLAINED, 50)
-        lines = rr.LineStrips3D(strips, colors=colour, radii=rr.Radius.ui_points(1))
-        self._lane.log(f"world/lidar/wedges/{name}", lines)
+        self._lane.log_list(f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)])
 
 
 def _pyramid(corners: Floats) -> list[Floats]:

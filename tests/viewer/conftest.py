@@ -24,8 +24,12 @@ class Read:
                     self.seconds[row["keyframe"]] = row["seconds"].total_seconds()
 
     def column(self, entity, component):
-        """The value of a component at every keyframe, in order."""
-        return [row[component] for _, row in sorted(self.rows[entity].items())]
+        """The value of a component at every keyframe, in order: the latest that was logged."""
+        values, latest = [], None
+        for keyframe in sorted(self.seconds) if entity in self.rows else ():
+            latest = self.rows[entity].get(keyframe, {component: latest})[component]
+            values.append(latest)
+        return values
 
     def numbers(self, entity):
         """The scalars of an entity."""
