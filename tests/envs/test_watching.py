@@ -1,5 +1,7 @@
 """Wrappers that watch: where they go, what they keep of several episodes, and that they change nothing."""
 
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
@@ -22,6 +24,13 @@ def watcher(request):
 
 def make(name="CARE-Dartout-v0", **arguments):
     return gymnasium.make(name, disable_env_checker=True, **arguments)
+
+
+@pytest.mark.parametrize(("wrapper", "extra"), [(RecordRerun, "viewer"), (ExportScans, "open3d")])
+def test_a_missing_extra_is_named(wrapper, extra, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, LIBRARIES[wrapper], None)
+    with pytest.raises(care_sim.MissingExtra, match=f"extra '{extra}'"):
+        wrapper(make(), tmp_path / "out.rrd")
 
 
 def test_the_open_loop_is_refused(watcher, tmp_path):

@@ -1,5 +1,7 @@
 """A recording of an episode, held against the episode's own row and keyframes."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -116,9 +118,22 @@ def test_camera_boxes_are_those_of_the_belief(episode):
     assert any(names for names in missed)
 
 
-def test_a_six_second_recording_is_small(episode):
+def test_a_six_second_recording_is_small_and_quickly_written(episode, tmp_path):
+    """Below 5 MB and, on a free core, a second; the test leaves room for a busy one."""
     path = episode[4]
     assert path.stat().st_size < 5e6
+    plain, recorded = (
+        min(spent(wrap) for _ in range(2))
+        for wrap in (lambda env, _policy: env, lambda env, policy: RecordRerun(env, tmp_path / "again.rrd", policy))
+    )
+    assert recorded - plain < 2.0
+
+
+def spent(wrap):
+    """CPU seconds of an episode."""
+    started = time.process_time()
+    trace(CONFIG, wrap=wrap)
+    return time.process_time() - started
 
 
 def test_raw_actions_are_chosen_or_floor(tmp_path, read):
