@@ -18,6 +18,9 @@ from care_sim.extras import import_rerun
 MAGIC = b"RRF"
 """What a recording begins with."""
 HERE = "127.0.0.1"
+VIEWER = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
+"""Rerun's own launcher; as a module it would not tell whether the viewer failed."""
+FAILED = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +39,10 @@ class View:
             if recording.read(len(MAGIC)) != MAGIC:
                 raise InvalidInput(f"{self.file} is no recording of `care-sim run --record`")
         if not self.web:
-            return _rerun(str(self.file), "--port", "auto")
+            if not _rerun(str(self.file), "--port", "auto"):
+                return 0
+            print("care-sim: the viewer failed; with --web a browser shows the recording", file=sys.stderr)
+            return FAILED
         data, pages = _free_ports(2)
         source = quote(f"rerun+http://{HERE}:{data}/proxy", safe="")
         print(
@@ -50,7 +56,7 @@ class View:
 def _rerun(*options: str) -> int:
     """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes outlives this one."""
     quiet = {"RUST_LOG": "warn"} | os.environ
-    process = subprocess.Popen([sys.executable, "-m", "rerun_cli", *options], start_new_session=True, env=quiet)
+    process = subprocess.Popen([sys.executable, "-c", VIEWER, *options], start_new_session=True, env=quiet)
     try:
         return process.wait()
     except KeyboardInterrupt:

@@ -8,9 +8,9 @@ from care_sim.viewer.entities import SECONDS
 
 EYE_M, TARGET_M = (-11.0, 0.0, 6.0), (12.0, 0.0, -1.0)
 """Behind the car and above it, in the sensor frame."""
-ABOVE_M, BELOW_M = (14.0, -0.1, 42.0), (14.0, 0.0, 0.0)
 DARK = (24, 26, 30)
 FIRED = "fired: blue exploitation, orange reserve, grey floor"
+RAW = ", green chosen by a raw action"
 
 
 def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
@@ -33,7 +33,10 @@ def _one(lane: str) -> rrb.Vertical:
     side = rrb.Vertical(_camera(lane), words, row_shares=[3, 2])
     below = rrb.Horizontal(_states([lane]), *_plots([lane]), budget)
     return rrb.Vertical(
-        rrb.Horizontal(_chase(lane), side, column_shares=[3, 2]), _grid(lane), below, row_shares=[5, 1.7, 2]
+        rrb.Horizontal(_chase(lane), side, column_shares=[3, 2]),
+        _grid(lane, FIRED + RAW),
+        below,
+        row_shares=[5, 1.7, 2],
     )
 
 
@@ -59,8 +62,8 @@ def _camera(lane: str) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(origin=f"{lane}/world/lidar/camera", name=name)
 
 
-def _grid(lane: str) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin=f"{lane}/grid", name=f"{lane}: {FIRED}")
+def _grid(lane: str, legend: str = FIRED) -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(origin=f"{lane}/grid", name=f"{lane}: {legend}")
 
 
 def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:

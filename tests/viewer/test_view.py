@@ -53,6 +53,14 @@ def test_a_place_that_cannot_be_written_is_one_line(capsys, tmp_path):
     assert "file" in err
 
 
+def test_without_a_display_the_browser_is_recommended(recording, capfd, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    code, _, err = run(capfd, "view", recording)
+    assert code == 1
+    assert err.splitlines()[-1].endswith("with --web a browser shows the recording")
+
+
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
 def test_the_web_viewer_is_served_and_ends_with_its_children(recording, end):
     command = [sys.executable, "-c", "from care_sim.cli import main; main()", "view", str(recording), "--web"]
