@@ -25,12 +25,16 @@ FAILED = 1
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra 'viewer')."""
+    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra 'viewer').
+
+    It needs no network. Where there is one, the viewer looks for its updates and counts its use, which
+    `rerun analytics disable` ends; its page in a browser fetches a font too.
+    """
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """The recording (.rrd)."""
     web: bool = False
-    """Serve it to browsers of this machine instead, which need no network for it. Ctrl-C ends it."""
+    """Serve it to browsers of this machine instead. Ctrl-C ends it."""
 
     def __call__(self) -> int:
         """Run it."""

@@ -9,6 +9,8 @@ ROW_PIXELS = 2
 """Pixel rows of the grid's picture to a row of cells, which is about twice as high as a column is wide."""
 WEDGE_M = 30.0
 """How far a wedge, which has no depth, is drawn."""
+MOST_POINTS = 6000
+"""Of a scan with more returns every second or third is drawn: a full scan would fill 9 MB in 6 s."""
 
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",
@@ -18,7 +20,7 @@ ENTITIES = {
     "world/driven": "the way of the car's centre so far, on the ground; world frame",
     "world/lidar": "the sensor frame in the world: x forward, y left, z up; metres. What is below it is in this frame",
     "world/lidar/path": "the strip that the controller guards, as far as it is drawn; sensor frame",
-    "world/lidar/returns": "points of the scan, coloured by the share of the budget that fired them; sensor frame",
+    "world/lidar/returns": f"points, coloured by share of the budget; every nth of more than {MOST_POINTS}; sensor frame",
     "world/lidar/tracks": "forecasts for this keyframe, faint when the last scan missed them; sensor frame",
     "world/lidar/velocities": "their motion over ground in the next second, m/s; sensor axes",
     "world/lidar/wedges/residual": f"edges of the wedges that no forecast explains, {WEDGE_M:.0f} m; sensor frame",

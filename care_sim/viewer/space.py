@@ -1,5 +1,7 @@
 """What is logged in space: bodies, the car and its way, returns, tracks, wedges."""
 
+import math
+
 import numpy as np
 import rerun as rr
 from rerun.components import FillMode
@@ -69,8 +71,9 @@ class Space:
 
     def _log_returns(self, moment: Moment) -> None:
         cells, points = moment.returned(self._rig.grid)
-        colours = SHARE_COLOURS[moment.shares.ravel()[cells]]
-        self._lane.log("world/lidar/returns", rr.Points3D(points, colors=colours))
+        step = math.ceil(len(cells) / looks.MOST_POINTS) or 1
+        colours = SHARE_COLOURS[moment.shares.ravel()[cells[::step]]]
+        self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
 
     def _log_tracks(self, stance: Stance) -> None:
         tracks = stance.belief.tracks

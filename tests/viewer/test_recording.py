@@ -129,6 +129,22 @@ def test_a_six_second_recording_is_small_and_quickly_written(episode, tmp_path):
     assert recorded - plain < 2.0
 
 
+def test_a_recorded_full_scan_is_small_too(tmp_path, read):
+    """More returns than are drawn: what is drawn lies among them, and the picture of the cells is whole."""
+    path, after = tmp_path / "full.rrd", []
+    config = EpisodeConfig("dartout", "full", 1.0)
+    trace(config, lambda loop, _frame: after.append(loop.belief), lambda env, policy: RecordRerun(env, path, policy))
+    assert path.stat().st_size < 5e6
+    found, grid = read(path), AngularGrid()
+    drawn, ranges = np.array(found.column("full/world/lidar/returns", "Points3D:positions")[7]), after[7].ranges.ravel()
+    returned = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
+    assert len(returned) > entities.MOST_POINTS >= len(drawn) > entities.MOST_POINTS / 2
+    cells = grid.cells_of(drawn)
+    np.testing.assert_allclose(np.linalg.norm(drawn, axis=1), ranges[cells], rtol=1e-5)
+    assert len(set(cells)) == len(drawn)
+    assert found.numbers("full/budget/reserve") == [100.0] * len(after)
+
+
 def spent(wrap):
     """CPU seconds of an episode."""
     started = time.process_time()
