@@ -20,7 +20,7 @@ ENTITIES = {
     "world/driven": "the way of the car's centre so far, on the ground; world frame",
     "world/lidar": "the sensor frame in the world: x forward, y left, z up; metres. What is below it is in this frame",
     "world/lidar/path": "the strip that the controller guards, as far as it is drawn; sensor frame",
-    "world/lidar/returns": f"points, coloured by share of the budget; every nth of more than {MOST_POINTS}; sensor frame",
+    "world/lidar/returns": f"points, coloured by share; every nth of more than {MOST_POINTS} returns; sensor frame",
     "world/lidar/tracks": "forecasts for this keyframe, faint when the last scan missed them; sensor frame",
     "world/lidar/velocities": "their motion over ground in the next second, m/s; sensor axes",
     "world/lidar/wedges/residual": f"edges of the wedges that no forecast explains, {WEDGE_M:.0f} m; sensor frame",
