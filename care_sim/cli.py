@@ -13,10 +13,11 @@ from typing import Any, NoReturn
 import tyro
 
 from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.study.clip import Clip
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
+from care_sim.study.compare import Compare
 from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
+from care_sim.viewer.command import View
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -85,7 +86,8 @@ ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sighti
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
     "run": Run,
-    "clip": Clip,
+    "compare": Compare,
+    "view": View,
     "sweep": Sweep,
     "ablate": Ablate,
     "faults": Faults,

@@ -43,6 +43,11 @@ def import_imageio_ffmpeg() -> ModuleType:
     return _import("imageio_ffmpeg", "A film as MP4", "video")
 
 
+def import_rerun() -> ModuleType:
+    """Rerun. Raises MissingExtra with the extra to install."""
+    return _import("rerun", "Rerun", "viewer")
+
+
 def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
         return import_module(module)

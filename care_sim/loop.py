@@ -108,11 +108,12 @@ class ClosedLoop:
         (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
-        sights = sights_of([taken], self._labels)
+        self.sights = sights_of([taken], self._labels)
+        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for people and scoring."""
         self.belief = Belief(
             self._odometry.reading(self.world.ego_motion),
             self.rig.budget,
-            self._camera.detect(sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._camera.detect(self.sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
             self._memory.tracks(sensor),
             ranges,
         )

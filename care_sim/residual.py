@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.frames import turned
+from care_sim.frames import Floats, turned
 from care_sim.grid import Cells
 from care_sim.types import Belief, ImageDetections, Rig, Tracks
 
@@ -27,11 +27,16 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
 
 
 def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:
-    """The depth-free wedge W(d) of every detection, turned by the yaw change since its picture."""
-    if not len(detections):
-        return []
-    bundles = rig.lenses.box_rays(detections.boxes, detections.cameras)
-    return rig.wedges(turned(bundles, -detections.yaw_changes[:, None]))
+    """The depth-free wedge W(d) of every detection."""
+    return rig.wedges(bundles(detections, rig)) if len(detections) else []
+
+
+def bundles(detections: ImageDetections, rig: Rig) -> Floats:
+    """(n, 9, 3) the rays through the image box of every detection, as of `PinholeCamera.box_rays`, turned by the yaw
+    change since its picture.
+    """
+    rays = rig.lenses.box_rays(detections.boxes, detections.cameras)
+    return turned(rays, -detections.yaw_changes[:, None])
 
 
 def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:

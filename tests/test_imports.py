@@ -1,10 +1,14 @@
 """What an episode makes a process load: a worker must stay small."""
 
 import json
+import pathlib
+import re
 import subprocess
 import sys
 
 import pytest
+
+import care_sim
 
 EPISODE = """
 import json, sys
@@ -33,3 +37,18 @@ def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
     assert {"care_sim", "gymnasium", "pybullet"} <= loaded
     assert {name.partition(".")[0] for name in loaded} & HEAVY == set()
     assert "scipy.stats" not in loaded
+
+
+def test_the_wrapper_that_records_loads_rerun_only_when_it_is_used():
+    line = "import sys; from care_sim.wrappers import RecordRerun; import care_sim.cli; print('rerun' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_only_the_viewer_imports_rerun():
+    package = pathlib.Path(care_sim.__file__).parent
+    importing = [
+        file for file in package.rglob("*.py") if re.search(r"^\s*(import|from) rerun", file.read_text(), re.M)
+    ]
+    assert importing
+    assert {file.parent for file in importing} == {package / "viewer"}

@@ -16,12 +16,14 @@ class Policy(ABC):
     """A scripted policy. Subclasses state the idea and its source, and implement `demand`.
 
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction, keyframe. `tags` are
-    some of `TAGS`, `source` is the citation in one line.
+    some of `TAGS`, `source` is the citation in one line. `demanded` is what `demand` last answered a call with, for
+    those who watch.
     """
 
     name: ClassVar[str] = ""
     tags: ClassVar[tuple[str, ...]] = ("causal",)
     source: ClassVar[str] = ""
+    demanded: Demand | None = None
 
     def __init__(self, rig: Rig):
         self.rig = rig
@@ -48,6 +50,7 @@ class Policy(ABC):
         demand = self.demand(belief)
         if not isinstance(demand, Demand):
             raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")
+        self.demanded = demand
         cells = allocate(demand, belief.budget, self.rig.reserve_fraction)
         if cells.min(initial=0) < 0 or cells.max(initial=0) >= self.rig.grid.size:
             raise InvalidInput(f"cells must lie in 0..{self.rig.grid.size - 1}")

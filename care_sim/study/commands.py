@@ -6,6 +6,7 @@ What imports the simulator or draws is imported by the command that needs it: he
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,6 +38,10 @@ class Run:
     """PNG file for a picture of the first keyframe at which the brake is on."""
     video: Path | None = None
     """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its ending."""
+    record: Path | None = None
+    """File (.rrd) for a recording that `care-sim view FILE` plays (extra 'viewer')."""
+    export: Path | None = None
+    """Folder for every scan as a point cloud (PCD), with poses and boxes as JSON (extra 'open3d')."""
     conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
     """Further conditions."""
 
@@ -47,13 +52,15 @@ class Run:
         from care_sim.study.filming import Filming
         from care_sim.study.photo import Photographer
         from care_sim.study.timeline import print_timeline
+        from care_sim.study.watchers import watched
 
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer, filming = Photographer(self.picture), Filming(self.video)
-        print_timeline(config, *trace(config, photographer, filming), console())
+        wrap = partial(watched, record=self.record, export=self.export)
+        print_timeline(config, *trace(config, photographer, filming, wrap=wrap), console())
         photographer.report()
         filming.write()
         return 0

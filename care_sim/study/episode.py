@@ -7,13 +7,15 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from traceback import extract_tb
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import gymnasium
 import numpy as np
 
 import care_sim
 from care_sim.errors import InvalidInput
 from care_sim.loop import ClosedLoop
+from care_sim.policies.base import Policy
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.task import Row
 from care_sim.types import Keyframe, Observation
@@ -21,6 +23,7 @@ from care_sim.world.world import World
 
 Answer = TypeVar("Answer")
 Watcher = Callable[[ClosedLoop, Keyframe], None]
+Environment = gymnasium.Env[Any, Any]
 KIB_MB = 1024 / 1e6
 
 
@@ -51,15 +54,20 @@ def run_episode(config: EpisodeConfig) -> Row:
     return trace(config)[0]
 
 
-def trace(config: EpisodeConfig, *watchers: Watcher) -> tuple[Row, list[Keyframe]]:
+def trace(
+    config: EpisodeConfig,
+    *watchers: Watcher,
+    wrap: Callable[[Environment, Policy], Environment] = lambda env, _policy: env,
+) -> tuple[Row, list[Keyframe]]:
     """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
 
-    `watchers` are called after every keyframe.
+    `watchers` are called after every keyframe; `wrap` puts wrappers that watch around the environment.
     """
     started = time.perf_counter()
     seal = Seal()
-    with config.make_env() as env:
-        policy = config.make_policy(env)
+    bare = config.make_env()
+    policy = config.make_policy(bare)
+    with wrap(bare, policy) as env:
         observation, info = env.reset(seed=config.seed)
         policy.reset()
         ended = False

@@ -11,9 +11,7 @@ from care_sim.envs.panel import draw_panel
 from care_sim.envs.picture import draw_keyframe
 from care_sim.loop import ClosedLoop
 from care_sim.study.clip_files import check_clip, write_clip
-from care_sim.study.config import EpisodeConfig
-from care_sim.study.episode import trace
-from care_sim.study.task import Row
+from care_sim.study.episode import Watcher
 from care_sim.types import Keyframe
 
 LAST_PICTURE_S = 2.5
@@ -45,31 +43,36 @@ class Filming:
             write_clip(self._path, self._pictures, self._keyframe_s, LAST_PICTURE_S)
 
 
-class Panels:
-    """Watches an episode and keeps the narrow picture of every keyframe, under the name of its policy."""
+class SideBySide:
+    """The same seed under several policies on one film, at `path`; without a path it does nothing.
 
-    def __init__(self, name: str):
-        self.name = name
-        self.pictures: list[Image.Image] = []
-        self._frames: list[Keyframe] = []
-
-    def __call__(self, loop: ClosedLoop, frame: Keyframe) -> None:
-        """Take the picture of a keyframe."""
-        self.keyframe_s = loop.rig.keyframe_s
-        self._frames.append(frame)
-        self.pictures.append(draw_panel(self.name, loop, self._frames))
-
-
-def film_side_by_side(configs: Sequence[EpisodeConfig], path: Path) -> list[Row]:
-    """Play episodes that differ in their policy, write them side by side, and return their rows.
-
-    An episode that ends before the others keeps its last picture. Errors are those of `check_clip`.
+    Errors are those of `Filming`.
     """
-    check_clip(path)
-    panels = [Panels(config.policy) for config in configs]
-    rows = [trace(config, panel)[0] for config, panel in zip(configs, panels, strict=True)]
-    write_clip(path, _side_by_side([panel.pictures for panel in panels]), panels[0].keyframe_s, LAST_PICTURE_S)
-    return rows
+
+    def __init__(self, path: Path | None):
+        self._path = path
+        self._films: list[list[Image.Image]] = []
+        if path is not None:
+            check_clip(path)
+
+    def panel(self, name: str) -> Watcher:
+        """What watches the next episode, of the policy `name`."""
+        frames: list[Keyframe] = []
+        film: list[Image.Image] = []
+        self._films.append(film)
+
+        def watch(loop: ClosedLoop, frame: Keyframe) -> None:
+            if self._path is not None:
+                self._keyframe_s = loop.rig.keyframe_s
+                frames.append(frame)
+                film.append(draw_panel(name, loop, frames))
+
+        return watch
+
+    def write(self) -> None:
+        """Write the film; an episode that ends before the others keeps its last picture."""
+        if self._path is not None:
+            write_clip(self._path, _side_by_side(self._films), self._keyframe_s, LAST_PICTURE_S)
 
 
 def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> list[Image.Image]:

@@ -31,7 +31,7 @@ def print_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe
     console.print(table)
     console.print(LEGEND, markup=False)
     for name in Outcome.__dataclass_fields__:
-        console.print(f"{LABELS.get(name, name):44} {_text(row[name])}")
+        console.print(f"{LABELS.get(name, name):44} {text(row[name])}")
     console.print(f"{'episode_hash':44} {row['episode_hash']}")
     console.print(f"{'wall_s':44} {row['wall_s']:.1f}")
 
@@ -58,7 +58,8 @@ def _cells(frame: Keyframe) -> tuple[str, ...]:
     )
 
 
-def _text(value: bool | int | float | None) -> str:
+def text(value: bool | int | float | None) -> str:
+    """A result as people read it."""
     if value is None:
         return "-"
     if isinstance(value, bool):

@@ -12,9 +12,10 @@ import care_sim
 from care_sim.envs import panel, picture
 from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.clip_files import ENDINGS, write_clip
+from care_sim.study.compare import play
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.episode import trace
-from care_sim.study.filming import Filming, film_side_by_side
+from care_sim.study.filming import Filming
 from care_sim.types import Keyframe
 
 SIZE = (64, 48)
@@ -76,7 +77,7 @@ def test_episodes_side_by_side_end_together(tmp_path):
         EpisodeConfig("dartout", policy, scenario_parameters=(("duration_s", length),))
         for policy, length in lengths.items()
     ]
-    rows = film_side_by_side(configs, tmp_path / "clip.png")
+    rows = play(configs, video=tmp_path / "clip.png")
     assert [row["keyframes"] for row in rows] == [2, 4]
     with Image.open(tmp_path / "clip.png") as clip:
         pictures = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(clip)]

@@ -1,0 +1,90 @@
+"""What the wrappers share that watch an episode and leave it as it is."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.errors import InvalidInput
+from care_sim.loop import ClosedLoop
+from care_sim.moments import Moment, Witness
+from care_sim.policies.base import Policy
+from care_sim.types import Action
+
+
+class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
+    """Gathers the moments of the closed loop under it. It stands inside wrappers that change the action.
+
+    With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions only what was chosen
+    and what the floor filled up. Raises InvalidInput for an environment that is no closed loop of CARE-Sim, and for
+    one whose actions are no scores of cells any more.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
+        super().__init__(env)
+        inner, name = env.unwrapped, type(self).__name__
+        if not isinstance(inner, ClosedLoopEnv):
+            raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {env}")
+        if env.action_space.shape != inner.rig.grid.shape:
+            raise InvalidInput(f"{name} goes under wrappers that change the action, not around them: got {env}")
+        self._closed_loop, self._policy = inner, policy
+        self._witness: Witness | None = None
+        self._episodes = 0
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode; the one before, if it was not played to its end, is closed as it is."""
+        self._leave(None)
+        answer = super().reset(seed=seed, options=options)
+        self._witness = Witness(self._closed_loop.loop, self._closed_loop.conditions.camera_confidence)
+        return answer
+
+    def step(self, action: Action) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Play a keyframe and keep its moment."""
+        if self._witness is None:
+            return super().step(action)
+        loop = self._closed_loop.loop
+        if loop.index == 0:
+            self.begin(loop, self._episodes)
+            self._episodes += 1
+        stance = self._witness.stance()
+        self.look(loop)
+        answer = super().step(action)
+        demand = self._policy.demanded if self._policy is not None else None
+        self.keep(self._witness.moment(stance, action, demand, self._closed_loop.keyframes[-1]))
+        if answer[2] or answer[3]:
+            self._leave(answer[4]["outcome"])
+        return answer
+
+    def close(self) -> None:
+        """Close what is kept, then the environment."""
+        self._leave(None)
+        super().close()
+
+    def _leave(self, outcome: Mapping[str, Any] | None) -> None:
+        begun = self._witness is not None and self._closed_loop.loop.index > 0
+        self._witness = None
+        if begun:
+            self.end(outcome)
+
+    @abstractmethod
+    def begin(self, loop: ClosedLoop, episode: int) -> None:
+        """An episode begins, number `episode` from 0: its first keyframe is about to be played."""
+
+    def look(self, loop: ClosedLoop) -> None:
+        """A keyframe is about to be played."""
+
+    @abstractmethod
+    def keep(self, moment: Moment) -> None:
+        """A keyframe was played."""
+
+    @abstractmethod
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """The episode is over; `outcome` has the fields of `care_sim.types.Outcome`, None for one that was left."""
+
+
+def numbered(path: Path, episode: int) -> Path:
+    """Where an episode is kept: the first in `path` itself, later ones beside it, with their number."""
+    return path.with_stem(f"{path.stem}-{episode}") if episode else path

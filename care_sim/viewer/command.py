@@ -1,0 +1,89 @@
+"""`care-sim view`: the Rerun viewer over a recording, on this machine or in a browser, without a network."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import quote
+
+import tyro
+
+from care_sim.errors import InvalidInput
+from care_sim.extras import import_rerun
+
+MAGIC = b"RRF"
+"""What a recording begins with."""
+HERE = "127.0.0.1"
+VIEWER = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
+"""Rerun's own launcher; as a module it would not tell whether the viewer failed."""
+FAILED = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra 'viewer').
+
+    It needs no network. Where there is one, the viewer looks for its updates and counts its use, which
+    `rerun analytics disable` ends; its page in a browser fetches a font too.
+    """
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """The recording (.rrd)."""
+    web: bool = False
+    """Serve it to browsers of this machine instead. Ctrl-C ends it."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        import_rerun()
+        with self.file.open("rb") as recording:
+            if recording.read(len(MAGIC)) != MAGIC:
+                raise InvalidInput(f"{self.file} is no recording of `care-sim run --record`")
+        if not self.web:
+            if not _rerun(str(self.file), "--port", "auto"):
+                return 0
+            print("care-sim: the viewer failed; with --web a browser shows the recording", file=sys.stderr)
+            return FAILED
+        data, pages = _free_ports(2)
+        source = quote(f"rerun+http://{HERE}:{data}/proxy", safe="")
+        print(
+            f"Open http://{HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a browser; Ctrl-C ends it.",
+            flush=True,
+        )
+        ports = ("--bind", HERE, "--port", str(data), "--web-viewer-port", str(pages))
+        return _rerun(str(self.file), "--serve-web", *ports)
+
+
+def _rerun(*options: str) -> int:
+    """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes outlives this one."""
+    quiet = {"RUST_LOG": "warn"} | os.environ
+    process = subprocess.Popen([sys.executable, "-c", VIEWER, *options], start_new_session=True, env=quiet)
+    try:
+        return process.wait()
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        _end(process)
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+    except ProcessLookupError:
+        return
+    process.wait()
+
+
+def _free_ports(count: int) -> list[int]:
+    """Ports of this machine that nobody listens on."""
+    sockets = [socket.socket() for _ in range(count)]
+    try:
+        for one in sockets:
+            one.bind((HERE, 0))
+        return [one.getsockname()[1] for one in sockets]
+    finally:
+        for one in sockets:
+            one.close()

@@ -1,0 +1,89 @@
+"""The wrapper that records: any agent, any learner, any policy."""
+
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+
+from care_sim.envs.watching import Watching, numbered
+from care_sim.extras import import_rerun
+from care_sim.loop import ClosedLoop
+from care_sim.moments import Moment
+from care_sim.policies.base import Policy
+from care_sim.types import Action
+
+if TYPE_CHECKING:
+    from care_sim.viewer.recording import Episode, Recording
+
+
+def recording(path: Path, lanes: Sequence[str]) -> "Recording":
+    """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed. `lanes` are their
+    names. Raises as `RecordRerun` does.
+    """
+    import_rerun()
+    from care_sim.viewer.recording import Recording
+
+    return Recording(path, lanes)
+
+
+class RecordRerun(Watching):
+    """Records every episode for the Rerun viewer: `care-sim view FILE`.
+
+    The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it; one that is left before its end
+    is kept as far as it was played. Action, observation, reward and episode stay what they are.
+
+    ### Arguments
+    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does: its demands tell which cells were
+    exploitation and which reserve. Without it only "chosen" and "floor" are known. `name` of the episode in the
+    recording, the policy's by default. Goes under wrappers that change the action:
+    `SectorReserve(RecordRerun(env, "out.rrd"))`.
+
+    ### What is recorded
+    At every keyframe the street, the returns, the camera's picture and detections, the cells, the measures:
+    `care_sim.viewer.entities.ENTITIES` has each with unit and frame, as has the page "About" of the recording.
+    Timelines are `keyframe` and `seconds`.
+
+    Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an environment that is no
+    closed loop of CARE-Sim or whose actions are no scores of cells, OSError where the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Action],
+        path: "str | PathLike[str] | Recording",
+        policy: Policy | None = None,
+        name: str | None = None,
+    ):
+        super().__init__(env, policy)
+        import_rerun()
+        self._path = Path(fspath(path)) if isinstance(path, str | PathLike) else None
+        self._recording = None if isinstance(path, str | PathLike) else path
+        self._name = name or (policy.name if policy is not None else "") or "agent"
+        self._episode: Episode | None = None
+
+    def begin(self, loop: ClosedLoop, episode: int) -> None:
+        """Open the file of this episode, or its lane in a file that was given."""
+        if self._path is not None:
+            self._recording = recording(numbered(self._path, episode), [self._name])
+        assert self._recording is not None
+        self._episode = self._recording.episode(self._name, loop)
+
+    def look(self, loop: ClosedLoop) -> None:
+        """Take the camera's picture."""
+        if self._episode is not None:
+            self._episode.look(loop)
+
+    def keep(self, moment: Moment) -> None:
+        """Log the keyframe."""
+        if self._episode is not None:
+            self._episode.keep(moment)
+
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """Finish the episode, and the file if it is its own."""
+        if self._episode is not None and self._recording is not None:
+            self._episode.end(outcome)
+            if self._path is not None:
+                self._recording.close()
+        self._episode = None

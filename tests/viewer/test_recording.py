@@ -1,0 +1,173 @@
+"""A recording of an episode, held against the episode's own row and keyframes."""
+
+import time
+
+import numpy as np
+import pytest
+
+from care_sim.frames import Frame
+from care_sim.grid import AngularGrid
+from care_sim.shares import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.episode import run_episode, trace
+from care_sim.viewer import entities
+from care_sim.viewer.wrapper import RecordRerun
+
+CONFIG = EpisodeConfig("dense", "care", 0.05, 1, false_negative_rate=0.2, false_positive_rate=0.3)
+
+
+@pytest.fixture(scope="module")
+def episode(tmp_path_factory, read):
+    """Row, keyframes, how the loop stood after each, and what was recorded."""
+    path = tmp_path_factory.mktemp("recordings") / "out.rrd"
+    after = []
+    row, keyframes = trace(
+        CONFIG,
+        lambda loop, _frame: after.append((loop.sensor, loop.belief)),
+        lambda env, policy: RecordRerun(env, path, policy),
+    )
+    return row, keyframes, after, read(path), path
+
+
+def test_recording_changes_nothing(episode):
+    row, *_ = episode
+    assert row["episode_hash"] == run_episode(CONFIG)["episode_hash"]
+
+
+def test_every_entity_is_documented_and_every_documented_one_is_there(episode):
+    found = episode[3]
+    names = {name.removeprefix("care/") for name in {*found.rows, *found.fixed} if name.startswith("care/")}
+    assert names == set(entities.ENTITIES)
+    (about,) = found.fixed["about"]["TextDocument:text"]
+    assert all(f"`{name}` | {content}" in about for name, content in entities.ENTITIES.items())
+
+
+def test_the_timelines_are_those_of_the_keyframes(episode):
+    _, keyframes, _, found, _ = episode
+    assert found.seconds == pytest.approx({frame.index: frame.time_s for frame in keyframes})
+    assert len(keyframes) == 60
+    always = ("world/bodies", "world/ego", "world/lidar/returns", "world/lidar/camera", "grid/cells", "grid/hulls")
+    assert all(set(found.rows[f"care/{name}"]) == set(range(60)) for name in always)
+
+
+def test_measures_are_those_of_the_keyframes(episode):
+    row, keyframes, _, found, _ = episode
+    for name, field in (("speed", "speed_mps"), ("distance", "distance_m"), ("clearance", "clearance_m")):
+        assert found.numbers(f"care/measures/{name}") == [getattr(frame, field) for frame in keyframes]
+    assert found.numbers("care/measures/braking") == [float(frame.braking) for frame in keyframes]
+    detected = first(found, "actor", "detected")
+    assert found.numbers("care/measures/distance")[detected] == row["detection_distance_m"]
+    assert first(found, "brake", "on") == [f.braking for f in keyframes].index(True)
+    (text,) = found.fixed["care/outcome"]["TextDocument:text"]
+    assert f"| detection_distance_m | {row['detection_distance_m']} |" in text
+
+
+def first(found, name, state):
+    """The keyframe at which a state begins."""
+    return min(n for n, row in found.rows[f"care/states/{name}"].items() if row["StateChange:state"] == [state])
+
+
+def test_cells_and_budget_are_those_that_fired(episode):
+    row, keyframes, _, found, _ = episode
+    pictures = found.column("care/grid/cells", "SegmentationImage:buffer")
+    fired = {share: found.numbers(f"care/budget/{SHARES[share]}") for share in (EXPLOITATION, RESERVE, FLOOR)}
+    total = 0
+    for number, (picture, frame) in enumerate(zip(pictures, keyframes, strict=True)):
+        cells = np.array(picture, np.uint8).reshape(-1, entities.ROW_PIXELS, 512)
+        assert (cells[:, 0] == cells[:, 1]).all()
+        shares = cells[:, 0, ::-1].ravel()
+        np.testing.assert_array_equal(np.flatnonzero(shares), frame.fired)
+        total += len(frame.fired)
+        for share, percents in fired.items():
+            assert percents[number] == pytest.approx(100 * np.count_nonzero(shares == share) / round(0.05 * 16384))
+    assert total == row["rays_fired"]
+    assert max(fired[RESERVE]) > 0
+    assert max(fired[EXPLOITATION]) == pytest.approx(70, abs=0.1)
+
+
+def test_returns_lie_where_the_scan_says_and_on_the_bodies_that_are_drawn(episode):
+    _, keyframes, after, found, _ = episode
+    grid = AngularGrid()
+    points = found.column("care/world/lidar/returns", "Points3D:positions")
+    for cloud, (_, belief) in zip(points, after, strict=True):
+        ranges = belief.ranges.ravel()
+        cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
+        np.testing.assert_allclose(cloud, grid.directions[cells] * ranges[cells, None], rtol=1e-5, atol=1e-4)
+    number = next(frame.index for frame in keyframes if frame.detected)
+    origin = found.column("care/world/lidar", "Transform3D:translation")[number][0]
+    sensor = Frame(*origin, 0.0)
+    bodies = {name: found.column("care/world/bodies", f"Boxes3D:{name}")[number] for name in ("centers", "half_sizes")}
+    person = found.column("care/world/bodies", "Boxes3D:labels")[number].index("person")
+    world = sensor.origin + sensor.vectors_to_world(np.array(points[number]))
+    away = np.abs(world[:, :2] - bodies["centers"][person][:2]).max(axis=1)
+    assert np.count_nonzero(away < max(bodies["half_sizes"][person][:2]) + 0.05) >= 3
+
+
+def test_camera_boxes_are_those_of_the_belief(episode):
+    _, _, after, found, _ = episode
+    kinds = ("explained", "residual")
+    columns = [found.column(f"care/world/lidar/camera/{kind}", "Boxes2D:centers") for kind in kinds]
+    labels = found.column("care/world/lidar/camera/residual", "Points2D:labels")
+    for number, (_, belief) in enumerate(after[:-1], 1):
+        boxes = belief.detections.boxes
+        drawn = np.array([centre for column in columns for centre in column[number] or []]).reshape(-1, 2)
+        expected = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, [1, 3]].mean(axis=1)])
+        np.testing.assert_allclose(sorted(drawn.tolist()), sorted(expected.tolist()), atol=1e-3)
+    assert any("false" in label for names in labels for label in names or [])
+    missed = found.column("care/world/lidar/camera/missed", "Points2D:labels")
+    assert any(names for names in missed)
+
+
+def test_a_six_second_recording_is_small_and_quickly_written(episode, tmp_path):
+    """Below 5 MB and, on a free core, a second; the test leaves room for a busy one."""
+    path = episode[4]
+    assert path.stat().st_size < 5e6
+    plain, recorded = (
+        min(spent(wrap) for _ in range(2))
+        for wrap in (lambda env, _policy: env, lambda env, policy: RecordRerun(env, tmp_path / "again.rrd", policy))
+    )
+    assert recorded - plain < 2.0
+
+
+def test_a_recorded_full_scan_is_small_too(tmp_path, read):
+    """More returns than are drawn: what is drawn lies among them, and the picture of the cells is whole."""
+    path, after = tmp_path / "full.rrd", []
+    config = EpisodeConfig("dartout", "full", 1.0)
+    trace(
+        config, lambda loop, _frame: after.append(loop.belief), wrap=lambda env, policy: RecordRerun(env, path, policy)
+    )
+    assert path.stat().st_size < 5e6
+    found, grid = read(path), AngularGrid()
+    drawn, ranges = np.array(found.column("full/world/lidar/returns", "Points3D:positions")[7]), after[7].ranges.ravel()
+    returned = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
+    assert len(returned) > entities.MOST_POINTS >= len(drawn) > entities.MOST_POINTS / 2
+    cells = grid.cells_of(drawn)
+    np.testing.assert_allclose(np.linalg.norm(drawn, axis=1), ranges[cells], rtol=1e-5)
+    assert len(set(cells)) == len(drawn)
+    assert found.numbers("full/budget/reserve") == [100.0] * len(after)
+
+
+def spent(wrap):
+    """CPU seconds of an episode."""
+    started = time.process_time()
+    trace(CONFIG, wrap=wrap)
+    return time.process_time() - started
+
+
+def test_raw_actions_are_chosen_or_floor(tmp_path, read):
+    import gymnasium
+
+    path = tmp_path / "raw.rrd"
+    with RecordRerun(gymnasium.make("CARE-Dartout-v0"), path) as env:
+        env.reset(seed=0)
+        scores = np.zeros(env.action_space.shape, np.float32)
+        scores[10, :100] = 1.0
+        for _ in range(3):
+            env.step(scores)
+    found = read(path)
+    assert found.numbers("agent/budget/chosen") == pytest.approx([100 * 100 / 1638] * 3)
+    assert found.numbers("agent/budget/floor") == pytest.approx([100 * 1538 / 1638] * 3)
+    assert not found.rows["agent/budget/exploitation"]
+    cells = np.array(found.column("agent/grid/cells", "SegmentationImage:buffer")[0]).reshape(-1, 512)
+    assert set(cells[10 * entities.ROW_PIXELS, 512 - 100 :]) == {CHOSEN}
+    assert found.fixed["agent/outcome"]["TextDocument:text"] == ["The episode was not finished."]
