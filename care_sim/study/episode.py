@@ -51,11 +51,13 @@ def run_episode(config: EpisodeConfig) -> Row:
 
 
 def trace(
-    config: EpisodeConfig, watch: Callable[[ClosedLoop, Keyframe], None] = lambda _loop, _frame: None
+    config: EpisodeConfig,
+    watch: Callable[[ClosedLoop, Keyframe], None] = lambda _loop, _frame: None,
+    begin: Callable[[ClosedLoop], None] = lambda _loop: None,
 ) -> tuple[Row, list[Keyframe]]:
     """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
 
-    `watch` is called after every keyframe.
+    `begin` is called before the first keyframe, `watch` after every one.
     """
     started = time.perf_counter()
     seal = Seal()
@@ -63,6 +65,7 @@ def trace(
         policy = config.make_policy(env)
         observation, info = env.reset(seed=config.seed)
         policy.reset()
+        begin(env.unwrapped.loop)  # type: ignore[attr-defined]
         ended = False
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
