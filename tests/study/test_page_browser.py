@@ -212,10 +212,13 @@ def test_every_study_has_a_page(study, opened, tmp_path):
 
 
 def test_text_from_outside_is_text(opened, tmp_path):
-    made = [each | {"policy": "</script><b id=evil>"} for each in STUDY[:5]] + STUDY[5:]
-    page = opened(written(tmp_path, [each | {"tags": "causal"} for each in made], "sweep"))
+    evil = "</script><b id=evil>"
+    both = [*STUDY, *rows("care", [9.0], budget=0.1), *rows("history", [9.0], budget=0.1)]
+    made = [each | {"policy": evil, "tags": "causal"} if each["policy"] == "history" else each for each in both]
+    page = opened(written(tmp_path, [{"tags": "causal"} | each for each in made], "sweep"))
     assert page.locator("#evil").count() == 0
-    assert "</script><b id=evil>" in page.inner_text("#tables")
+    assert evil in page.inner_text("#tables")
+    assert evil in page.inner_html("#charts svg").replace("&lt;", "<").replace("&gt;", ">")
 
 
 @pytest.mark.slow
