@@ -82,7 +82,7 @@ def test_a_page_opens_at_once_and_says_what_was_played(opened, played):
     text = page.inner_text("body")
     assert "Sweep of the closed loop" in text
     assert "4 of 5 are the same to the last bit as in the results" in text
-    assert "1 episodes end otherwise with this version of the code" in text
+    assert "Episodes that end otherwise with this version of the code, which are marked: 1." in text
     assert "config.json is missing" in text
     assert "never" not in page.inner_text("table.episodes")
 

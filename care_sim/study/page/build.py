@@ -1,6 +1,7 @@
 """Builds the page of a folder of results."""
 
 import json
+import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -89,9 +90,9 @@ class Page:
     def warnings(self) -> list[str]:
         """Sentences about what is missing, or is not as it was."""
         reasons = Counter(episode.ending for episode in self.episodes if isinstance(episode.ending, str))
-        unplayable = [f"{count} episodes cannot be played again: {reason}." for reason, count in reasons.items()]
+        unplayable = [f"Episodes that cannot be played again: {count} ({reason})." for reason, count in reasons.items()]
         others = self.count("differences")
-        otherwise = [f"{others} episodes end otherwise with this version of the code; they are marked."]
+        otherwise = [f"Episodes that end otherwise with this version of the code, which are marked: {others}."]
         return [*self.origin.missing, *unplayable, *(otherwise if others else [])]
 
     def count(self, what: str) -> int:
@@ -107,6 +108,8 @@ def write_page(folder: Path, path: Path, most: int, workers: int, make_executor:
     rows, study, left_out = reported(folder)
     with replacing(path) as unfinished:
         watched = chosen(rows, most) if study.kind is EPISODES else []
+        if watched:
+            print(f"playing {len(watched)} episodes again to be watched", file=sys.stderr)
         about = origin(folder, rows, study.kind, left_out)
         page = Page(folder.resolve().name, study, rows, about, played_again(watched, workers, make_executor))
         unfinished.write_text(page.html(), encoding="utf-8")
