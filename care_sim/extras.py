@@ -48,6 +48,18 @@ def import_rerun() -> ModuleType:
     return _import("rerun", "Rerun", "viewer")
 
 
+def vega_bundle() -> str:
+    """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra to install."""
+    bundle: str = _import("vl_convert", "A page", "page").javascript_bundle()
+    return bundle
+
+
+def check_page() -> None:
+    """Raise MissingExtra where a library is missing that makes pages."""
+    for module in ("altair", "jinja2", "vl_convert"):
+        _import(module, "A page", "page")
+
+
 def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
         return import_module(module)

@@ -3,6 +3,7 @@
 What imports the simulator or draws is imported by the command that needs it: help stays quick.
 """
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.study.options import USUAL, Options, seeds_of
 from care_sim.study.running import Running, console, in_turn, playable
 
@@ -186,16 +187,39 @@ class Crowding(_SetStudy):
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Print the tables of a folder of results, and draw its figures again."""
+    """Print the tables of a folder of results and draw its figures again, or make one web page of it all."""
 
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """The --out of an earlier study."""
+    page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """HTML file for the page, which needs nothing else to be read; the folder is left as it is (extra 'page')."""
+    episodes: int = 400
+    """The most episodes that are played again to be watched in the page, seed by seed; 0 for none."""
+    workers: int = os.cpu_count() or 1
+    """Processes that play them."""
 
     def __call__(self) -> int:
         """Run it."""
+        return self._print() if self.page is None else self._write(self.page)
+
+    def _print(self) -> int:
         from care_sim.study.report import print_report, reported, write_report
 
         rows, study, left_out = reported(self.folder)
         print_report(rows, console(), study, left_out)
         write_report(rows, self.folder, study, left_out)
+        return 0
+
+    def _write(self, path: Path) -> int:
+        from care_sim.extras import check_page
+
+        check_whole("episodes", self.episodes, 0)
+        check_whole("workers", self.workers, 1)
+        check_page()
+        from care_sim.study.page.build import write_page
+
+        page = write_page(self.folder, path, self.episodes, self.workers)
+        for sentence in page.warnings:
+            print(f"care-sim: {sentence}", file=sys.stderr)
+        print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {page.count('replay')} episodes to watch")
         return 0

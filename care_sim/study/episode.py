@@ -57,11 +57,13 @@ def run_episode(config: EpisodeConfig) -> Row:
 def trace(
     config: EpisodeConfig,
     *watchers: Watcher,
+    begin: Callable[[ClosedLoop], None] = lambda _loop: None,
     wrap: Callable[[Environment, Policy], Environment] = lambda env, _policy: env,
 ) -> tuple[Row, list[Keyframe]]:
     """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
 
-    `watchers` are called after every keyframe; `wrap` puts wrappers that watch around the environment.
+    `begin` is called before the first keyframe, `watchers` after every one; `wrap` puts wrappers that watch around the
+    environment.
     """
     started = time.perf_counter()
     seal = Seal()
@@ -70,6 +72,7 @@ def trace(
     with wrap(bare, policy) as env:
         observation, info = env.reset(seed=config.seed)
         policy.reset()
+        begin(env.unwrapped.loop)  # type: ignore[attr-defined]
         ended = False
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))

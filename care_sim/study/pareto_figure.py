@@ -25,7 +25,7 @@ def pareto_figure(plays: Plays) -> Figure:
     panels = figure.subplots(1, len(plays.budgets), squeeze=False)[0]
     drawn = styles(plays.tags.items())
     for axes, budget in zip(panels, plays.budgets, strict=True):
-        points = {policy: point for policy in plays.policies if (point := _point(plays, policy, budget))}
+        points = {policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))}
         _draw(axes, points, drawn, plays)
         axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
     panels[0].set_ylabel("first-sighting recall (%)")
@@ -43,7 +43,8 @@ def _beats(other: Point, point: Point) -> bool:
     return other != point and all(theirs >= ours for theirs, ours in zip(other, point, strict=True))
 
 
-def _point(plays: Plays, policy: str, budget: float) -> Point | None:
+def recalls(plays: Plays, policy: str, budget: float) -> Point | None:
+    """Where a policy stands at a budget; None where a recall is not known."""
     overall, first = (plays.level(ratio, policy, budget).by_event for ratio in (OVERALL, FIRST_SIGHTING))
     return None if overall is None or first is None else (overall, first)
 
@@ -81,7 +82,7 @@ def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
 def _name(figure: Figure, axes: Axes, plays: Plays) -> None:
     """The title, the markers by policy, what the full scan reaches, and what the grey line is."""
     figure.suptitle(f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10)
-    ceiling = _point(plays, FULL, 1.0) if plays.full else None
+    ceiling = recalls(plays, FULL, 1.0) if plays.full else None
     reached = f"; full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall" if ceiling else ""
     line = f"grey line: Pareto frontier of the policies that a car can have{reached}"
     figure.supxlabel("\n".join(["overall recall (%)", line, *tag_notes(plays.tags.values())]), fontsize=9)

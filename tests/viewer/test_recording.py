@@ -24,7 +24,7 @@ def episode(tmp_path_factory, read):
     row, keyframes = trace(
         CONFIG,
         lambda loop, _frame: after.append((loop.sensor, loop.belief)),
-        lambda env, policy: RecordRerun(env, path, policy),
+        wrap=lambda env, policy: RecordRerun(env, path, policy),
     )
     return row, keyframes, after, read(path), path
 

@@ -1,0 +1,161 @@
+// Episodes from above: lengths come in centimetres, angles in milliradians, y to the left; here metres, y down.
+
+const SVG = "http://www.w3.org/2000/svg";
+const VIEW = { behind: 9, ahead: 41, side: 9.5 };
+const NARROW = { behind: 6, ahead: 26, side: 9.5 };
+const REACH = 50;
+
+function add(parent, name, attributes = {}, text = "") {
+  const element = parent.appendChild(document.createElementNS(SVG, name));
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text) element.textContent = text;
+  return element;
+}
+
+const degrees = (milliradians) => (-milliradians * 0.18) / Math.PI;
+const place = ([x, y, yaw]) => `translate(${x / 100} ${-y / 100}) rotate(${degrees(yaw)})`;
+const HALF_TURN = 1000 * Math.PI;
+const turn = (from, to) => ((((to - from + HALF_TURN) % (2 * HALF_TURN)) + 2 * HALF_TURN) % (2 * HALF_TURN)) - HALF_TURN;
+const mix = ([x, y, yaw], to, share) => [x + share * (to[0] - x), y + share * (to[1] - y), yaw + share * turn(yaw, to[2])];
+const at = (poses, k, share) => (share && k + 1 < poses.length ? mix(poses[k], poses[k + 1], share) : poses[k]);
+const box = (parent, [length, width], className) =>
+  add(parent, "rect", { x: -length / 200, y: -width / 200, width: length / 100, height: width / 100, class: className });
+const direction = (milliradians, reach) =>
+  `${(reach * Math.cos(milliradians / 1000)).toFixed(2)} ${(-reach * Math.sin(milliradians / 1000)).toFixed(2)}`;
+const fan = (from, to, reach) => `M0 0L${direction(from, reach)}L${direction(to, reach)}Z`;
+
+async function unpack(text) {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).json();
+}
+
+class View {
+  // One episode on a stage of its own.
+  constructor(root, episode, standing, story) {
+    this.story = story;
+    this.last = story.time.length - 1;
+    this.figure = root.appendChild(document.createElement("figure"));
+    this.figure.className = "view";
+    const title = this.figure.appendChild(document.createElement("h3"));
+    title.textContent = `${episode.policy}, ${episode.setting}, seed ${episode.seed}`;
+    this.window = root.clientWidth < 500 ? NARROW : VIEW;
+    this.stage = add(this.figure, "svg", { role: "img", "aria-label": `${title.textContent}, seen from above` });
+    this.furnish(standing);
+    this.now = this.line("now");
+    this.now.setAttribute("aria-live", "polite");
+    this.line("tale").textContent = this.tale(episode);
+    this.addStrips();
+  }
+
+  line(className) {
+    const paragraph = this.figure.appendChild(document.createElement("p"));
+    paragraph.className = className;
+    return paragraph;
+  }
+
+  furnish(standing) {
+    const { ego, moving } = this.story;
+    const { side } = this.window;
+    const tens = Array.from({ length: 18 }, (_, n) => 10 * n - 20);
+    for (const x of tens) add(this.stage, "path", { d: `M${x} ${-side}V${side}`, class: "tick" });
+    this.sensor = add(this.stage, "g");
+    this.sectors = [...this.story.rays[0]].map((_, n, all) => {
+      const [from, to] = [n, n + 1].map((end) => ((2 * end) / all.length - 1) * Math.PI * 1000);
+      return add(this.sensor, "path", { d: fan(from, to, REACH), class: "ray" });
+    });
+    this.wedges = add(this.sensor, "g");
+    this.bodies = new Map();
+    for (const body of [...standing, ...moving]) this.addBody(body);
+    for (const x of tens) add(this.stage, "text", { x: x + 0.2, y: side - 0.4, class: "metres" }, `${x} m`);
+    this.tracks = add(this.stage, "g");
+    this.ring = add(this.stage, "circle", { r: 1.5, class: "ring" });
+    this.ego = add(this.stage, "g");
+    add(this.ego, "rect", { x: 0, y: -ego.size[1] / 200 - 0.3, width: REACH - 10, height: ego.size[1] / 100 + 0.6, class: "path" });
+    box(this.ego, ego.size, "ego");
+    this.lights = add(this.ego, "rect", { x: -ego.size[0] / 200, y: -ego.size[1] / 200, width: 0.8, height: ego.size[1] / 100, class: "brake" });
+  }
+
+  addBody(body) {
+    const shape = add(this.stage, "g", { transform: place(body.pose ?? body.poses[0]) });
+    const rect = box(shape, body.size, body.sought ? "sought" : body.reported ? "body" : "mute");
+    add(rect, "title", {}, body.kind);
+    this.bodies.set(body.n, { body, shape, rect });
+    if (body.sought) this.sought = body;
+  }
+
+  addStrips() {
+    const strips = this.figure.appendChild(document.createElement("div"));
+    strips.className = "strips";
+    const rows = { "camera sees it": ["in_view", "bar-in-view"], "LiDAR detects it": ["found", "bar-found"], braking: ["brake", "bar-brake"] };
+    this.heads = Object.entries(rows).map(([label, [name, className]]) => {
+      strips.appendChild(document.createElement("span")).textContent = label;
+      const svg = add(strips, "svg", { viewBox: `0 0 ${this.last} 1`, preserveAspectRatio: "none", "aria-hidden": "true", width: "100%" });
+      for (const { index, 0: run } of this.story[name].matchAll(/1+/g)) add(svg, "rect", { x: index, y: 0, width: run.length, height: 1, class: className });
+      return add(svg, "rect", { y: 0, width: this.last / 250, height: 1, class: "playhead" });
+    });
+  }
+
+  tale(episode) {
+    const { in_view, found, brake, contact, distance, time } = this.story;
+    const when = (k) => `${(time[k] / 100).toFixed(1)} s (${(distance[k] / 100).toFixed(1)} m away)`;
+    const tell = (flags, yes, no) => (flags.includes("1") ? `${yes} at ${when(flags.indexOf("1"))}` : no);
+    const parts = [
+      tell(in_view, "Comes into the camera's view", "Never in the camera's view"),
+      tell(found, "detected by the LiDAR", "never detected by the LiDAR"),
+      tell(brake, "the car brakes", "the car never brakes"),
+    ];
+    if (contact !== null) parts.push(`collision at ${(time[contact + 1] / 100).toFixed(1)} s`);
+    const otherwise = episode.differences.length ? ` Ends otherwise than in the results: ${episode.differences.join("; ")}.` : "";
+    return `${parts.join("; ")}.${otherwise}`;
+  }
+
+  draw(k, share) {
+    // Moment k, and bodies a share of the way to the next one. What a keyframe tells holds until the next.
+    k = Math.min(k, this.last);
+    const { story } = this;
+    const { behind, ahead, side } = this.window;
+    const frame = Math.min(k, this.last - 1);
+    const pose = at(story.place, k, share);
+    this.stage.setAttribute("viewBox", `${pose[0] / 100 - behind} ${-side} ${behind + ahead} ${2 * side}`);
+    this.ego.setAttribute("transform", place(pose));
+    for (const { body, shape } of this.bodies.values()) if (body.poses) shape.setAttribute("transform", place(at(body.poses, k, share)));
+    if (this.sought) {
+      const [x, y] = at(this.sought.poses ?? [this.sought.pose], k, share);
+      this.ring.setAttribute("transform", `translate(${x / 100} ${-y / 100})`);
+    }
+    if (this.drawn !== k) this.drawMoment(k, frame);
+    this.drawn = k;
+    this.heads.forEach((head) => head.setAttribute("x", Math.min(k + share, this.last) - this.last / 500));
+  }
+
+  drawMoment(k, frame) {
+    const { story } = this;
+    const on = (name) => story[name][frame] === "1";
+    const [x, y, yaw] = story.place[k];
+    const ahead = story.ego.sensor;
+    this.sensor.setAttribute("transform", place([x + ahead * Math.cos(yaw / 1000), y + ahead * Math.sin(yaw / 1000), yaw]));
+    this.sectors.forEach((sector, n) => sector.setAttribute("fill-opacity", (0.75 * (parseInt(story.rays[frame][n], 36) / 35) ** 0.7).toFixed(3)));
+    this.wedges.replaceChildren();
+    for (const [left, right, known] of story.camera[k]) add(this.wedges, "path", { d: fan(left, right, REACH), class: known ? "explained" : "unexplained" });
+    for (const [n, { rect }] of this.bodies) rect.classList.toggle("seen", story.seen[k][n] === "1");
+    this.tracks.replaceChildren();
+    for (const [id, tx, ty, heading, vx, vy, coasting] of story.tracks[k]) {
+      const [kind, ...size] = story.tracked[id];
+      const shape = add(this.tracks, "g", { transform: place([tx, ty, heading]) });
+      add(box(shape, size, coasting ? "track coasting" : "track"), "title", {}, `track of a ${kind}`);
+      add(this.tracks, "path", { d: `M${tx / 100} ${-ty / 100}l${vx / 100} ${-vy / 100}`, class: "track" });
+    }
+    this.ring.setAttribute("class", `ring ${on("found") ? "found" : on("in_view") ? "in-view" : "unseen"}`);
+    this.lights.style.visibility = on("brake") ? "visible" : "hidden";
+    this.now.textContent = this.sentence(k, frame, on);
+  }
+
+  sentence(k, frame, on) {
+    const { time, speed, distance, contact } = this.story;
+    const away = distance[frame] === null ? "" : `, actor ${(distance[frame] / 100).toFixed(1)} m away`;
+    const state = on("found") ? "detected" : on("in_view") ? "in the camera's view, not detected" : "not in the camera's view, not detected";
+    const hit = contact !== null && k === this.last ? " Collision." : "";
+    return `${(time[k] / 100).toFixed(1)} s, ${(speed[k] / 100).toFixed(1)} m/s${away}: ${state}${on("brake") ? ", braking" : ""}.${hit}`;
+  }
+}

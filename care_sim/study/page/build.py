@@ -1,0 +1,134 @@
+"""Builds the page of a folder of results."""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+import care_sim
+from care_sim.extras import vega_bundle
+from care_sim.study.executors import ExecutorFactory, processes
+from care_sim.study.files import replacing
+from care_sim.study.kinds import EPISODES
+from care_sim.study.page.budget_charts import budget_charts
+from care_sim.study.page.chart import Chart
+from care_sim.study.page.crowding_charts import crowding_charts
+from care_sim.study.page.episodes import Episode, chosen, played_again
+from care_sim.study.page.fault_charts import fault_charts
+from care_sim.study.page.listing import Group, groups, reel
+from care_sim.study.page.origin import Origin, origin
+from care_sim.study.page.protocol_charts import protocol_charts
+from care_sim.study.page.tables import blocks
+from care_sim.study.report import reported
+from care_sim.study.studies import Study
+from care_sim.study.task import Row
+
+TITLES = {
+    "sweep": "Sweep of the closed loop",
+    "paper": "The paper's closed-loop study",
+    "ablate": "Ablations of the closed loop",
+    "faults": "Faults in the closed loop",
+    "crowding": "Crowding in the closed loop",
+    "protocol": "First sightings in the open loop",
+}
+CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
+    "sweep": budget_charts,
+    "paper": budget_charts,
+    "faults": fault_charts,
+    "crowding": crowding_charts,
+    "protocol": protocol_charts,
+}
+"""The interactive charts of the studies that have any."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page shows of a study."""
+
+    name: str
+    study: Study
+    rows: Sequence[Row]
+    origin: Origin
+    episodes: Sequence[Episode]
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether there are episodes to watch: in the open loop nothing reacts."""
+        return self.study.kind is EPISODES
+
+    def html(self) -> str:
+        """The page as one file."""
+        charts = CHARTS[self.study.name](self.rows) if self.study.name in CHARTS else []
+        return str(
+            _template().render(
+                page=self,
+                title=TITLES[self.study.name],
+                version=care_sim.__version__,
+                charts=charts,
+                specs=_embedded([chart.spec for chart in charts]),
+                vega=Markup(vega_bundle()) if charts else "",
+                tables=[(table, blocks(table)) for table in self.study.tables(self.rows)],
+                closing=self.study.closing(self.rows),
+                groups=self.groups(),
+                reel=_embedded(reel(self.episodes)),
+                asset=_asset,
+            )
+        )
+
+    def groups(self) -> list[Group]:
+        """The episodes by setting; none in the open loop."""
+        return groups(self.rows, self.episodes) if self.closed_loop else []
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences about what is missing, or is not as it was."""
+        reasons = Counter(episode.ending for episode in self.episodes if isinstance(episode.ending, str))
+        unplayable = [f"Episodes that cannot be played again: {count} ({reason})." for reason, count in reasons.items()]
+        others = self.count("differences")
+        otherwise = [f"Episodes that end otherwise with this version of the code, which are marked: {others}."]
+        return [*self.origin.missing, *unplayable, *(otherwise if others else [])]
+
+    def count(self, what: str) -> int:
+        """How many of the episodes that were played again are `identical`, or have `differences` or a `replay`."""
+        return sum(bool(getattr(episode, what)) for episode in self.episodes)
+
+
+def write_page(folder: Path, path: Path, most: int, workers: int, make_executor: ExecutorFactory = processes) -> Page:
+    """Write the page of a folder of results, with at most so many episodes to watch, to `path`.
+
+    Raises InvalidInput where there are no results, and MissingExtra without the libraries.
+    """
+    rows, study, left_out = reported(folder)
+    with replacing(path) as unfinished:
+        watched = chosen(rows, most) if study.kind is EPISODES else []
+        if watched:
+            print(f"playing {len(watched)} episodes again to be watched", file=sys.stderr)
+        about = origin(folder, rows, study.kind, left_out)
+        page = Page(folder.resolve().name, study, rows, about, played_again(watched, workers, make_executor))
+        unfinished.write_text(page.html(), encoding="utf-8")
+    return page
+
+
+def _template() -> Any:
+    loader = PackageLoader("care_sim.study.page", "assets")
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("page.html")
+
+
+def _asset(name: str) -> Markup:
+    """A file of the page as it stands."""
+    return Markup(resources.files("care_sim.study.page").joinpath("assets", name).read_text(encoding="utf-8"))
+
+
+def _embedded(data: Any) -> Markup:
+    """Plain data for a script element, whose end no text in it can be."""
+    return Markup(json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))
