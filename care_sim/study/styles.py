@@ -26,11 +26,14 @@ _KNOWN = {
     "uncertainty": ("#CC79A7", "P"),
     "beam-reduce": ("#332288", ">"),
     "random": ("#999933", "X"),
+    "learned-scorer": ("#117733", "p"),
+    "ppo": ("#AA4499", "h"),
+    "ppo-dartout": ("#661100", "*"),
 }
 """From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind."""
-_SPARE = ("#117733", "#AA4499", "#661100", "#6699CC", "#44AA99")
+_SPARE = ("#6699CC", "#44AA99", "#CC6677", "#88CCEE", "#DDCC77")
 _GREYS = ("0.3", "0.45", "0.6")
-_MARKERS = ("p", "h", "*", "d", "H")
+_MARKERS = ("d", "H", "8", "1", "2")
 FULL = Style("0.35", "_", "--")
 
 

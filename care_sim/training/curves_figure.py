@@ -11,9 +11,6 @@ from care_sim.policies import tags_of
 from care_sim.study.styles import FULL, styles
 from care_sim.training.curves import Run
 
-LEARNED = "#CC3311"
-"""From the palette of Tol (2021); the learner is none of the rules."""
-
 
 def curves_figure(groups: Sequence[Sequence[Run]]) -> Figure:
     """A panel a task: a line a training seed, their mean where there are several, rules as lines across."""
@@ -28,13 +25,13 @@ def curves_figure(groups: Sequence[Sequence[Run]]) -> Figure:
 def _draw(axes: Axes, runs: Sequence[Run]) -> None:
     config, marks = runs[0].config, runs[0].marks
     learner = config["algorithm"]
-    colours = {name: style.colour for name, style in styles((name, tags_of(name)) for name in marks).items()}
-    colours |= {"full": FULL.colour, learner: LEARNED}
+    drawn = styles((name, tags_of(name)) for name in (*marks, learner)) | {"full": FULL}
+    colours = {name: style.colour for name, style in drawn.items()}
     for name, height in marks.items():
         axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
-        axes.plot(run.steps, run.values, color=LEARNED, linewidth=0.9, alpha=0.5 if len(runs) > 1 else 1.0)
-    _mean(axes, runs)
+        axes.plot(run.steps, run.values, color=colours[learner], linewidth=0.9, alpha=0.5 if len(runs) > 1 else 1.0)
+    _mean(axes, runs, colours[learner])
     axes.set_xlim(0, max(run.steps[-1] for run in runs))
     if runs[0].closed_loop:
         axes.set_ylim(bottom=0)
@@ -55,11 +52,11 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     axes.grid(axis="y", color="0.92")
 
 
-def _mean(axes: Axes, runs: Sequence[Run]) -> None:
+def _mean(axes: Axes, runs: Sequence[Run], colour: str) -> None:
     shared = min((run.steps for run in runs), key=len)
     if len(runs) > 1 and all(run.steps[: len(shared)] == shared for run in runs):
         values = np.mean([run.values[: len(shared)] for run in runs], axis=0)
-        axes.plot(shared, values, color=LEARNED, linewidth=2.2)
+        axes.plot(shared, values, color=colour, linewidth=2.2)
 
 
 def _name_lines(axes: Axes, heights: dict[str, float], colours: dict[str, str]) -> None:

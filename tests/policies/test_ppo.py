@@ -15,7 +15,7 @@ from care_sim.errors import InvalidInput
 from care_sim.features import CHANNELS
 from care_sim.grid import AngularGrid
 from care_sim.policies.score_map import ScoreMap
-from care_sim.policies.weights import Card, Weights, save
+from care_sim.policies.weights import Card, Weights, load, save, shipped
 from care_sim.policies.wrapping import Wrapping
 from care_sim.training.evaluation import evaluate, rule
 
@@ -71,7 +71,7 @@ def test_it_fires_what_its_learner_would_behind_the_wrappers(tmp_path, env, acti
     path = untrained(tmp_path / "w.npz", wrapping)
     policy = care_sim.make_policy("ppo", env, path=path)
     behind = GridObservation(ACTIONS[action](env, 16, 2), 32, 4)
-    learned = ScoreMap(care_sim.policies.ppo.load(path), wrapping)
+    learned = ScoreMap(load(path), wrapping)
     fired = []
     for wrapped, choose in ((env, policy), (behind, learned)):
         seen, _ = wrapped.reset(seed=4)
@@ -93,7 +93,7 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
     envs = side_by_side(config)
     model = make(config, envs).learn(128)
     save(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
-    numpy = ScoreMap(care_sim.policies.ppo.load(tmp_path / "w.npz"), config.wrapping)
+    numpy = ScoreMap(load(tmp_path / "w.npz"), config.wrapping)
     observations = envs.reset()
     for _ in range(20):
         actions, _ = model.predict(observations, deterministic=True)
@@ -153,6 +153,18 @@ def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budge
         distances[policy] = score.distance_m
         env.close()
     assert distances[name] > distances["history"] + 2
+
+
+def test_what_was_learned_on_the_dense_street_is_a_place(tmp_path, env):
+    """With all pictures taken away it detects the person as early: what the results say of it."""
+    weights = load(shipped("ppo-dense"))
+    unseeing = weights.arrays | {"window.weight": np.zeros_like(weights.arrays["window.weight"])}
+    save(tmp_path / "unseeing.npz", unseeing, weights.card)
+    distances = []
+    for path in (shipped("ppo-dense"), tmp_path / "unseeing.npz"):
+        policy = care_sim.make_policy("ppo", env, path=path)
+        distances.append(evaluate(env, lambda seen, _, policy=policy: policy(seen), range(3)).distance_m)
+    assert distances[0] == distances[1] > 15
 
 
 def test_it_is_no_policy_behind_wrappers_of_learners(env):

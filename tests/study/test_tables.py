@@ -84,10 +84,8 @@ def test_what_is_learned_is_compared_with_every_policy_too():
         {line[0]: line[1:] for line in reversed(found[f"dense: {name} minus each policy"].rows)}
         for name in ("care", "learned-scorer")
     )
-    assert of_care["learned-scorer"] != ("",)
-    assert of_learned["care"] == tuple(
-        entry.translate(str.maketrans("+-", "-+")) for entry in of_care["learned-scorer"]
-    )
+    assert of_care["learned-scorer"] == ("+1.0 [1.0,1.0]",)
+    assert of_learned["care"] == ("-1.0 [-1.0,-1.0]",)
     assert "full" in of_learned
     assert "learned-scorer" not in of_learned
 

@@ -3,13 +3,12 @@
 import json
 
 import pytest
-from matplotlib.colors import to_hex
 
 from care_sim.cli import main
 from care_sim.errors import InvalidInput
 from care_sim.training.config import Ppo, Sac
 from care_sim.training.curves import read, together
-from care_sim.training.curves_figure import LEARNED, curves_figure
+from care_sim.training.curves_figure import curves_figure
 
 DISTANCES = (4.0, 10.0, 16.0)
 
@@ -36,7 +35,8 @@ def folders(tmp_path):
 
 
 def learned(axes):
-    return [line for line in axes.lines if to_hex(line.get_color()).upper() == LEARNED]
+    (name,) = (text for text in axes.texts if text.get_text() == "ppo")
+    return [line for line in axes.lines if line.get_color() == name.get_color()]
 
 
 def test_runs_that_differ_by_their_seed_lie_together(folders):
