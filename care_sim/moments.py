@@ -98,7 +98,8 @@ class Witness:
         if not len(shown):
             return np.empty(0, np.int64)
         taken = self._sights[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
-        same = (shown.rows()[:, None, :7] == taken.detections.rows()[None, :, :7]).all(axis=2)
+        drawn = slice(ImageDetections.COLUMNS.index("age"))
+        same = (shown.rows()[:, None, drawn] == taken.detections.rows()[None, :, drawn]).all(axis=2)
         bodies = np.append(taken.objects, NOBODY)
         return bodies[np.where(same.any(axis=1), same.argmax(axis=1) if same.size else NOBODY, NOBODY)]
 

@@ -11,8 +11,8 @@ from care_sim.bench.config import BenchConfig
 from care_sim.bench.figure import growth_figure
 from care_sim.bench.measure import measure
 from care_sim.bench.tables import tables
+from care_sim.files import replacing
 from care_sim.study.figures import save
-from care_sim.study.files import replacing
 
 
 def run(config: BenchConfig) -> int:

@@ -12,6 +12,7 @@ import gymnasium
 import numpy as np
 
 from care_sim.envs.watching import Watching, numbered
+from care_sim.errors import InvalidInput
 from care_sim.extras import import_open3d
 from care_sim.frames import Floats
 from care_sim.loop import ClosedLoop
@@ -44,8 +45,9 @@ class ExportScans(Watching):
     - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the episode is over.
 
     ### Arguments
-    `path` of the folder; `policy`, the `care_sim.Policy` that acts, as for `RecordRerun`. Raises
-    `care_sim.MissingExtra` without the extra `open3d`, else as `RecordRerun` does.
+    `path` of the folder, one for every environment of a vector; `policy`, the `care_sim.Policy` that acts, as for
+    `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`, `care_sim.InvalidInput` for an environment
+    that is no closed loop of CARE-Sim and for a folder that holds scans already, OSError where nothing can be written.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Action], path: "str | PathLike[str]", policy: Policy | None = None):
@@ -56,6 +58,8 @@ class ExportScans(Watching):
     def begin(self, loop: ClosedLoop, episode: int) -> None:
         """Make the folder."""
         self._folder = numbered(self._path, episode)
+        if any(self._folder.glob("[0-9]*.pcd")):
+            raise InvalidInput(f"{self._folder} holds scans already: name another folder")
         self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(None)
 

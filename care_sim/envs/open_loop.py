@@ -130,7 +130,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         exposure = self.exposures[-1] if self.exposures else None
         index = exposure.index if exposure else self.loop.index
         found = self._masks[-1] if self._masks else np.zeros(len(self.loop.shot.annotations), bool)
-        return draw_plan(self.loop, index, exposure, found, self._sightings.appearing(index))
+        seen = self._sightings
+        return draw_plan(self.loop, index, exposure, found, seen.scored(index), seen.appearing(index))
 
 
 class FilmEnv(OpenLoopEnv):

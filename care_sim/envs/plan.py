@@ -37,18 +37,17 @@ def draw_plan(
     index: int,
     exposure: Exposure | None,
     found: NDArray[np.bool_],
+    scored: NDArray[np.bool_],
     appearing: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
     """A picture (HEIGHT, WIDTH, 3) of keyframe `index` of a film from above, the car driving to the right.
 
-    The annotated objects: found, not found, or beyond the range that is scored; those that appear (n,) have a double
+    The annotated objects (n,): found, not found, or beyond the range that is `scored`; those `appearing` have a double
     line. The returns of the fired cells, and below the angular grid with their ranges. `exposure` is None before the
     first scan. The episode is left as it was.
     """
     shot = loop.film.shots[index]
     returned = _returned(shot.cloud, exposure)
-    distances = np.hypot(*shot.annotations.boxes[:, :2].T)
-    scored = distances <= RANGE_M
     canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
     draw = ImageDraw.Draw(canvas)
     colours = [FOUND if one else MISSED if near else OUT_OF_RANGE for one, near in zip(found, scored, strict=True)]

@@ -26,7 +26,12 @@ AnyLoop = TypeVar("AnyLoop", bound=Loop)
 
 
 class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
-    """An environment whose action scores the cells of the angular grid."""
+    """An environment whose action scores the cells of the angular grid.
+
+    `acted` is the last action that it took: scores (E, A) of the cells, whatever wrappers made of it.
+    """
+
+    acted: NDArray[np.float32]
 
     def __init__(
         self,
@@ -96,7 +101,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
-        scores = checked_scores(action, self.rig.grid.shape)
+        self.acted = scores = checked_scores(action, self.rig.grid.shape)
         floor = self._floor.next()
         return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
 

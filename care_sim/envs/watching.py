@@ -16,11 +16,10 @@ from care_sim.types import Action
 
 
 class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
-    """Gathers the moments of the closed loop under it. It stands inside wrappers that change the action.
+    """Gathers the moments of the closed loop under it, around or inside wrappers that change the action.
 
     With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions only what was chosen
-    and what the floor filled up. Raises InvalidInput for an environment that is no closed loop of CARE-Sim, and for
-    one whose actions are no scores of cells any more.
+    and what the floor filled up. Raises InvalidInput for an environment that is no closed loop of CARE-Sim.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
@@ -28,11 +27,9 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         inner, name = env.unwrapped, type(self).__name__
         if not isinstance(inner, ClosedLoopEnv):
             raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {env}")
-        if env.action_space.shape != inner.rig.grid.shape:
-            raise InvalidInput(f"{name} goes under wrappers that change the action, not around them: got {env}")
         self._closed_loop, self._policy = inner, policy
         self._witness: Witness | None = None
-        self._episodes = 0
+        self._begun, self._episodes = False, 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the one before, if it was not played to its end, is closed as it is."""
@@ -46,26 +43,27 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         if self._witness is None:
             return super().step(action)
         loop = self._closed_loop.loop
-        if loop.index == 0:
+        if not self._begun:
             self.begin(loop, self._episodes)
-            self._episodes += 1
+            self._begun, self._episodes = True, self._episodes + 1
         stance = self._witness.stance()
         self.look(loop)
         answer = super().step(action)
         demand = self._policy.demanded if self._policy is not None else None
-        self.keep(self._witness.moment(stance, action, demand, self._closed_loop.keyframes[-1]))
+        self.keep(self._witness.moment(stance, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]))
         if answer[2] or answer[3]:
-            self._leave(answer[4]["outcome"])
+            self._leave(answer[4].get("outcome"))
         return answer
 
     def close(self) -> None:
         """Close what is kept, then the environment."""
-        self._leave(None)
-        super().close()
+        try:
+            self._leave(None)
+        finally:
+            super().close()
 
     def _leave(self, outcome: Mapping[str, Any] | None) -> None:
-        begun = self._witness is not None and self._closed_loop.loop.index > 0
-        self._witness = None
+        begun, self._begun, self._witness = self._begun, False, None
         if begun:
             self.end(outcome)
 
@@ -87,4 +85,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
 
 def numbered(path: Path, episode: int) -> Path:
     """Where an episode is kept: the first in `path` itself, later ones beside it, with their number."""
-    return path.with_stem(f"{path.stem}-{episode}") if episode else path
+    if not episode:
+        return path
+    path = path if path.stem.strip(".") else path.resolve()
+    return path.with_stem(f"{path.stem}-{episode}")

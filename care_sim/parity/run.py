@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from rich.console import Console
 
+from care_sim.files import replacing
 from care_sim.parity.config import ParityConfig
 from care_sim.parity.keyframes import keyframes
 from care_sim.parity.outcomes import outcomes
@@ -17,7 +18,6 @@ from care_sim.parity.random_scenes import random_scenes
 from care_sim.parity.tables import tables
 from care_sim.parity.tally import REFERENCES
 from care_sim.scenarios import SCENARIOS
-from care_sim.study.files import replacing
 from care_sim.study.progress import Lines, bar
 from care_sim.study.provenance import machine, versions
 

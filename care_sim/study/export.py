@@ -34,7 +34,7 @@ class Export(PlayOptions):
         from rich.console import Console
         from rich.progress import track
 
-        from care_sim.study.files import replacing
+        from care_sim.files import replacing
 
         configs = self._configs()
         with replacing(self.out) as file:

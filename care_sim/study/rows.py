@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from care_sim.errors import InvalidInput
-from care_sim.study.files import replacing
+from care_sim.files import replacing
 from care_sim.study.task import Row
 
 STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"

@@ -57,7 +57,7 @@ class Curves:
         self._lane.fix("outcome", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
     def _log_curves(self) -> None:
-        frames, percents = self._frames, 100 * np.array(self._counts) / self._budget
+        frames, percents = self._frames, 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
         for name, field in MEASURES.items():
             self._log_curve(f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float))
         for share in (CHOSEN, FLOOR) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE, FLOOR):
@@ -74,5 +74,5 @@ class Curves:
             return
         self._states[entity] = state
         self._lane.log(entity, rr.StateChange(state=state))
-        if before is not None or state == "on":
+        if before is not None or state not in ("off", "out of view"):
             self._lane.log("events", rr.TextLog(words))

@@ -2,6 +2,8 @@
 
 from care_sim.types import CLASSES
 
+ABOUT = "about"
+"""The page that says what a recording holds; every other entity is one of an episode."""
 SECONDS, KEYFRAME = "seconds", "keyframe"
 """The timelines: time of the scan, and number of the keyframe from 0."""
 

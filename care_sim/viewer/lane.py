@@ -13,6 +13,11 @@ THIN = -1.0
 """Radius of lines; Rerun takes negative ones for points of the screen."""
 
 
+def entity_path(lane: str, entity: str) -> str:
+    """The path of an entity of an episode; the name of a lane may hold anything."""
+    return f"{rr.escape_entity_path_part(lane)}/{entity}"
+
+
 class Lane:
     """Logs below `name` into a stream."""
 
@@ -27,7 +32,7 @@ class Lane:
 
     def log(self, entity: str, *content: Any) -> None:
         """Log at the present keyframe."""
-        self._stream.log(f"{self.name}/{entity}", *content)
+        self._stream.log(entity_path(self.name, entity), *content)
 
     def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
         """Log a list of `count` things at the present keyframe, made by `make`; nothing if it was and is empty."""
@@ -38,11 +43,11 @@ class Lane:
     def log_curve(self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats) -> None:
         """Log a number a keyframe (n,) at once, which costs as much as logging one."""
         times = rr.TimeColumn(KEYFRAME, sequence=keyframes), rr.TimeColumn(SECONDS, duration=times_s)
-        self._stream.send_columns(f"{self.name}/{entity}", times, rr.Scalars.columns(scalars=values))
+        self._stream.send_columns(entity_path(self.name, entity), times, rr.Scalars.columns(scalars=values))
 
     def fix(self, entity: str, *content: Any) -> None:
         """Log what holds for the whole episode."""
-        self._stream.log(f"{self.name}/{entity}", *content, static=True)
+        self._stream.log(entity_path(self.name, entity), *content, static=True)
 
 
 def boxes(table: Floats, **looks: Any) -> rr.Boxes3D:

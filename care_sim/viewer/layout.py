@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import rerun.blueprint as rrb
 
-from care_sim.viewer.entities import SECONDS
+from care_sim.viewer.entities import ABOUT, SECONDS
+from care_sim.viewer.lane import entity_path
 
 EYE_M, TARGET_M = (-11.0, 0.0, 6.0), (12.0, 0.0, -1.0)
 """Behind the car and above it, in the sensor frame."""
 DARK = (24, 26, 30)
-FIRED = "fired: blue exploitation, orange reserve, grey floor"
-RAW = ", green chosen by a raw action"
+FIRED = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
 
 
 def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
@@ -24,17 +24,19 @@ def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
 def _one(lane: str) -> rrb.Vertical:
     words = rrb.Tabs(
         rrb.TextLogView(
-            origin=f"{lane}/events", name="What happened", columns=rrb.TextLogColumns(text_log_columns=["Body"])
+            origin=entity_path(lane, "events"),
+            name="What happened",
+            columns=rrb.TextLogColumns(text_log_columns=["Body"]),
         ),
-        rrb.TextDocumentView(origin=f"{lane}/outcome", name="Outcome"),
-        rrb.TextDocumentView(origin="about", name="About"),
+        rrb.TextDocumentView(origin=entity_path(lane, "outcome"), name="Outcome"),
+        rrb.TextDocumentView(origin=ABOUT, name="About"),
     )
-    budget = rrb.TimeSeriesView(origin=f"{lane}/budget", name="Budget, percent")
+    budget = rrb.TimeSeriesView(origin=entity_path(lane, "budget"), name="Budget, percent")
     side = rrb.Vertical(_camera(lane), words, row_shares=[3, 2])
     below = rrb.Horizontal(_states([lane]), *_plots([lane]), budget)
     return rrb.Vertical(
         rrb.Horizontal(_chase(lane), side, column_shares=[3, 2]),
-        _grid(lane, FIRED + RAW),
+        _grid(lane),
         below,
         row_shares=[5, 1.7, 2],
     )
@@ -48,8 +50,8 @@ def _several(lanes: Sequence[str]) -> rrb.Vertical:
 
 def _chase(lane: str) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
-        origin=f"{lane}/world/lidar",
-        contents=[f"+ {lane}/world/**", f"- {lane}/world/lidar/camera/**"],
+        origin=entity_path(lane, "world/lidar"),
+        contents=[f"+ {entity_path(lane, 'world/**')}", f"- {entity_path(lane, 'world/lidar/camera/**')}"],
         name=f"{lane}: the street",
         background=DARK,
         line_grid=False,
@@ -59,19 +61,21 @@ def _chase(lane: str) -> rrb.Spatial3DView:
 
 def _camera(lane: str) -> rrb.Spatial2DView:
     name = f"{lane}: camera: blue explained, orange residual, red missed by fault"
-    return rrb.Spatial2DView(origin=f"{lane}/world/lidar/camera", name=name)
+    return rrb.Spatial2DView(origin=entity_path(lane, "world/lidar/camera"), name=name)
 
 
-def _grid(lane: str, legend: str = FIRED) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin=f"{lane}/grid", name=f"{lane}: {legend}")
+def _grid(lane: str) -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {FIRED}")
 
 
 def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(contents=[f"{lane}/states/**" for lane in lanes], name="Who is seen, who brakes")
+    return rrb.StateTimelineView(
+        contents=[entity_path(lane, "states/**") for lane in lanes], name="Who is seen, who brakes"
+    )
 
 
 def _plots(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
     return [
-        rrb.TimeSeriesView(contents=[f"{lane}/measures/{name}" for lane in lanes], name=title)
+        rrb.TimeSeriesView(contents=[entity_path(lane, f"measures/{name}") for lane in lanes], name=title)
         for name, title in (("speed", "Speed, m/s"), ("clearance", "Clearance, m"))
     ]

@@ -1,17 +1,19 @@
 """A file that the Rerun viewer plays: episodes in lanes, side by side."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
 
+from care_sim.errors import InvalidInput, unknown
+from care_sim.files import replacing
 from care_sim.loop import ClosedLoop
 from care_sim.moments import Moment
 from care_sim.types import Rig
 from care_sim.viewer.curves import Curves
-from care_sim.viewer.entities import LANES, about
+from care_sim.viewer.entities import ABOUT, LANES, about
 from care_sim.viewer.lane import Lane
 from care_sim.viewer.layout import blueprint
 from care_sim.viewer.photo import photograph
@@ -20,19 +22,27 @@ from care_sim.viewer.space import Space
 
 
 class Recording(AbstractContextManager["Recording"]):
-    """Writes `path`; `lanes` are the names of the episodes that will be in it. Raises OSError where it cannot."""
+    """Writes `path`, which is there once this is closed; `lanes` are the names of the episodes that will be in it.
+
+    Raises InvalidInput for a folder, for a file that is being written already and for a lane with the name of the page
+    `about`, OSError where nothing can be written.
+    """
 
     def __init__(self, path: Path, lanes: Sequence[str]):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
+        if ABOUT in lanes:
+            raise InvalidInput(f"{ABOUT!r} is a page of every recording: name the episode otherwise")
         self._lanes = tuple(lanes)
+        self._file = ExitStack()
+        unfinished = self._file.enter_context(replacing(path))
         self._stream = rr.RecordingStream("care-sim")
-        self._stream.save(path, default_blueprint=blueprint(self._lanes))
+        self._stream.save(unfinished, default_blueprint=blueprint(self._lanes))
         self._stream.send_recording_name(path.stem)
-        self._stream.log("about", rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True)
+        self._stream.log(ABOUT, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True)
 
     def episode(self, name: str, loop: ClosedLoop) -> "Episode":
-        """Begin the lane `name`, one of those announced."""
+        """Begin the lane `name`. Raises InvalidInput for one that was not announced."""
+        if name not in self._lanes:
+            raise unknown("lane", name, self._lanes)
         colour = LANES[self._lanes.index(name) % len(LANES)]
         return Episode(Lane(self._stream, name), loop.rig, loop.world.ego_kind.size[1], colour)
 
@@ -41,8 +51,9 @@ class Recording(AbstractContextManager["Recording"]):
 
     def close(self) -> None:
         """Finish the file."""
-        self._stream.flush()
-        self._stream.disconnect()
+        with self._file:
+            self._stream.flush()
+            self._stream.disconnect()
 
 
 class Episode:

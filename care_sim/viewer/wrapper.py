@@ -32,13 +32,13 @@ class RecordRerun(Watching):
     """Records every episode for the Rerun viewer: `care-sim view FILE`.
 
     The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it; one that is left before its end
-    is kept as far as it was played. Action, observation, reward and episode stay what they are.
+    is kept as far as it was played. A file is there whole or not at all, once its episode is over or the environment
+    is closed. Action, observation, reward and episode stay what they are.
 
     ### Arguments
     `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does: its demands tell which cells were
     exploitation and which reserve. Without it only "chosen" and "floor" are known. `name` of the episode in the
-    recording, the policy's by default. Goes under wrappers that change the action:
-    `SectorReserve(RecordRerun(env, "out.rrd"))`.
+    recording, the policy's by default. Environments of a vector need a file each, such as `f"out-{number}.rrd"`.
 
     ### What is recorded
     At every keyframe the street, the returns, the camera's picture and detections, the cells, the measures:
@@ -46,7 +46,8 @@ class RecordRerun(Watching):
     Timelines are `keyframe` and `seconds`.
 
     Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an environment that is no
-    closed loop of CARE-Sim or whose actions are no scores of cells, OSError where the file cannot be written.
+    closed loop of CARE-Sim and for a file that is a folder or is being written already, OSError where it cannot be
+    written.
     """
 
     def __init__(

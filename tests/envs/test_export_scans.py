@@ -89,3 +89,13 @@ def test_tracks_are_forecasts_of_what_was_detected_before(played):
     assert track["class"] == "pedestrian"
     np.testing.assert_allclose(track["box"][:2], np.array(person["box"][:2]) - (x, y), atol=0.3)
     assert track["velocity"][1] == pytest.approx(2.7, abs=1.0)
+
+
+def test_a_folder_that_holds_scans_is_refused_before_play(open3d, tmp_path):
+    (tmp_path / "000.pcd").touch()
+    with ExportScans(gymnasium.make("CARE-Dartout-v0", disable_env_checker=True), tmp_path) as env:
+        env.reset(seed=0)
+        with pytest.raises(care_sim.InvalidInput, match="holds scans already"):
+            env.step(np.zeros(env.action_space.shape, np.float32))
+        assert env.unwrapped.loop.index == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["000.pcd"]

@@ -1,17 +1,22 @@
 """A recording of an episode, held against the episode's own row and keyframes."""
 
 import time
+from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
+from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.grid import AngularGrid
+from care_sim.moments import Witness
 from care_sim.shares import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.episode import run_episode, trace
 from care_sim.viewer import entities
-from care_sim.viewer.wrapper import RecordRerun
+from care_sim.viewer.layout import blueprint
+from care_sim.viewer.wrapper import RecordRerun, recording
 
 CONFIG = EpisodeConfig("dense", "care", 0.05, 1, false_negative_rate=0.2, false_positive_rate=0.3)
 
@@ -154,9 +159,67 @@ def spent(wrap):
     return time.process_time() - started
 
 
-def test_raw_actions_are_chosen_or_floor(tmp_path, read):
-    import gymnasium
+def recorded(path, name, lanes=None):
+    """Begin an episode `name` of one keyframe in a recording of its own."""
+    with (
+        recording(path, lanes or [name]) as file,
+        RecordRerun(gymnasium.make("CARE-Dartout-v0"), file, name=name) as env,
+    ):
+        env.reset(seed=0)
+        env.step(np.zeros(env.action_space.shape, np.float32))
 
+
+def test_a_name_may_hold_anything(tmp_path, read):
+    recorded(tmp_path / "out.rrd", "a/b: c *")
+    name = r"a\/b\:\ c\ \*"
+    assert f"{name}/world/bodies" in read(tmp_path / "out.rrd").rows
+
+
+def test_a_view_looks_where_its_lane_is_logged():
+    (row, _) = blueprint(["a/b", "care"]).root_container.contents
+    (chase, *_), _ = (column.contents for column in row.contents)
+    assert chase.origin == r"a\/b/world/lidar"
+    assert chase.name == "a/b: the street"
+    assert chase.contents == [r"+ a\/b/world/**", r"- a\/b/world/lidar/camera/**"]
+
+
+@pytest.mark.parametrize(
+    ("name", "lanes", "said"), [("about", None, "'about' is a page"), ("x", ["care"], "'x'.*care")]
+)
+def test_a_name_that_has_no_place_is_one_line(name, lanes, said, tmp_path):
+    with pytest.raises(InvalidInput, match=said):
+        recorded(tmp_path / "out.rrd", name, lanes)
+
+
+def test_a_folder_is_no_recording_and_an_old_recording_stays_until_the_new_one_is_whole(tmp_path):
+    with pytest.raises(InvalidInput, match="is a folder"):
+        recording(tmp_path, ["care"])
+    file = tmp_path / "out.rrd"
+    file.write_text("old")
+    with recording(file, ["care"]):
+        assert file.read_text() == "old"
+    assert file.stat().st_size > 1000
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_who_is_in_view_from_the_start_has_an_event(tmp_path, read):
+    """Told by a first keyframe that is said to have it in view."""
+    path = tmp_path / "out.rrd"
+    with recording(path, ["agent"]) as file, gymnasium.make("CARE-Dartout-v0") as env:
+        env.reset(seed=0)
+        rig = env.unwrapped.rig
+        episode = file.episode("agent", env.unwrapped.loop)
+        witness = Witness(env.unwrapped.loop, 0.5)
+        stance = witness.stance()
+        episode.look(env.unwrapped.loop)
+        env.step(np.zeros(rig.grid.shape, np.float32))
+        frame = replace(env.unwrapped.keyframes[-1], in_view=True)
+        episode.keep(witness.moment(stance, env.unwrapped.acted, None, frame))
+        episode.end(None)
+    assert "actor in view" in str(read(path).rows["agent/events"][0]["TextLog:text"])
+
+
+def test_raw_actions_are_chosen_or_floor(tmp_path, read):
     path = tmp_path / "raw.rrd"
     with RecordRerun(gymnasium.make("CARE-Dartout-v0"), path) as env:
         env.reset(seed=0)
