@@ -1,55 +1,64 @@
 """Moving pictures as files: MP4 through FFmpeg, animated GIF, WebP and PNG through Pillow."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from care_sim.errors import unknown
+from care_sim.errors import InvalidInput, unknown
 from care_sim.extras import import_imageio_ffmpeg
+from care_sim.files import replacing
 
 GIF_COLOURS = 96
 """Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file goes."""
 
 
 def check_clip(path: Path) -> None:
-    """Raise InvalidInput for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its library; make
-    the folder.
+    """Raise InvalidInput for a folder and for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its
+    library; make the folder that it will be in.
     """
     if path.suffix not in ENDINGS:
         raise unknown("ending of a clip", path.suffix, ENDINGS)
+    if path.is_dir():
+        raise InvalidInput(f"{path} is a folder, a file is wanted")
     if path.suffix == ".mp4":
         import_imageio_ffmpeg()
     path.parent.mkdir(parents=True, exist_ok=True)
 
 
-def write_clip(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
+def write_clip(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
     """Write pictures of one size, `picture_s` seconds each, the last for `hold_s`; an animation begins anew.
 
-    The ending of `path` decides the form, and the errors are those of `check_clip`.
+    The ending of `path`, which `check_clip` has let pass, decides the form. The file is there whole or not at all.
     """
-    check_clip(path)
-    ENDINGS[path.suffix](path, pictures, picture_s, hold_s)
+    with replacing(path) as unfinished:
+        ENDINGS[path.suffix](unfinished, pictures, picture_s, hold_s)
 
 
-def _write_mp4(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
+def _write_mp4(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
+    shown = iter(pictures)
+    first = next(shown)
     ffmpeg = import_imageio_ffmpeg()
-    film = ffmpeg.write_frames(str(path), pictures[0].size, fps=1 / picture_s, macro_block_size=2, quality=7)
-    film.send(None)
-    for picture in [*pictures, *[pictures[-1]] * (round(hold_s / picture_s) - 1)]:
-        film.send(picture.tobytes())
-    film.close()
+    frames = ffmpeg.write_frames(str(path), first.size, fps=1 / picture_s, macro_block_size=2, quality=7)
+    with closing(frames) as film:
+        film.send(None)
+        for picture in chain([first], shown):
+            film.send(picture.tobytes())
+        for _ in range(round(hold_s / picture_s) - 1):
+            film.send(picture.tobytes())
 
 
-def _write_animation(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
-    durations = [round(1000 * picture_s)] * (len(pictures) - 1) + [round(1000 * hold_s)]
+def _write_animation(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
     first, *others = pictures
+    durations = [round(1000 * picture_s)] * len(others) + [round(1000 * hold_s)]
     first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
 
 
-def _write_gif(path: Path, pictures: Sequence[Image.Image], picture_s: float, hold_s: float) -> None:
-    _write_animation(path, _in_few_colours(pictures), picture_s, hold_s)
+def _write_gif(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
+    _write_animation(path, _in_few_colours(list(pictures)), picture_s, hold_s)
 
 
 def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
@@ -59,7 +68,7 @@ def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
 
 
-ENDINGS: dict[str, Callable[[Path, Sequence[Image.Image], float, float], None]] = {
+ENDINGS: dict[str, Callable[[Path, Iterable[Image.Image], float, float], None]] = {
     ".mp4": _write_mp4,
     ".gif": _write_gif,
     ".webp": _write_animation,

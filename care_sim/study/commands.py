@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +17,9 @@ from care_sim.study.options import USUAL, Options, seeds_of
 from care_sim.study.running import Running, console, in_turn, playable
 
 if TYPE_CHECKING:
+    from care_sim.policies.base import Policy
     from care_sim.study.config import EpisodeConfig
+    from care_sim.study.episode import Environment
 
     Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
 
@@ -50,21 +51,31 @@ class Run:
         """Run it."""
         from care_sim.study.config import grid
         from care_sim.study.episode import trace
-        from care_sim.study.filming import Filming
+        from care_sim.study.filming import Film
         from care_sim.study.photo import Photographer
         from care_sim.study.timeline import print_timeline
-        from care_sim.study.watchers import watched
 
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer, filming = Photographer(self.picture), Filming(self.video)
-        wrap = partial(watched, record=self.record, export=self.export)
-        print_timeline(config, *trace(config, photographer, filming, wrap=wrap), console())
+        photographer, film = Photographer(self.picture), Film(self.video)
+        print_timeline(config, *trace(config, photographer, film.episode(self.policy), wrap=self._watched), console())
         photographer.report()
-        filming.write()
+        film.write()
         return 0
+
+    def _watched(self, env: "Environment", policy: "Policy") -> "Environment":
+        """`env`, recorded and its scans written where that is wanted."""
+        if self.record is not None:
+            from care_sim.viewer.wrapper import RecordRerun
+
+            env = RecordRerun(env, self.record, policy)
+        if self.export is not None:
+            from care_sim.envs.export_scans import ExportScans
+
+            env = ExportScans(env, self.export, policy)
+        return env
 
 
 @dataclass(frozen=True, kw_only=True)

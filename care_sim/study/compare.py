@@ -10,7 +10,7 @@ import tyro
 
 from care_sim.errors import InvalidInput
 from care_sim.study.options import USUAL, Options
-from care_sim.study.running import DONE, FAILED, console, playable
+from care_sim.study.running import DONE, FAILED, console, playable, report_problems
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -61,25 +61,45 @@ class Compare:
         policies, left_out = playable(self.policies, lambda name: made([name]))
         if not policies:
             raise InvalidInput("none of the policies can be played")
-        configs = made(policies)
-        console().print(outcomes(configs, play(configs, self.record, self.video)))
-        if self.record is not None:
-            print(f"Recorded in {self.record}: care-sim view {self.record}")
-        if self.video is not None:
-            print(f"Filmed in {self.video}")
-        return FAILED if left_out else DONE
+        failures = play(made(policies), self.record, self.video)
+        return FAILED if left_out or failures else DONE
 
 
-def play(configs: "Sequence[EpisodeConfig]", record: Path | None = None, video: Path | None = None) -> "list[Row]":
-    """Play one after the other, into one recording and one film if there are to be any; their rows."""
-    from care_sim.study.episode import trace
-    from care_sim.study.filming import SideBySide
+def play(configs: "Sequence[EpisodeConfig]", record: Path | None = None, video: Path | None = None) -> list[str]:
+    """Play one after the other, into one recording and one film if there are to be any, and print their outcomes. What
+    was played is printed whatever happens to the others; a line for each that failed is printed too, and returned.
+    """
+    from care_sim.envs.panel import draw_panel
+    from care_sim.study.episode import answer, trace
+    from care_sim.study.filming import Film
 
-    film = SideBySide(video)
-    with _recorded(configs, record) as wrapped:
-        rows = [trace(config, film.panel(config.policy), wrap=partial(wrapped, config.policy))[0] for config in configs]
-    film.write()
-    return rows
+    film = Film(video, draw_panel)
+    answers: list[Row | str] = []
+    try:
+        with _recorded(configs, record) as wrapped:
+
+            def played(config: "EpisodeConfig") -> "Row":
+                return trace(config, film.episode(config.policy), wrap=partial(wrapped, config.policy))[0]
+
+            for config in configs:
+                answers.append(answer(played, config))  # noqa: PERF401, what is there stays where one is interrupted
+    finally:
+        failures = _report(configs, answers)
+    if record is not None:
+        print(f"Recorded in {record}: care-sim view {record}")
+    if film.write():
+        print(f"Filmed in {video}")
+    return failures
+
+
+def _report(configs: "Sequence[EpisodeConfig]", answers: "Sequence[Row | str]") -> list[str]:
+    told = [*zip(configs, answers, strict=False)]
+    rows = [(config, row) for config, row in told if not isinstance(row, str)]
+    if rows:
+        console().print(outcomes(rows))
+    failures = [f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)]
+    report_problems(failures)
+    return failures
 
 
 @contextmanager
@@ -94,15 +114,16 @@ def _recorded(configs: "Sequence[EpisodeConfig]", record: Path | None) -> "Itera
         yield lambda name, env, policy: RecordRerun(env, shared, policy, name)
 
 
-def outcomes(configs: "Sequence[EpisodeConfig]", rows: "Sequence[Row]") -> "Table":
+def outcomes(played: "Sequence[tuple[EpisodeConfig, Row]]") -> "Table":
     """A line an episode."""
     from rich.table import Table
 
     from care_sim.study.timeline import text
 
-    table = Table(title=f"{configs[0].scenario} seed {configs[0].seed}", title_justify="left", box=None)
+    config = played[0][0]
+    table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)
     for column in ("policy", "budget", *COLUMNS.values()):
         table.add_column(column, justify="left" if column == "policy" else "right", no_wrap=True)
-    for config, row in zip(configs, rows, strict=True):
+    for config, row in played:
         table.add_row(config.policy, f"{config.budget:.4g}", *(text(row[name]) for name in COLUMNS))
     return table

@@ -1,13 +1,12 @@
 """Episodes on film: one as its picture shows it, or the same seed under several policies side by side."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
 
 from PIL import Image
 
 from care_sim.envs.drawing import PAPER
-from care_sim.envs.panel import draw_panel
 from care_sim.envs.picture import draw_keyframe
 from care_sim.loop import ClosedLoop
 from care_sim.study.clip_files import check_clip, write_clip
@@ -18,44 +17,29 @@ LAST_PICTURE_S = 2.5
 """How long the end of a film stays."""
 _GAP = 8
 
+Draw = Callable[[str, ClosedLoop, Sequence[Keyframe]], Image.Image]
+"""Draws where a loop stands after its keyframes so far, under the name of its policy."""
 
-class Filming:
-    """Watches an episode and writes its pictures to `path`; without a path it does nothing.
 
-    Raises InvalidInput for an ending that no clip has, MissingExtra for one whose library is not installed.
+def whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
+    """The picture of an episode on its own."""
+    return Image.fromarray(draw_keyframe(loop, frames[-1]))
+
+
+class Film:
+    """Episodes side by side on one film at `path`, drawn by `draw`; without a path it does nothing.
+
+    Raises InvalidInput for a folder and for an ending that no clip has, MissingExtra for one whose library is not
+    installed.
     """
 
-    def __init__(self, path: Path | None):
-        self._path = path
-        self._pictures: list[Image.Image] = []
-        if path is not None:
-            check_clip(path)
-
-    def __call__(self, loop: ClosedLoop, frame: Keyframe) -> None:
-        """Take the picture of a keyframe."""
-        if self._path is not None:
-            self._keyframe_s = loop.rig.keyframe_s
-            self._pictures.append(Image.fromarray(draw_keyframe(loop, frame)))
-
-    def write(self) -> None:
-        """Write the film, once the episode is over: a picture a keyframe, at the speed of the world."""
-        if self._path is not None:
-            write_clip(self._path, self._pictures, self._keyframe_s, LAST_PICTURE_S)
-
-
-class SideBySide:
-    """The same seed under several policies on one film, at `path`; without a path it does nothing.
-
-    Errors are those of `Filming`.
-    """
-
-    def __init__(self, path: Path | None):
-        self._path = path
+    def __init__(self, path: Path | None, draw: Draw = whole):
+        self._path, self._draw = path, draw
         self._films: list[list[Image.Image]] = []
         if path is not None:
             check_clip(path)
 
-    def panel(self, name: str) -> Watcher:
+    def episode(self, name: str) -> Watcher:
         """What watches the next episode, of the policy `name`."""
         frames: list[Keyframe] = []
         film: list[Image.Image] = []
@@ -65,20 +49,25 @@ class SideBySide:
             if self._path is not None:
                 self._keyframe_s = loop.rig.keyframe_s
                 frames.append(frame)
-                film.append(draw_panel(name, loop, frames))
+                film.append(self._draw(name, loop, frames))
 
         return watch
 
-    def write(self) -> None:
-        """Write the film; an episode that ends before the others keeps its last picture."""
-        if self._path is not None:
-            write_clip(self._path, _side_by_side(self._films), self._keyframe_s, LAST_PICTURE_S)
+    def write(self) -> bool:
+        """Write the film, a picture a keyframe, at the speed of the world; whether there was anything to write.
+
+        An episode that ends before the others keeps its last picture; one without a keyframe is left out.
+        """
+        films = [film for film in self._films if film]
+        if self._path is not None and films:
+            write_clip(self._path, _side_by_side(films), self._keyframe_s, LAST_PICTURE_S)
+        return bool(films)
 
 
-def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> list[Image.Image]:
-    moments = zip_longest(*films)
+def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> Iterator[Image.Image]:
     last = [film[-1] for film in films]
-    return [_row([now or end for now, end in zip(moment, last, strict=True)]) for moment in moments]
+    for moment in zip_longest(*films):
+        yield _row([now or end for now, end in zip(moment, last, strict=True)])
 
 
 def _row(pictures: Sequence[Image.Image]) -> Image.Image:

@@ -41,7 +41,7 @@ class Running:
             rows, _, missing = reported(out)
             print_report(rows, console(), STUDIES[study], missing)
             print(f"Results are in {out}")
-        _name([*(f"failed: {line}" for line in summary(failures, STUDIES[study].kind.unit)), *left_out])
+        report_problems([*(f"failed: {line}" for line in summary(failures, STUDIES[study].kind.unit)), *left_out])
         return FAILED if failures or left_out else DONE
 
 
@@ -55,7 +55,7 @@ def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[
 
     policies, broken = made(expanded(names, policy_names()), make)
     left_out = [f"left out: {reason}" for reason in broken.values()]
-    _name(left_out)
+    report_problems(left_out)
     return policies, left_out
 
 
@@ -67,7 +67,8 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
     return several or (one,)
 
 
-def _name(problems: Sequence[str]) -> None:
+def report_problems(problems: Sequence[str]) -> None:
+    """Print them, a line each, where complaints go."""
     for problem in problems:
         print(f"care-sim: {problem}", file=sys.stderr)
 

@@ -1,7 +1,8 @@
 """Clips read back: how many pictures, how long each, what they show; and that filming changes nothing."""
 
+import re
 import sys
-from itertools import accumulate
+from itertools import accumulate, count
 
 import gymnasium
 import numpy as np
@@ -9,13 +10,15 @@ import pytest
 from PIL import Image, ImageSequence
 
 import care_sim
+from care_sim.cli import main
 from care_sim.envs import panel, picture
 from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.policies.care import Care
 from care_sim.study.clip_files import ENDINGS, write_clip
 from care_sim.study.compare import play
 from care_sim.study.config import EpisodeConfig
-from care_sim.study.episode import trace
-from care_sim.study.filming import Filming
+from care_sim.study.episode import run_episode, trace
+from care_sim.study.filming import Film
 from care_sim.types import Keyframe
 
 SIZE = (64, 48)
@@ -54,31 +57,82 @@ def test_a_clip_shows_every_picture_in_turn_and_holds_the_last(ending, tmp_path)
 
 def test_a_clip_that_cannot_be_written_is_refused_before_an_episode_is_played(tmp_path, monkeypatch):
     with pytest.raises(InvalidInput, match=r"unknown ending of a clip '\.avi'; known: \.gif, \.mp4, \.png, \.webp"):
-        Filming(tmp_path / "clip.avi")
+        Film(tmp_path / "clip.avi")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtra, match=r"extra 'video': pip install 'care-sim\[video\]'"):
-        Filming(tmp_path / "clip.mp4")
+        Film(tmp_path / "clip.mp4")
 
 
 def test_filming_leaves_the_episode_as_it_was(tmp_path):
     config = EpisodeConfig("dartout", "care", scenario_parameters=SHORT)
-    filming = Filming(tmp_path / "clip.png")
-    filmed, _ = trace(config, filming)
-    filming.write()
+    film = Film(tmp_path / "clip.png")
+    filmed, _ = trace(config, film.episode("care"))
+    film.write()
     assert filmed["episode_hash"] == trace(config)[0]["episode_hash"]
     with Image.open(tmp_path / "clip.png") as clip:
         assert (clip.n_frames, clip.size) == (3, (picture.WIDTH, picture.HEIGHT))
 
 
-def test_episodes_side_by_side_end_together(tmp_path):
+def test_a_folder_is_no_clip_and_what_was_there_stays_until_the_new_one_is_whole(tmp_path):
+    (tmp_path / "clip.mp4").mkdir()
+    with pytest.raises(InvalidInput, match="is a folder"):
+        Film(tmp_path / "clip.mp4")
+    path = tmp_path / "clip.gif"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError):
+        write_clip(path, (PICTURES[1 // (2 - number)] for number in range(3)), 0.1, 0.3)
+    assert path.read_text() == "old"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def care_fails_with(error, monkeypatch):
+    """Let the policy raise at its third keyframe."""
+    demand = Care.demand
+
+    def failing(policy, belief):
+        if next(keyframes) == 2:
+            raise error
+        return demand(policy, belief)
+
+    keyframes = count()
+    monkeypatch.setattr(Care, "demand", failing)
+
+
+def test_a_policy_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
+    care_fails_with(RuntimeError("no idea"), monkeypatch)
+    options = ["--scenario-parameters", "duration_s=0.4", "--video", str(tmp_path / "clip.png")]
+    with pytest.raises(SystemExit) as end:
+        main(["compare", "dartout", "--policies", "history", "care", "full", *options])
+    out, err = capsys.readouterr()
+    assert end.value.code == 1
+    assert re.findall("^ ?(history|care|full|Filmed) ", out, re.M) == ["history", "full", "Filmed"]
+    assert err.count("failed: ") == 1
+    assert "RuntimeError: no idea" in err
+    with Image.open(tmp_path / "clip.png") as clip:
+        assert clip.n_frames == 4
+        assert clip.width > 3 * panel.WIDTH
+
+
+def test_what_was_played_is_printed_when_the_rest_is_interrupted(monkeypatch, capsys):
+    care_fails_with(KeyboardInterrupt, monkeypatch)
+    with pytest.raises(SystemExit) as end:
+        main(["compare", "dartout", "--policies", "history", "care", "--scenario-parameters", "duration_s=0.4"])
+    assert end.value.code == 130
+    assert re.findall("^ ?(history|care) ", capsys.readouterr().out, re.M) == ["history"]
+
+
+def test_episodes_side_by_side_end_together(tmp_path, capsys):
     """The shorter one keeps its last picture; the rows are those of the episodes on their own."""
     lengths = {"history": 0.2, "care": 0.4}
     configs = [
         EpisodeConfig("dartout", policy, scenario_parameters=(("duration_s", length),))
         for policy, length in lengths.items()
     ]
-    rows = play(configs, video=tmp_path / "clip.png")
-    assert [row["keyframes"] for row in rows] == [2, 4]
+    assert play(configs, video=tmp_path / "clip.png") == []
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    fired = {words[0]: int(words[-1]) for words in rows if words[:1] and words[0] in lengths}
+    assert fired == {config.policy: run_episode(config)["rays_fired"] for config in configs}
+    assert fired["care"] == 2 * fired["history"]
     with Image.open(tmp_path / "clip.png") as clip:
         pictures = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(clip)]
     assert len(pictures) == 4

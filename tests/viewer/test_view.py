@@ -53,6 +53,26 @@ def test_a_place_that_cannot_be_written_is_one_line(capsys, tmp_path):
     assert "file" in err
 
 
+@pytest.mark.parametrize(
+    ("command", "option", "name"),
+    [
+        ("run", "--record", "out.rrd"),
+        ("run", "--video", "out.gif"),
+        ("run", "--export", "scans"),
+        ("compare", "--record", "out.rrd"),
+        ("compare", "--video", "out.gif"),
+    ],
+)
+def test_what_stands_in_the_way_is_one_line_and_nothing_is_played(command, option, name, capsys, tmp_path, request):
+    if option == "--export":
+        request.getfixturevalue("open3d")
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "000.pcd").touch()
+    code, out, err = run(capsys, command, "dartout", option, tmp_path / name, *SHORT)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert name in err
+
+
 def test_without_a_display_the_browser_is_recommended(recording, capfd, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
