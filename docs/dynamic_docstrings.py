@@ -1,4 +1,4 @@
-"""A Griffe extension: a class that puts its docstring together when it is imported shows that one."""
+"""A Griffe extension: a class or module that puts its docstring together when it is imported shows that one."""
 
 import inspect
 from typing import Any
@@ -7,10 +7,18 @@ import griffe
 
 
 class DynamicDocstrings(griffe.Extension):
-    """Looks at classes that assign `__doc__`."""
+    """Looks at classes and modules that assign `__doc__`."""
 
     def on_class_members(self, *, cls: griffe.Class, **_: Any) -> None:
         """Replace the docstring of the source by that of the imported class."""
-        if "__doc__" in cls.members:
-            imported = griffe.dynamic_import(cls.path)
-            cls.docstring = griffe.Docstring(inspect.cleandoc(imported.__doc__), parent=cls)
+        _replace(cls)
+
+    def on_module_members(self, *, mod: griffe.Module, **_: Any) -> None:
+        """The same for a module."""
+        _replace(mod)
+
+
+def _replace(documented: griffe.Class | griffe.Module) -> None:
+    if "__doc__" in documented.members:
+        imported = griffe.dynamic_import(documented.path)
+        documented.docstring = griffe.Docstring(inspect.cleandoc(imported.__doc__), parent=documented)

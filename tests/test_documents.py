@@ -11,11 +11,13 @@ from pathlib import Path
 import pytest
 import tyro
 
+import care_sim.wrappers
 from care_sim import cli
 from care_sim.bench.config import BenchConfig
 from care_sim.envs import IDS
 from care_sim.parity.config import ParityConfig
 from care_sim.training import COMMANDS as LEARNERS
+from care_sim.viewer.entities import ENTITIES
 
 ROOT = Path(__file__).resolve().parents[1]
 SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
@@ -50,8 +52,9 @@ LINES = [
 @pytest.mark.parametrize("block", BLOCKS)
 def test_a_block_runs_on_its_own(block, tmp_path, drive):
     """In an empty folder, with an Argoverse 2 log in `logs`."""
-    if "RecordVideo" in block:
-        pytest.importorskip("moviepy")
+    for wrapper, library in (("RecordVideo", "moviepy"), ("RecordRerun", "rerun")):
+        if wrapper in block:
+            pytest.importorskip(library)
     (tmp_path / "logs").symlink_to(drive.parent)
     paths = {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(
@@ -112,6 +115,10 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     page = (tmp_path / "site" / "environments" / "dense.html").read_text()
     for part in ("CARE-Dense-v0", "Reward", "Episode end", "lidar_dropout", "vehicles", "encroachment_s"):
         assert part in page
+    watch = (tmp_path / "site" / "watch.html").read_text()
+    assert [name for name in ENTITIES if f"<code>{name}</code>" not in watch] == []
+    wrappers = (tmp_path / "site" / "api" / "wrappers.html").read_text()
+    assert {*care_sim.wrappers.__all__} <= {*re.findall(r'<h2 id="[\w.]*\.(\w+)"', wrappers)}
     for page in (tmp_path / "site").rglob("*.html"):
         loaded = re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page.read_text())
         assert loaded == [], f"{page.name} asks the network"

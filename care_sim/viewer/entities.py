@@ -73,3 +73,6 @@ def about() -> str:
         "Bodies, pictures, what was missed and the states are truth, which no policy is shown.\n\n"
         f"| entity | content |\n|---|---|\n{rows}\n"
     )
+
+
+__doc__ = f"{__doc__}\n\n{about()}"
