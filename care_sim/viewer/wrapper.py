@@ -1,6 +1,7 @@
 """The wrapper that records: any agent, any learner, any policy."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,8 +84,7 @@ class RecordRerun(Watching):
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Finish the episode, and the file if it is its own."""
-        if self._episode is not None and self._recording is not None:
-            self._episode.end(outcome)
-            if self._path is not None:
-                self._recording.close()
-        self._episode = None
+        episode, self._episode = self._episode, None
+        if episode is not None and self._recording is not None:
+            with nullcontext() if self._path is None else self._recording:
+                episode.end(outcome)
