@@ -169,6 +169,8 @@ def test_what_was_learned_on_the_dense_street_is_a_place(tmp_path, env):
 
 def test_it_is_no_policy_behind_wrappers_of_learners(env):
     for wrapped in (SectorReserve(env), GridObservation(env), GridObservation(SectorScores(env))):
-        with pytest.raises(InvalidInput, match=r"policy ppo plays the environment itself.*: give env\.unwrapped"):
+        with pytest.raises(
+            InvalidInput, match=r"policy ppo plays .*: give and step env\.unwrapped"
+        ):
             care_sim.make_policy("ppo", wrapped)
     care_sim.make_policy("ppo", SectorReserve(env).unwrapped)
