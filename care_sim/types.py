@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import check_number, check_whole
+from care_sim.errors import InvalidInput, check_number, check_whole
 from care_sim.frames import Floats
 from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
 from care_sim.pinhole import Lenses, PinholeCamera
@@ -144,7 +144,9 @@ class Belief:
 
     @classmethod
     def from_observation(cls, observation: Observation) -> "Belief":
-        """Read an observation of the environments back, without loss."""
+        """Read an observation of the environments back, without loss. Raises InvalidInput for another."""
+        if not isinstance(observation, Mapping) or "ranges" not in observation:
+            raise InvalidInput("an observation of CARE-Sim's environments is needed, as they give it without wrappers")
         ranges = observation["ranges"]
         speed, yaw_rate, acceleration = (float(value) for value in observation["ego"])
         return cls(

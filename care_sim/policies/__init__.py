@@ -109,7 +109,10 @@ def maker(name: str) -> Maker:
 def _check_bare(name: str, env: gymnasium.Env) -> None:
     inner = env.unwrapped
     if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
-        raise InvalidInput(f"policy {name} plays the environment itself, not behind its wrappers: give env.unwrapped")
+        raise InvalidInput(
+            f"policy {name} plays the environment itself, not behind wrappers that change what is seen or done: "
+            "give and step env.unwrapped"
+        )
 
 
 def _of_environment(name: str, env: gymnasium.Env, attribute: str) -> object:

@@ -126,8 +126,8 @@ def load(path: str | PathLike[str]) -> Weights:
     except FileNotFoundError as error:
         raise InvalidInput(f"weights {path}: no such file") from error
     except Exception as error:
-        reason = " ".join((str(error) or type(error).__name__).split())
-        raise InvalidInput(f"weights {path}: not a file of weights, or damaged ({reason})") from error
+        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[0]
+        raise InvalidInput(f"weights {path}: no .npz of weights of care-sim train, or damaged ({reason})") from error
 
 
 def shipped(name: str) -> Path:

@@ -19,7 +19,8 @@ class Options(Conditions):
     scenario_parameters: tuple[str, ...] = ()
     """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
     policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policy as NAME=VALUE, for example k_safe=0 for care-sbf."""
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
+    POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
 
     def arguments(self) -> dict[str, Any]:
         """As arguments of `EpisodeConfig`."""

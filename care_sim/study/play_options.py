@@ -33,7 +33,8 @@ class PlayOptions:
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
     policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policy as NAME=VALUE, for example k_safe=0 for care-sbf."""
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
+    POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
     conditions: Annotated[Conditions, tyro.conf.arg(name="")] = USUAL_CONDITIONS
     """Further conditions."""
 

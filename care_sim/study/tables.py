@@ -8,7 +8,7 @@ from care_sim.study.entries import ends, interval, marked, percent, spread, tag_
 from care_sim.study.paper import Published, paper_cells, published
 from care_sim.study.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
 from care_sim.study.table import Table
-from care_sim.study.task import REFERENCE, Row
+from care_sim.study.task import FULL, REFERENCE, Row
 
 COLUMNS = (
     "budget",
@@ -44,7 +44,8 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     sayings = [_published(cell) for cell in cells]
     sentences = dict.fromkeys(f'Paper: "{saying.sentence}"' for saying in sayings if saying)
     lines = (_line(cell, saying) for cell, saying in zip(cells, sayings, strict=True))
-    missing = [] if any(cell.regret for cell in cells) else ["Regret: full not run."]
+    regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
+    missing = [] if regretted else ["Regret: full not run."]
     notes = [*tag_notes(cell.tags for cell in cells), *missing]
     hidden = FILES_ONLY if any(cell.never for cell in cells) else (*FILES_ONLY, "never")
     return Table(title, COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, WHOLE)
@@ -52,7 +53,7 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
 
 def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
     """CARE minus every other policy, then the same of every learned one; none for a policy that ran alone."""
-    tags = {cell.policy: cell.tags for cell in cells} | ({"full": ()} if full_of(groups, setting) else {})
+    tags = {cell.policy: cell.tags for cell in cells} | ({FULL: ()} if full_of(groups, setting) else {})
     learned = [policy for policy in tags if "learned" in tags[policy]]
     named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
     return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
@@ -77,7 +78,7 @@ def _contrast_table(
 def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
     """What a policy has over another at the same budget, or over the full scan."""
     setting, policy, _ = theirs
-    return contrast(measure, groups.get(ours), full_of(groups, setting) if policy == "full" else groups.get(theirs))
+    return contrast(measure, groups.get(ours), full_of(groups, setting) if policy == FULL else groups.get(theirs))
 
 
 def _published(cell: Cell) -> Published | None:

@@ -15,7 +15,7 @@ import numpy as np
 import care_sim
 from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
 from care_sim.errors import check_whole
-from care_sim.policies import make_policy
+from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.provenance import SESSION, code_digest, file_digest, policy_digest
 
@@ -112,9 +112,24 @@ def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, An
     """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither camera nor
     allocator.
     """
-    if policy != FULL:
-        return {"budget": budget, **conditions}
-    return conditions | {"budget": 1.0} | {name: DEFAULTS[name] for name in UNFELT_BY_FULL}
+    felt = conditions | {"budget": budget}
+    if parameters := conditions.get("policy_parameters"):
+        felt["policy_parameters"] = own(policy, parameters)
+    if policy == FULL:
+        felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNFELT_BY_FULL}
+    return felt
+
+
+def own(policy: str, parameters: Parameters) -> Parameters:
+    """Those of a policy among parameters for several: NAME is for all, POLICY.NAME for that policy alone.
+
+    Raises InvalidInput for a name before the point that is no policy.
+    """
+    parted = [(*name.rpartition("."), value) for name, value in parameters]
+    for owner, point, _, _ in parted:
+        if point:
+            check_policy(owner)
+    return tuple((name, value) for owner, point, name, value in parted if not point or owner == policy)
 
 
 def files_in(parameters: Parameters) -> list[str]:

@@ -33,7 +33,7 @@ class Score:
     distance_m: float | None
 
     def __str__(self) -> str:
-        seen = "" if self.distance_m is None else f", first detection at {self.distance_m:.2f} m"
+        seen = "" if self.distance_m is None else f", first detection at {self.distance_m:.2f} m (0 where never)"
         return f"return {self.mean_return:.2f}{seen}"
 
 

@@ -49,7 +49,7 @@ def train(config: AgentConfig) -> int:
 
 def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(folder.checkpoint, env=envs, device="cpu")
-    if model.num_timesteps >= config.steps:
+    if model.num_timesteps >= config.steps and folder.evaluated(model):
         raise InvalidInput(f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with --steps")
     envs.seed(config.seed + model.num_timesteps)
     if config.algorithm == "sac":
@@ -72,15 +72,18 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
     clock, begun = Stopwatch(folder.seconds), model.num_timesteps
     with bar(config.steps, "steps") if sys.stderr.isatty() else nullcontext(Lines(config.steps, "steps")) as show:
         shown = _shower(show, config, clock, begun)
-        while not folder.evaluated(model):
-            score = evaluate(env, acting(model), validation_seeds(config.episodes))
-            folder.keep(model, score, clock.seconds, env.unwrapped.rig)
-            _say(f"{model.num_timesteps} steps: {score}")
-            if (left := config.steps - model.num_timesteps) > 0:
-                with clock:
-                    _stretch(model, min(config.evaluate_every, left), shown, folder)
-    rate = (model.num_timesteps - begun) / clock.here
-    _say(f"{rate:.0f} environment steps a second inside {config.algorithm}, learning included; kept in {folder.path}")
+        while True:
+            if not folder.evaluated(model):
+                score = evaluate(env, acting(model), validation_seeds(config.episodes))
+                folder.keep(model, score, clock.seconds, env.unwrapped.rig)
+                _say(f"{model.num_timesteps} steps: {score}")
+            if (left := config.steps - model.num_timesteps) <= 0:
+                break
+            with clock:
+                _stretch(model, min(config.evaluate_every, left), shown, folder)
+    if learned := model.num_timesteps - begun:
+        _say(f"{learned / clock.here:.0f} environment steps a second inside {config.algorithm}, learning included")
+    _say(f"kept in {folder.path}")
 
 
 def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, is_number
+from care_sim.errors import InvalidInput, is_number, unknown
 from care_sim.frames import Floats, Pose
 from care_sim.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
@@ -86,10 +86,12 @@ class World:
         """Add a body that stands at a pose, follows a function of time, or drives in the traffic.
 
         `reported=False` keeps perception silent about it, whatever its kind. A `backdrop` stands behind all
-        that perception reports, so that the camera need not render it.
+        that perception reports, so that the camera need not render it. Raises InvalidInput for an unknown kind.
         """
         pose_at = _motion(pose)
         place = pose_at(self.time)
+        if kind not in CATALOGUE:
+            raise unknown("kind of body", kind, CATALOGUE)
         body = self.bullet.add(CATALOGUE[kind], place, backdrop=backdrop)
         self._footprints.add(body, CATALOGUE[kind].size, place)
         actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)

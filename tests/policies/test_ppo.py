@@ -169,6 +169,13 @@ def test_what_was_learned_on_the_dense_street_is_a_place(tmp_path, env):
 
 def test_it_is_no_policy_behind_wrappers_of_learners(env):
     for wrapped in (SectorReserve(env), GridObservation(env), GridObservation(SectorScores(env))):
-        with pytest.raises(InvalidInput, match=r"policy ppo plays the environment itself.*: give env\.unwrapped"):
+        with pytest.raises(InvalidInput, match=r"policy ppo plays .*: give and step env\.unwrapped"):
             care_sim.make_policy("ppo", wrapped)
     care_sim.make_policy("ppo", SectorReserve(env).unwrapped)
+
+
+def test_the_observation_of_a_wrapped_environment_is_refused_in_one_line(env):
+    policy = care_sim.make_policy("ppo", env)
+    seen, _ = GridObservation(env).reset(seed=0)
+    with pytest.raises(InvalidInput, match="an observation of CARE-Sim's environments is needed"):
+        policy(seen)

@@ -136,3 +136,13 @@ def test_full_runs_once_for_all_budgets():
     configs = grid(["dense"], ["care", "full"], (0.03, 0.1), (0, 1))
     assert [(c.policy, c.budget) for c in configs if c.seed == 0] == [("care", 0.03), ("care", 0.1), ("full", 1.0)]
     assert [plain["seeds"] for plain in listed(configs)["configurations"]] == [[0, 1]] * 3
+
+
+def test_a_parameter_may_be_one_policys_own():
+    given = (("k_safe", 1.0),), (("care-sbf.k_safe", 1.0),)
+    alone, beside = (grid(["dense"], ["care-sbf"], [0.1], [0], policy_parameters=each) for each in given)
+    assert alone == beside
+    care, history = grid(["dense"], ["care", "history"], [0.1], [0], policy_parameters=given[1])
+    assert care.policy_parameters == history.policy_parameters == ()
+    with pytest.raises(InvalidInput, match="unknown policy 'carre'"):
+        grid(["dense"], ["care"], [0.1], [0], policy_parameters=(("carre.k_safe", 1.0),))

@@ -73,6 +73,13 @@ def test_care_is_compared_with_every_policy_at_every_budget():
     assert found["Detected, points", "history"][0].startswith("+40 [0,80]")
 
 
+def test_the_full_scan_alone_has_nothing_to_regret():
+    (table,) = sweep_tables([row for row in STUDY if row["policy"] == "full"])
+    assert table.notes == ()
+    (table,) = sweep_tables([row for row in STUDY if row["policy"] == "history"])
+    assert table.notes == ("Regret: full not run.",)
+
+
 def test_what_is_learned_is_compared_with_every_policy_too():
     learned = rows("learned-scorer", [14.0, 15.0, 16.0, 17.0, 18.0], changes={"tags": "causal+learned"})
     found = {table.title: table for table in sweep_tables([*STUDY, *learned])}

@@ -121,3 +121,8 @@ def test_what_comes_later_is_at_once_where_it_belongs(world):
     assert world.bullet.cast(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0, 0.0]]), 50.0)[0] == pytest.approx(
         30.0 - late.kind.size[0] / 2, abs=0.01
     )
+
+
+def test_an_unknown_kind_of_body_is_named(world):
+    with pytest.raises(InvalidInput, match=r"unknown kind of body 'child'; known: .*pedestrian"):
+        world.add("somebody", "child", (10.0, 0.0, 0.0))
