@@ -14,7 +14,9 @@ from care_sim.study.styles import styles
 
 MANY = [f"policy-{number}" for number in range(20)]
 MARKERS = {
-    style.marker for tags in ((), ("privileged",)) for style in styles((name, tags) for name in [*BUILT_IN, *MANY]).values()
+    style.marker
+    for tags in ((), ("privileged",))
+    for style in styles((name, tags) for name in [*BUILT_IN, *MANY]).values()
 }
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise, starmap
 import numpy as np
 from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
+from matplotlib.transforms import Affine2D
 
 from care_sim.frames import Floats
 
@@ -17,7 +18,7 @@ STROKE = 0.28
 def outline(marker: str) -> str:
     """The outline of a marker that Matplotlib knows by this name; bars where it draws lines. It can be filled."""
     style = MarkerStyle(marker)
-    path = style.get_path().transformed(style.get_transform().scale(2, -2))
+    path = style.get_path().transformed(style.get_transform() + Affine2D().scale(2, -2))
     return "".join(_outlined(path) if style.is_filled() else starmap(_bar, _ends(path)))
 
 
