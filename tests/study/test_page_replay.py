@@ -4,7 +4,6 @@ import base64
 import json
 import signal
 import zlib
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ import pytest
 from care_sim.grid import AngularGrid
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.episode import trace
+from care_sim.study.executors import processes
 from care_sim.study.page.episodes import Episode, chosen, config_of, played_again
 from care_sim.study.page.replay import SECTORS, fullness, packed, replayed, sightlines
 from care_sim.types import Rig
@@ -153,18 +153,25 @@ def test_a_row_with_another_outcome_is_not_identical_whatever_its_hash(replay):
 
 
 def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
-    rows, handed = [CONFIG.row() | {"scenario.duration_s": 0.2}] * 8, []
+    rows, handed = [CONFIG.row() | {"scenario.duration_s": 0.2}] * 20, []
 
-    class Interrupted(ThreadPoolExecutor):
-        def submit(self, *arguments):
-            handed.append(super().submit(*arguments))
+    def interrupted(workers):
+        executor = processes(workers)
+        submit = executor.submit
+
+        def submit_and_interrupt(*arguments):
+            handed.append(submit(*arguments))
             if len(handed) == len(rows):
                 signal.raise_signal(signal.SIGINT)
             return handed[-1]
 
+        executor.submit = submit_and_interrupt
+        return executor
+
     with pytest.raises(KeyboardInterrupt):
-        played_again(rows, 1, Interrupted)
-    assert sum(future.cancelled() for future in handed) >= 6
+        played_again(rows, 1, interrupted)
+    assert all(future.done() for future in handed)
+    assert sum(future.cancelled() for future in handed) >= 15
 
 
 def test_what_cannot_be_played_says_why():

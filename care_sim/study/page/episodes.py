@@ -54,13 +54,12 @@ def played_again(rows: Sequence[Row], workers: int, make_executor: ExecutorFacto
     """Play the episodes of rows again, in processes. An interrupt does not wait for those that have not begun."""
     if not rows:
         return []
-    with make_executor(min(workers, len(rows))) as executor:
-        try:
-            futures = [executor.submit(answer, _replay_of, row) for row in rows]
-            return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
-        except BaseException:
-            executor.shutdown(wait=False, cancel_futures=True)
-            raise
+    executor = make_executor(min(workers, len(rows)))
+    try:
+        futures = [executor.submit(answer, _replay_of, row) for row in rows]
+        return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 def config_of(row: Row) -> EpisodeConfig:

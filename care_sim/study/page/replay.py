@@ -28,7 +28,7 @@ from care_sim.world.world import Actor
 SECTORS = 128
 """Directions of the picture in which fired cells are counted, from azimuth -pi on."""
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
-"""A share of the cells of a sector is written as one digit, from none to all of them."""
+"""How full a sector is, is written as one digit, from none of its cells to all of them."""
 CENTI, MILLI = 100, 1000
 
 
