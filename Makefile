@@ -49,8 +49,9 @@ reproduce: setup
 test: $(VENV)/.developing
 	$(BIN)/python -m pytest --numprocesses 2
 
+# NO_MKDOCS_2_WARNING: the theme tells of its end of life, in May 2027, at every build; a warning is to be one of a page.
 docs: $(VENV)/.developing
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --config-file .mkdocs.yml
 	@echo "build/site/index.html; to search in it: $(BIN)/python -m http.server --directory build/site"
 
 lint: $(VENV)/.developing

@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
@@ -87,6 +88,34 @@ def test_commands_are_understood():
     assert [entry for entry in LINES if not understood(entry[1])] == []
 
 
+def test_the_quick_start_makes_a_page():
+    page, line = "docs/index.md", "care-sim report runs/mine -o report.html"
+    assert (page, line) in LINES
+
+
+def test_files_that_a_page_names_are_there():
+    """Those of the repository, as seen from its root."""
+    named = [
+        (page, name)
+        for page in PAGES
+        for name in re.findall(r"`((?:docs|care_sim|examples|tests)/[\w./]*)`", page.read_text())
+    ]
+    assert len(named) > 5
+    assert [(name_of(page), name) for page, name in named if not (ROOT / name).exists()] == []
+
+
+def test_the_learner_in_one_file_learns(monkeypatch, capsys):
+    pytest.importorskip("torch")
+    place = spec_from_file_location("train_ppo", ROOT / "docs" / "examples" / "train_ppo.py")
+    example = module_from_spec(place)
+    place.loader.exec_module(example)
+    for name, number in {"UPDATES": 2, "ROLLOUT": 60, "ENVIRONMENTS": 2, "BATCH": 40}.items():
+        monkeypatch.setattr(example, name, number)
+    example.main()
+    steps = re.findall(r"^ *(\d+) steps: return +-?[\d.]+$", capsys.readouterr().out, re.M)
+    assert steps == ["120", "240"]
+
+
 def test_the_policy_has_twenty_lines_at_most():
     (policy,) = (block for block in fenced(ROOT / "README.md", "python") if "class Corridor" in block)
     body = policy[policy.index("class Corridor") : policy.index("env = ")]
@@ -107,7 +136,7 @@ def test_every_environment_has_a_page():
 
 def test_the_site_is_built_without_a_warning(tmp_path):
     pytest.importorskip("material")
-    command = [sys.executable, "-m", "mkdocs", "build", "--site-dir", str(tmp_path / "site")]
+    command = [sys.executable, "-m", "mkdocs", "build", "-f", ".mkdocs.yml", "--site-dir", str(tmp_path / "site")]
     quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=ROOT, env=quiet, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

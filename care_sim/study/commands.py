@@ -227,10 +227,11 @@ class Report:
         check_whole("episodes", self.episodes, 0)
         check_whole("workers", self.workers, 1)
         check_page()
+        from care_sim.study.entries import counted
         from care_sim.study.page.build import write_page
 
         page = write_page(self.folder, path, self.episodes, self.workers)
         for sentence in page.warnings:
             print(f"care-sim: {sentence}", file=sys.stderr)
-        print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {page.count('replay')} episodes to watch")
+        print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {counted(page.watchable, 'episode')} to watch")
         return 0

@@ -29,11 +29,13 @@ from care_sim.study.task import Row
 class Study:
     """How the rows of a study are shown: all pure functions of them.
 
-    `closing` are sentences after the tables; `figure_names` every figure that the study can draw, as patterns in which
-    a * stands for any text; `caption` says how to read its tables; `kind` is what it plays.
+    `title` names it to readers; `closing` are sentences after the tables; `figure_names` every figure that the study
+    can draw, as patterns in which a * stands for any text; `caption` says how to read its tables; `kind` is what it
+    plays.
     """
 
     name: str
+    title: str
     tables: Callable[[Sequence[Row]], list[Table]]
     figures: Callable[[Sequence[Row]], dict[str, Figure]]
     closing: Callable[[Sequence[Row]], list[str]]
@@ -60,19 +62,51 @@ def _paper_closing(rows: Sequence[Row]) -> list[str]:
 
 
 _ALL = (
-    Study("sweep", sweep_tables, budget_figure.sweep_figures, _sweep_closing, budget_figure.NAMES),
-    Study("paper", sweep_tables, budget_figure.sweep_figures, _paper_closing, budget_figure.NAMES),
+    Study(
+        "sweep",
+        "Sweep of the closed loop",
+        sweep_tables,
+        budget_figure.sweep_figures,
+        _sweep_closing,
+        budget_figure.NAMES,
+    ),
+    Study(
+        "paper",
+        "The paper's closed-loop study",
+        sweep_tables,
+        budget_figure.sweep_figures,
+        _paper_closing,
+        budget_figure.NAMES,
+    ),
     Study(
         "crowding",
+        "Crowding in the closed loop",
         crowding_tables,
         crowding_figure.crowding_figures,
         _sweep_closing,
         (crowding_figure.NAME,),
         COMPARED,
     ),
-    Study("ablate", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
-    Study("faults", fault_tables, faults_figure.fault_figures, _sweep_closing, faults_figure.NAMES, COMPARED),
-    Study("protocol", protocol_tables, protocol_figures, protocol_closing, FIGURE_NAMES, PROTOCOL_CAPTION, PLAYS),
+    Study("ablate", "Ablations of the closed loop", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
+    Study(
+        "faults",
+        "Faults in the closed loop",
+        fault_tables,
+        faults_figure.fault_figures,
+        _sweep_closing,
+        faults_figure.NAMES,
+        COMPARED,
+    ),
+    Study(
+        "protocol",
+        "First sightings in the open loop",
+        protocol_tables,
+        protocol_figures,
+        protocol_closing,
+        FIGURE_NAMES,
+        PROTOCOL_CAPTION,
+        PLAYS,
+    ),
 )
 STUDIES = {study.name: study for study in _ALL}
 SWEEP = STUDIES["sweep"]

@@ -109,6 +109,16 @@ def test_plays_are_counted_by_scene_and_floor(tmp_path):
     assert about.missing == ("1 of 6 plays are missing from plays.parquet.", "Left out: scene c: damaged.")
 
 
+def test_what_failed_is_told_once(tmp_path):
+    failed = ["care 3% seed 7: the worker process died"]
+    describe(tmp_path, {"failed": failed, "configurations": [*CONFIGURATIONS, {"seeds": [7]}]})
+    assert origin(tmp_path, STUDY, EPISODES, failed).missing == (f"Left out: {failed[0]}.",)
+    describe(tmp_path, {"failed": failed, "configurations": [*CONFIGURATIONS, {"seeds": [7, 8]}]})
+    lost, left_out = origin(tmp_path, STUDY, EPISODES, failed).missing
+    assert lost == "1 of 22 episodes are missing from episodes.parquet."
+    assert left_out == f"Left out: {failed[0]}."
+
+
 def test_settings_are_what_varies_or_departs_from_the_default():
     played = [*STUDY, *rows("care", [1.0], false_negative_rate=0.4, scenario_parameters=(("vehicles", 9),))]
     told = settings([{**dict.fromkeys(["scenario.vehicles"]), **row} for row in played])

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import signal
 import zlib
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from care_sim.grid import AngularGrid
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.episode import trace
+from care_sim.study.executors import processes
 from care_sim.study.page.episodes import Episode, chosen, config_of, played_again
-from care_sim.study.page.replay import SECTORS, packed, replayed, shares, sightlines
+from care_sim.study.page.replay import SECTORS, fullness, packed, replayed, sightlines
 from care_sim.types import Rig
 
 CONFIG = EpisodeConfig("dartout", "care", 0.1, seed=3)
@@ -90,13 +92,13 @@ def test_the_camera_sees_the_person_where_the_person_is(replay):
     assert explained == 0
 
 
-def test_shares_count_the_cells_of_a_sector_in_all_rows():
+def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
     grid = AngularGrid()
     width = grid.columns // SECTORS
     third = [row * grid.columns + 2 * width + column for row in range(grid.rows) for column in range(width)]
-    assert shares(np.array(third), grid) == "00z" + "0" * (SECTORS - 3)
-    assert shares(np.arange(grid.size), grid) == "z" * SECTORS
-    assert shares(np.array(third[: len(third) // 7]), grid)[2] == "5"
+    assert fullness(np.array(third), grid) == "00z" + "0" * (SECTORS - 3)
+    assert fullness(np.arange(grid.size), grid) == "z" * SECTORS
+    assert fullness(np.array(third[: len(third) // 7]), grid)[2] == "5"
 
 
 def test_a_box_in_the_middle_of_the_picture_is_straight_ahead(seen):
@@ -142,6 +144,34 @@ def test_an_episode_that_ends_otherwise_is_told_from_one_that_does_not(replay):
     assert other.differences == [f"detection_distance_m none → {distance:.2f}", "braked False → True"]
     assert Episode(replay.row, "gone").differences == []
     assert not Episode({}, "gone").identical
+
+
+def test_a_row_with_another_outcome_is_not_identical_whatever_its_hash(replay):
+    edited = Episode(replay.row | {"braked": False}, replay)
+    assert edited.differences == ["braked False → True"]
+    assert not edited.identical
+
+
+def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
+    rows, handed = [CONFIG.row() | {"scenario.duration_s": 0.2}] * 20, []
+
+    def interrupted(workers):
+        executor = processes(workers)
+        submit = executor.submit
+
+        def submit_and_interrupt(*arguments):
+            handed.append(submit(*arguments))
+            if len(handed) == len(rows):
+                signal.raise_signal(signal.SIGINT)
+            return handed[-1]
+
+        executor.submit = submit_and_interrupt
+        return executor
+
+    with pytest.raises(KeyboardInterrupt):
+        played_again(rows, 1, interrupted)
+    assert all(future.done() for future in handed)
+    assert sum(future.cancelled() for future in handed) >= 15
 
 
 def test_what_cannot_be_played_says_why():

@@ -6,7 +6,7 @@ from typing import Any
 import altair as alt
 
 from care_sim.study.budget_figure import DODGE, SPREAD
-from care_sim.study.entries import marked, percent, spread, tag_notes
+from care_sim.study.entries import counted, marked, percent, spread, tag_notes
 from care_sim.study.page.chart import FULL_SCAN, Chart, Look, apart, budget_axis, budgets_text, inline, specification
 from care_sim.study.summary import Cell, summarise
 from care_sim.study.task import FULL, Row
@@ -53,8 +53,8 @@ def _chart(cells: Sequence[Cell]) -> Chart:
     chart = alt.layer(*layers).add_params(look.chosen).properties(width="container", height=300)
     scenario, budgets = cells[0].setting.scenario, _budgets(cells)
     counts = sorted({cell.episodes for cell in cells})
-    seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    title = f"{scenario}: first detection against the budget, {seeds} seeds a point"
+    seeds = counted(counts[0], "seed") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
+    title = f"{scenario}: first detection against the budget, {seeds} a point"
     about_it = f"Median distance of the first detection in metres, a curve a policy, budgets {budgets_text(budgets)}."
     return Chart(title, about_it, (*NOTES, *tag_notes(own for _, own in tags)), specification(chart))
 

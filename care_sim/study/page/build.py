@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 import care_sim
 from care_sim.extras import vega_bundle
+from care_sim.study.entries import counted
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.files import replacing
 from care_sim.study.kinds import EPISODES
@@ -28,16 +29,9 @@ from care_sim.study.page.protocol_charts import protocol_charts
 from care_sim.study.page.tables import blocks
 from care_sim.study.report import reported
 from care_sim.study.studies import Study
+from care_sim.study.table import Table
 from care_sim.study.task import Row
 
-TITLES = {
-    "sweep": "Sweep of the closed loop",
-    "paper": "The paper's closed-loop study",
-    "ablate": "Ablations of the closed loop",
-    "faults": "Faults in the closed loop",
-    "crowding": "Crowding in the closed loop",
-    "protocol": "First sightings in the open loop",
-}
 CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
     "sweep": budget_charts,
     "paper": budget_charts,
@@ -49,12 +43,28 @@ CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
 
 
 @dataclass(frozen=True)
+class Findings:
+    """What a study makes of its rows."""
+
+    charts: Sequence[Chart]
+    tables: Sequence[Table]
+    closing: Sequence[str]
+
+    @classmethod
+    def of(cls, study: Study, rows: Sequence[Row]) -> "Findings":
+        """Charts, tables and closing sentences."""
+        charts = CHARTS.get(study.name, _no_charts)(rows)
+        return cls(charts, study.tables(rows), study.closing(rows))
+
+
+@dataclass(frozen=True)
 class Page:
     """What a page shows of a study."""
 
     name: str
     study: Study
     rows: Sequence[Row]
+    findings: Findings
     origin: Origin
     episodes: Sequence[Episode]
 
@@ -65,20 +75,21 @@ class Page:
 
     def html(self) -> str:
         """The page as one file."""
-        charts = CHARTS[self.study.name](self.rows) if self.study.name in CHARTS else []
+        charts = self.findings.charts
         return str(
             _template().render(
                 page=self,
-                title=TITLES[self.study.name],
+                title=self.study.title,
                 version=care_sim.__version__,
                 charts=charts,
                 specs=_embedded([chart.spec for chart in charts]),
                 vega=Markup(vega_bundle()) if charts else "",
-                tables=[(table, blocks(table)) for table in self.study.tables(self.rows)],
-                closing=self.study.closing(self.rows),
+                tables=[(table, blocks(table)) for table in self.findings.tables],
+                closing=self.findings.closing,
                 groups=self.groups(),
                 reel=_embedded(reel(self.episodes)),
                 asset=_asset,
+                counted=counted,
             )
         )
 
@@ -91,13 +102,23 @@ class Page:
         """Sentences about what is missing, or is not as it was."""
         reasons = Counter(episode.ending for episode in self.episodes if isinstance(episode.ending, str))
         unplayable = [f"Episodes that cannot be played again: {count} ({reason})." for reason, count in reasons.items()]
-        others = self.count("differences")
-        otherwise = [f"Episodes that end otherwise with this version of the code, which are marked: {others}."]
-        return [*self.origin.missing, *unplayable, *(otherwise if others else [])]
+        otherwise = [f"Episodes that end otherwise when played again here, which are marked: {self.differing}."]
+        return [*self.origin.missing, *unplayable, *(otherwise if self.differing else [])]
 
-    def count(self, what: str) -> int:
-        """How many of the episodes that were played again are `identical`, or have `differences` or a `replay`."""
-        return sum(bool(getattr(episode, what)) for episode in self.episodes)
+    @property
+    def watchable(self) -> int:
+        """How many episodes were played again."""
+        return sum(episode.replay is not None for episode in self.episodes)
+
+    @property
+    def identical(self) -> int:
+        """How many of them went to the last bit as in the results."""
+        return sum(episode.identical for episode in self.episodes)
+
+    @property
+    def differing(self) -> int:
+        """How many of them ended otherwise."""
+        return sum(bool(episode.differences) for episode in self.episodes)
 
 
 def write_page(folder: Path, path: Path, most: int, workers: int, make_executor: ExecutorFactory = processes) -> Page:
@@ -107,13 +128,18 @@ def write_page(folder: Path, path: Path, most: int, workers: int, make_executor:
     """
     rows, study, left_out = reported(folder)
     with replacing(path) as unfinished:
+        findings, about = Findings.of(study, rows), origin(folder, rows, study.kind, left_out)
         watched = chosen(rows, most) if study.kind is EPISODES else []
         if watched:
-            print(f"playing {len(watched)} episodes again to be watched", file=sys.stderr)
-        about = origin(folder, rows, study.kind, left_out)
-        page = Page(folder.resolve().name, study, rows, about, played_again(watched, workers, make_executor))
+            print(f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr)
+        episodes = played_again(watched, workers, make_executor)
+        page = Page(folder.resolve().name, study, rows, findings, about, episodes)
         unfinished.write_text(page.html(), encoding="utf-8")
     return page
+
+
+def _no_charts(_rows: Sequence[Row]) -> list[Chart]:
+    return []
 
 
 def _template() -> Any:

@@ -8,6 +8,7 @@ import altair as alt
 from matplotlib.colors import to_hex
 
 from care_sim.study.entries import marked, percent
+from care_sim.study.page.shapes import outline
 from care_sim.study.styles import FULL, Style, styles
 
 FULL_SCAN = "full scan"
@@ -15,13 +16,6 @@ PANEL_WIDTH = 200
 """Pixels that a panel wants to be wide; the browser sets as many side by side as there is room for."""
 FAINT = 0.12
 """Opacity of what is not chosen in the legend."""
-_SALTIRE = "M-1,-.6L-.6,-1L0,-.4L.6,-1L1,-.6L.4,0L1,.6L.6,1L0,.4L-.6,1L-1,.6L-.4,0Z"
-_SHAPES = {
-    "s": "square", "o": "circle", "D": "diamond", "d": "diamond", "^": "triangle-up", "v": "triangle-down",
-    "<": "triangle-left", ">": "triangle-right", "P": "cross", "X": _SALTIRE, "*": "triangle-up",
-    "p": "circle", "h": "square", "H": "diamond", "_": "stroke",
-}  # fmt: skip
-"""Markers of Matplotlib as Vega draws them."""
 _DASHES = {"-": [1, 0], "--": [5, 3]}
 
 
@@ -76,7 +70,7 @@ class Look:
 
         return cls(
             alt.Color("policy:N", scale=scale([to_hex(s.colour) for s in drawn.values()]), legend=legend),
-            alt.Shape("policy:N", scale=scale([_SHAPES[s.marker] for s in drawn.values()]), legend=legend),
+            alt.Shape("policy:N", scale=scale([outline(s.marker) for s in drawn.values()]), legend=legend),
             alt.StrokeDash("policy:N", scale=scale([_DASHES[s.line] for s in drawn.values()]), legend=legend),
             alt.condition(chosen, alt.value(1.0), alt.value(FAINT)),
             chosen,

@@ -6,7 +6,7 @@ import altair as alt
 
 from care_sim.study.crowding import COLLAPSE_M, Crowd
 from care_sim.study.crowding_figure import PALE
-from care_sim.study.entries import interval, mean, percent
+from care_sim.study.entries import counted, interval, mean, percent
 from care_sim.study.page.chart import Chart, inline, specification
 from care_sim.study.task import Row
 
@@ -47,7 +47,7 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
         base.mark_rect(strokeWidth=1.5).encode(color=colour, stroke=frame, tooltip=about),
         base.mark_text(fontSize=11).encode(text="text:N", color=ink, tooltip=about),
     ).properties(width="container", height=26 * len(crowd.counts))
-    seeds = len({row["seed"] for row in rows})
-    title = f"dense: first detection of all-camera minus care, m, {seeds} seeds"
+    seeds = counted(len({row["seed"] for row in rows}), "seed")
+    title = f"dense: first detection of all-camera minus care, m, {seeds}"
     about_it = "A heat map of the mean difference by budget and standing vehicles; negative where all-camera is later."
     return [Chart(title, about_it, NOTES, specification(chart))]

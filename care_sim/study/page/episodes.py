@@ -31,8 +31,10 @@ class Episode:
 
     @property
     def identical(self) -> bool:
-        """Whether the replay fired, measured and moved to the last bit as the episode did."""
-        return self.replay is not None and self.replay.row["episode_hash"] == self.row.get("episode_hash")
+        """Whether the replay fired, measured and moved to the last bit as the episode did, and ends as the row does."""
+        if self.replay is None or self.differences:
+            return False
+        return bool(self.replay.row["episode_hash"] == self.row.get("episode_hash"))
 
     @property
     def differences(self) -> list[str]:
@@ -49,12 +51,15 @@ def chosen(rows: Sequence[Row], most: int) -> list[Row]:
 
 
 def played_again(rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes) -> list[Episode]:
-    """Play the episodes of rows again, in processes."""
+    """Play the episodes of rows again, in processes. An interrupt does not wait for those that have not begun."""
     if not rows:
         return []
-    with make_executor(min(workers, len(rows))) as executor:
+    executor = make_executor(min(workers, len(rows)))
+    try:
         futures = [executor.submit(answer, _replay_of, row) for row in rows]
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 def config_of(row: Row) -> EpisodeConfig:

@@ -7,6 +7,7 @@ from typing import Any
 
 import altair as alt
 
+from care_sim.study.entries import counted
 from care_sim.study.factors import Place
 from care_sim.study.faults import FAULTS, PLACES, policies_of
 from care_sim.study.faults_figure import MEASURES, Measure
@@ -56,11 +57,11 @@ def _chart(played: Played, place: Place, measure: Measure) -> Chart:
     chart = layers.facet(
         facet=alt.Facet("fault:N", sort=faults, header=header), columns=5, data=inline(values)
     ).resolve_scale(x="independent")
-    seeds = len({row["seed"] for row in played.rows})
+    seeds = counted(len({row["seed"] for row in played.rows}), "seed")
     apart = "Marks of later policies are smaller, so that equal ones stay visible."
     hollow = "Hollow, at the bottom: the median is an actor that was not detected."
     return Chart(
-        f"{place}: {measure.label}, {seeds} seeds",
+        f"{place}: {measure.label}, {seeds}",
         f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a policy.",
         (apart, *([hollow] if any(value["value"] is None for value in values) else []), *played.notes(played.policies)),
         specification(chart.add_params(look.chosen)),

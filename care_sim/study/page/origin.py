@@ -81,13 +81,14 @@ def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def _unplayed(description: Mapping[str, Any], rows: Sequence[Row], kind: Kind) -> list[str]:
-    """What the configurations ask for and the rows do not hold."""
+    """What the configurations ask for and the rows do not hold; what failed is told as left out."""
     try:
         asked = sum(len(each.get("seeds", each.get("floor_seeds"))) for each in description.get("configurations", ()))
         asked *= len(description.get("scenes", "1"))
+        failed = len(description.get("failed", ()))
     except (AttributeError, TypeError):
         return [f"The configurations in {CONFIG} cannot be read."]
-    lacking = asked - len(rows)
+    lacking = asked - failed - len(rows)
     return [f"{lacking} of {asked} {kind.unit} are missing from {kind.file}."] if lacking > 0 else []
 
 

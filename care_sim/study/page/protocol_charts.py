@@ -6,7 +6,7 @@ from typing import Any
 import altair as alt
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.study.entries import MARKS, marked, percent, tag_notes
+from care_sim.study.entries import MARKS, counted, marked, percent, tag_notes
 from care_sim.study.levels_figure import APART, DODGE, SPREAD
 from care_sim.study.page.chart import FULL_SCAN, PANEL_WIDTH, Chart, Look, apart, budget_axis, inline, specification
 from care_sim.study.pareto_figure import Point, frontier, recalls
@@ -127,4 +127,4 @@ def _panel(budget: float) -> str:
 
 
 def _title(plays: Plays) -> str:
-    return f"{plays.setting.label}: {len(plays.scenes)} scenes"
+    return f"{plays.setting.label}: {counted(len(plays.scenes), 'scene')}"

@@ -28,7 +28,7 @@ from care_sim.world.world import Actor
 SECTORS = 128
 """Directions of the picture in which fired cells are counted, from azimuth -pi on."""
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
-"""A share of the cells of a sector is written as one digit, from none to all of them."""
+"""How full a sector is, is written as one digit, from none of its cells to all of them."""
 CENTI, MILLI = 100, 1000
 
 
@@ -79,7 +79,7 @@ class Recorder:
 
     def after(self, loop: ClosedLoop, frame: Keyframe) -> None:
         """Take down what a keyframe fired, and what there is after it."""
-        self.rays.append(shares(frame.fired, loop.rig.grid))
+        self.rays.append(fullness(frame.fired, loop.rig.grid))
         self._take(loop)
 
     def bodies(self) -> list[dict[str, Any]]:
@@ -126,11 +126,11 @@ class Recorder:
         return about | ({"pose": poses[0].tolist()} if still else {"poses": poses.tolist()})
 
 
-def shares(fired: Cells, grid: AngularGrid) -> str:
-    """The share of the cells of every sector that fire, a digit a sector."""
+def fullness(fired: Cells, grid: AngularGrid) -> str:
+    """How much of every sector fires, a digit a sector."""
     width = grid.columns // SECTORS
     counts = np.bincount(np.asarray(fired) % grid.columns // width, minlength=SECTORS)
-    return "".join(DIGITS[round(share)] for share in (counts / (width * grid.rows) * (len(DIGITS) - 1)).tolist())
+    return "".join(DIGITS[round(digit)] for digit in (counts / (width * grid.rows) * (len(DIGITS) - 1)).tolist())
 
 
 def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) -> list[list[int]]:

@@ -30,8 +30,10 @@ class Player {
   async show(number, beside, position) {
     this.stop();
     this.number = number;
+    const wish = (this.wish = Symbol());
     const chosen = [number, ...(beside === "" ? [] : [Number(beside)])].map((n) => this.reel.episodes[n]);
     const stories = await Promise.all(chosen.map((episode) => unpack(episode.story)));
+    if (wish !== this.wish) return; // another was chosen meanwhile
     this.part("views").replaceChildren();
     this.views = chosen.map((episode, n) => new View(this.part("views"), episode, this.reel.bodies[episode.bodies], stories[n]));
     this.last = Math.max(...this.views.map((view) => view.last));

@@ -98,7 +98,8 @@ class View {
 
   tale(episode) {
     const { in_view, found, brake, contact, distance, time } = this.story;
-    const when = (k) => `${(time[k] / 100).toFixed(1)} s (${(distance[k] / 100).toFixed(1)} m away)`;
+    const away = (k) => (distance[k] === null ? "" : ` (${(distance[k] / 100).toFixed(1)} m away)`);
+    const when = (k) => `${(time[k] / 100).toFixed(1)} s${away(k)}`;
     const tell = (flags, yes, no) => (flags.includes("1") ? `${yes} at ${when(flags.indexOf("1"))}` : no);
     const parts = [
       tell(in_view, "Comes into the camera's view", "Never in the camera's view"),
@@ -153,9 +154,10 @@ class View {
 
   sentence(k, frame, on) {
     const { time, speed, distance, contact } = this.story;
+    const now = `${(time[k] / 100).toFixed(1)} s, ${(speed[k] / 100).toFixed(1)} m/s`;
+    if (k === this.last) return `${now}.${contact !== null ? " Collision." : ""}`; // after the last keyframe
     const away = distance[frame] === null ? "" : `, actor ${(distance[frame] / 100).toFixed(1)} m away`;
     const state = on("found") ? "detected" : on("in_view") ? "in the camera's view, not detected" : "not in the camera's view, not detected";
-    const hit = contact !== null && k === this.last ? " Collision." : "";
-    return `${(time[k] / 100).toFixed(1)} s, ${(speed[k] / 100).toFixed(1)} m/s${away}: ${state}${on("brake") ? ", braking" : ""}.${hit}`;
+    return `${now}${away}: ${state}${on("brake") ? ", braking" : ""}.`;
   }
 }
