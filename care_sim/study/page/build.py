@@ -14,9 +14,9 @@ from markupsafe import Markup
 
 import care_sim
 from care_sim.extras import vega_bundle
+from care_sim.files import replacing
 from care_sim.study.entries import counted
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.files import replacing
 from care_sim.study.kinds import EPISODES
 from care_sim.study.page.budget_charts import budget_charts
 from care_sim.study.page.chart import Chart
