@@ -152,6 +152,15 @@ def test_a_row_with_another_outcome_is_not_identical_whatever_its_hash(replay):
     assert not edited.identical
 
 
+@pytest.fixture
+def interruptible():
+    """Also where the tests run in the background, with interrupts ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_does_not_wait_for_episodes_that_have_not_begun():
     rows, handed = [CONFIG.row() | {"scenario.duration_s": 0.2}] * 20, []
 
