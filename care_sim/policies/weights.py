@@ -91,7 +91,8 @@ class Weights:
         for name, value in needed.items():
             if getattr(card, name) != value:
                 has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
-                raise InvalidInput(f"weights {self.path}: {name} is {has}, needed is {wanted}")
+                hint = "; those trained with several budgets fit any" if name == "budget" else ""
+                raise InvalidInput(f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}")
 
     def array(self, name: str, *shape: int | None) -> NDArray[np.float32]:
         """An array by name; None in `shape` is any length. Raises InvalidInput for a missing one, or another shape."""

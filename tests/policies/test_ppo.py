@@ -155,16 +155,19 @@ def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budge
     assert distances[name] > distances["history"] + 2
 
 
-def test_what_was_learned_on_the_dense_street_is_a_place(tmp_path, env):
-    """With all pictures taken away it detects the person as early: what the results say of it."""
+def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env):
+    """What the results say of the shipped weights: without pictures as early, without the place nearly so."""
     weights = load(shipped("ppo-dense"))
-    unseeing = weights.arrays | {"window.weight": np.zeros_like(weights.arrays["window.weight"])}
-    save(tmp_path / "unseeing.npz", unseeing, weights.card)
+    paths = [shipped("ppo-dense")]
+    for name in ("window.weight", "place"):
+        paths.append(tmp_path / f"without-{name}.npz")
+        save(paths[-1], weights.arrays | {name: np.zeros_like(weights.arrays[name])}, weights.card)
     distances = []
-    for path in (shipped("ppo-dense"), tmp_path / "unseeing.npz"):
+    for path in paths:
         policy = care_sim.make_policy("ppo", env, path=path)
         distances.append(evaluate(env, lambda seen, _, policy=policy: policy(seen), range(3)).distance_m)
     assert distances[0] == distances[1] > 15
+    assert distances[2] > distances[0] - 1
 
 
 def test_it_is_no_policy_behind_wrappers_of_learners(env):
