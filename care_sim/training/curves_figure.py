@@ -45,9 +45,10 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     )
     trained = ", ".join(f"{budget:.3g}" for budget in config["budget"])
     axes.set_xlabel(
-        f"environment steps, trained at budget {trained}\n"
+        f"environment steps, in thousands\ntrained at budget {trained}\n"
         f"a point is the mean of {config['episodes']} validation episodes at {config['budget'][0]:.3g}"
     )
+    axes.xaxis.set_major_formatter(lambda steps, _: f"{steps / 1000:g}")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.92")
 

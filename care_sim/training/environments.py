@@ -19,7 +19,7 @@ from care_sim.training.seeds import TrainingSeeds
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
-ACTIONS = {"SectorReserve": SectorReserve, "SectorScores": SectorScores}
+ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
 
 
 def bare(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:

@@ -51,6 +51,8 @@ def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
     assert [line.get_ydata().tolist() for line in learned(alone)] == [[4, 10, 16]]
     assert learned(alone)[0].get_xdata().tolist() == [0, 100, 200]
     assert both.get_title(loc="left") == "ppo, CARE-Dense-v0, 2 training seeds"
+    figure.canvas.draw()
+    assert "0.1" in {label.get_text() for label in alone.get_xticklabels()}, "thousands of steps"
     assert {text.get_text() for text in both.texts} == {"random", "care", "full", "ppo"}
 
 
