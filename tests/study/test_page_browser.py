@@ -6,11 +6,14 @@ import re
 import shutil
 import zlib
 from concurrent.futures import ThreadPoolExecutor
+from io import BytesIO
 from pathlib import Path
 
 import made_plays
+import numpy as np
 import pytest
 from made_rows import CROWD, STUDY, row, rows
+from PIL import Image, ImageColor
 
 from care_sim.study import ablations, faults
 from care_sim.study.annotation import annotated, tagged
@@ -19,6 +22,7 @@ from care_sim.study.episode import run_episode
 from care_sim.study.page.build import write_page
 from care_sim.study.page.replay import packed
 from care_sim.study.rows import write_rows
+from care_sim.study.styles import styles
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="the browser tests need the PyPI package playwright")
 CHROMIUM = shutil.which("chromium")
@@ -235,6 +239,16 @@ def test_a_page_fits_a_phone_and_reads_in_any_light(scheme, opened, played):
     assert contrast(ink, paper) > 7
     quiet = page.evaluate("getComputedStyle(document.querySelector('.note')).color")
     assert contrast(quiet, paper) > 4.5
+
+
+def test_a_colour_names_the_same_policy_in_light_and_dark(opened, played):
+    colours = {name: drawn.colour for name, drawn in styles((name, ("causal",)) for name in ("history", "care")).items()}
+    for scheme in ("light", "dark"):
+        page = opened(played[0], READY, color_scheme=scheme)
+        picture = Image.open(BytesIO(page.locator(".plot[data-drawn]").first.screenshot())).convert("RGB")
+        shown = np.array(picture).reshape(-1, 3)
+        for policy, colour in colours.items():
+            assert (shown == ImageColor.getrgb(colour)).all(axis=1).sum() > 50, (scheme, policy)
 
 
 def test_everything_is_open_in_print(opened, played):
