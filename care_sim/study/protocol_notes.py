@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
+from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
 from care_sim.study.entries import percent
 from care_sim.study.gaps import Gap
 from care_sim.study.protocol_entries import OVER_EVENTS
@@ -28,7 +29,24 @@ def played(plays: Plays) -> str:
     seeds = {len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets}
     return (
         f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} object frames; "
-        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene."
+        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene.{_by_both_counts(plays, total.events)}"
+    )
+
+
+def _by_both_counts(plays: Plays, events: float) -> str:
+    """How many events there are by the other presence; of rows that do not tell nothing."""
+    counts = [row.get("emerging") for row in plays.scenes.values()]
+    if None in counts:
+        return ""
+    emerging = sum(counts)
+    if dict(plays.setting.conditions).get("presence") == VISIBLE:
+        return (
+            f" Of the events, {emerging:,} are of objects that were hidden within range at scene start, which "
+            f"presence {ANNOTATED} does not count."
+        )
+    return (
+        f" {emerging:,} objects that were hidden within range at scene start are no events; presence {VISIBLE} counts "
+        f"them too, {events + emerging:,.0f} in all."
     )
 
 
