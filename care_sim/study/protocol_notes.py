@@ -1,6 +1,6 @@
 """What stands under the protocol's tables: how much was played, what is missing, where the paper's numbers stand."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
@@ -29,24 +29,24 @@ def played(plays: Plays) -> str:
     seeds = {len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets}
     return (
         f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} object frames; "
-        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene.{_by_both_counts(plays, total.events)}"
+        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene.{by_both_counts(plays.scenes.values())}"
     )
 
 
-def _by_both_counts(plays: Plays, events: float) -> str:
-    """How many events there are by the other presence; of rows that do not tell nothing."""
-    counts = [row.get("emerging") for row in plays.scenes.values()]
-    if None in counts:
+def by_both_counts(scenes: Collection[Row]) -> str:
+    """How many events there are by the other presence, given one row of every scene; nothing where rows do not tell."""
+    counted = [row.get("emerging") for row in scenes]
+    if None in counted:
         return ""
-    emerging = sum(counts)
-    if dict(plays.setting.conditions).get("presence") == VISIBLE:
+    emerging = sum(counted)
+    if any(row.get("presence") == VISIBLE for row in scenes):
         return (
             f" Of the events, {emerging:,} are of objects that were hidden within range at scene start, which "
             f"presence {ANNOTATED} does not count."
         )
     return (
-        f" {emerging:,} objects that were hidden within range at scene start are no events; presence {VISIBLE} counts "
-        f"them too, {events + emerging:,.0f} in all."
+        f" {_several(emerging, 'object')} hidden within range at scene start {'is' if emerging == 1 else 'are'} no "
+        f"event; presence {VISIBLE} counts them too, {counts(scenes).events + emerging:,.0f} in all."
     )
 
 

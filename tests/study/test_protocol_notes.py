@@ -93,10 +93,12 @@ def test_the_notes_tell_the_events_by_both_counts_where_the_rows_do():
 
     assert note().endswith("6 scenes, 120 events, 1,200 object frames; 3 floor seeds, averaged per scene.")
     assert note(emerging=2).endswith(
-        "averaged per scene. 12 objects that were hidden within range at scene start are no events; presence visible "
-        "counts them too, 132 in all."
+        "averaged per scene. 12 objects hidden within range at scene start are no event; presence visible counts them "
+        "too, 132 in all."
     )
     assert note(emerging=2, presence="visible").endswith(
         "averaged per scene. Of the events, 12 are of objects that were hidden within range at scene start, which "
         "presence annotated does not count."
     )
+    alone = protocol_closing([play("a", "full", [0], [1], emerging=1)])
+    assert "1 object hidden within range at scene start is no event" in alone[0]
