@@ -32,6 +32,9 @@ class Annotations:
         return len(self.objects)
 
 
+NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 7)))
+
+
 @dataclass(frozen=True)
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points` (P, 3) in the
@@ -78,10 +81,15 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between keyframes."""
+    """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between keyframes.
+
+    `hidden` are the objects that its source annotates at the first keyframe though no sensor tells of them there:
+    neither a return nor a pixel. No shot annotates them, so nobody has to find them; they were present all the same.
+    """
 
     name: str
     cameras: tuple[PinholeCamera, ...]
     sensor_height_m: float
     keyframe_s: float
     shots: tuple[Shot, ...]
+    hidden: Annotations = NO_ANNOTATIONS

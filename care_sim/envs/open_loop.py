@@ -15,7 +15,7 @@ from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
 from care_sim.errors import InvalidInput
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import Score
-from care_sim.evaluation.sightings import Sightings
+from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.film import Film
 from care_sim.openloop import Exposure, OpenLoop
 from care_sim.perception.registry import PROXY, make_detector
@@ -50,7 +50,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     ### Arguments
     `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `detector` by name
-    (`care_sim.perception.registry.detector_names`) and `detector_parameters`; any field of
+    (`care_sim.perception.registry.detector_names`) and `detector_parameters`; `presence` "annotated" or "visible", who
+    is present at scene start and so never a first sighting (`care_sim.evaluation.sightings`); any field of
     `care_sim.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the
     cameras' mount, the engine. `min_returns` is the `returns` detector's. A value that is not allowed raises
     `care_sim.InvalidInput`.
@@ -67,6 +68,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         budget: float = 0.10,
         detector: str = PROXY,
         detector_parameters: Mapping[str, object] | None = None,
+        presence: str = ANNOTATED,
         render_mode: str | None = None,
         **parameters: Any,
     ):
@@ -75,6 +77,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         for name in UNFILMED:
             if name in parameters:
                 raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
+        check_presence(presence)
         conditions = conditions_of(parameters)
         if parameters:
             raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
@@ -85,6 +88,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
         self.render_mode = render_mode
+        self.presence = presence
         self.exposures: list[Exposure] = []
         self._masks: list[matching.Mask] = []
 
@@ -99,7 +103,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """
         entropy = seed, crc32(film.name.encode())
         camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(4)
-        self._sightings = _sightings(film)
+        self._sightings = _sightings(film, self.presence)
         self.exposures, self._masks = [], []
         loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._detector)
         return self.begin(loop, floor), {"seed": seed, "scene": film.name}
@@ -150,8 +154,8 @@ class FilmEnv(OpenLoopEnv):
 
 
 @lru_cache(maxsize=1)
-def _sightings(film: Film) -> Sightings:
-    return Sightings.of(film.name, [shot.annotations for shot in film.shots])
+def _sightings(film: Film, presence: str) -> Sightings:
+    return Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden, presence=presence)
 
 
 class StreetEnv(OpenLoopEnv):

@@ -5,7 +5,8 @@ and the taxonomy are those of its Sensor Dataset guide. A log folder needs `city
 `annotations*.feather`; its sensor recordings are not used.
 
 Boxes without a recorded LiDAR point inside are left out, as the official evaluation leaves them out: nobody saw
-those objects there. Static surroundings are not annotated, so only what is annotated occludes.
+those objects there. Those of the first keyframe are in `Film.hidden`, since the objects were present. Static
+surroundings are not annotated, so only what is annotated occludes.
 """
 
 from pathlib import Path
@@ -32,7 +33,7 @@ from care_sim.sources.argoverse2_tables import (
 )
 from care_sim.sources.feather import Columns
 from care_sim.sources.motion import motions
-from care_sim.sources.staging import Prop, shoot
+from care_sim.sources.staging import Prop, annotations_of, shoot
 
 UP_LIDAR = (1.35, 0.0, 1.64)
 """Metres in the car's frame: `up_lidar` in the calibration of the Sensor Dataset guide."""
@@ -77,9 +78,11 @@ def film(log: Path, grid: AngularGrid | None = None) -> Film:
     grid, shots = grid or AngularGrid(), []
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
-        seen = shoot(_props(boxes, moments[row]), sensor, SENSOR_HEIGHT_M, grid)
+        seen = shoot(_props(_rows(boxes, moments[row], seen=True)), sensor, SENSOR_HEIGHT_M, grid)
         shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
-    return Film(log.name, SURROUND_CAMERAS, SENSOR_HEIGHT_M, KEYFRAME_S, tuple(shots))
+    unseen = _props(_rows(boxes, keyframes[0], seen=False))
+    hidden = annotations_of([prop for prop in unseen if prop.label is not None])
+    return Film(log.name, SURROUND_CAMERAS, SENSOR_HEIGHT_M, KEYFRAME_S, tuple(shots), hidden)
 
 
 def _is_log(path: Path) -> bool:
@@ -110,11 +113,16 @@ def _car_frames(poses: Columns, moments: Cells) -> list[Frame]:
     return [Frame.turned_by(turn, place) for turn, place in zip(turns, places - places[0], strict=True)]
 
 
-def _props(boxes: Columns, sweep: int) -> list[Prop]:
-    """What was seen in a sweep; the sensor's axes are the car's."""
-    seen = (boxes["timestamp_ns"] == sweep) & (boxes["num_interior_pts"] > 0)
-    numbers, labels = boxes["number"][seen].tolist(), [CATEGORIES[name] for name in boxes["category"][seen].tolist()]
-    sizes = [tuple(size) for size in table(boxes, SIZE)[seen].tolist()]
-    places, turns = table(boxes, PLACE)[seen] - UP_LIDAR, table(boxes, TURN)[seen]
+def _rows(boxes: Columns, sweep: int, seen: bool) -> Columns:
+    """The boxes of a sweep that a point was recorded in, or those that none was."""
+    kept = (boxes["timestamp_ns"] == sweep) & ((boxes["num_interior_pts"] > 0) == seen)
+    return {name: column[kept] for name, column in boxes.items()}
+
+
+def _props(boxes: Columns) -> list[Prop]:
+    """The boxes as bodies; the sensor's axes are the car's."""
+    numbers, labels = boxes["number"].tolist(), [CATEGORIES[name] for name in boxes["category"].tolist()]
+    sizes = [tuple(size) for size in table(boxes, SIZE).tolist()]
+    places, turns = table(boxes, PLACE) - UP_LIDAR, table(boxes, TURN)
     frames = [Frame.turned_by(Rotation.from_quat(turn), place) for turn, place in zip(turns, places, strict=True)]
     return [Prop(*values) for values in zip(numbers, labels, sizes, frames, strict=True)]

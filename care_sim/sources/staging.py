@@ -52,7 +52,7 @@ def shoot(
     plane in the world would bury what stands where they fall.
     """
     reported = [prop for prop in props if prop.label is not None]
-    annotations = _annotations(reported)
+    annotations = annotations_of(reported)
     with closing(BulletWorld(ground=False)) as world:
         bodies = {id(prop): _add(world, prop, sensor) for prop in props}
         numbers = {bodies[id(prop)]: prop.number for prop in reported}
@@ -63,7 +63,8 @@ def shoot(
     return annotations, sights, Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
 
 
-def _annotations(props: Sequence[Prop]) -> Annotations:
+def annotations_of(props: Sequence[Prop]) -> Annotations:
+    """The annotations of `props`, all of the five classes."""
     boxes = _table([prop.box for prop in props])
     classes = [CLASSES.index(str(prop.label)) for prop in props]
     numbers = [prop.number for prop in props]

@@ -28,13 +28,14 @@ def record(
     """The film of a street. `Cloud.objects` and `Annotations.objects` are the columns of `street.poses`.
 
     An object is annotated at a keyframe where a return of the full sweep lies on it or a camera shows it: nuScenes
-    annotates what has at least one LiDAR or radar point, and nobody could have seen what is wholly hidden.
+    scores what has at least one LiDAR or radar point, and nobody could have seen what is wholly hidden. The street
+    knows what is wholly hidden as well: who is so at its first keyframe is in `Film.hidden`.
     """
     grid = grid or AngularGrid()
     with closing(BulletWorld()) as world:
         stage = _Stage(street, world)
-        shots = tuple(stage.shot(k, grid, cameras) for k in range(len(street.ego)))
-    return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots)
+        shots, hidden = zip(*(stage.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True)
+    return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots, hidden[0])
 
 
 @lru_cache(maxsize=1)
@@ -53,8 +54,8 @@ class _Stage:
         self._classes = np.array([NOBODY if label is None else CLASSES.index(label) for label in labels])
         self._bodies: dict[int, int] = {}
 
-    def shot(self, keyframe: int, grid: AngularGrid, cameras: tuple[PinholeCamera, ...]) -> Shot:
-        """Everything that can be seen at a keyframe."""
+    def shot(self, keyframe: int, grid: AngularGrid, cameras: tuple[PinholeCamera, ...]) -> tuple[Shot, Annotations]:
+        """Everything that can be seen at a keyframe, and who is near and cannot."""
         street = self._street
         x, y, yaw = street.ego[keyframe].tolist()
         sensor = Frame.mounted((x, y, yaw), LIDAR_POSITION)
@@ -69,9 +70,11 @@ class _Stage:
         sights = Sights(seen.detections, numbers_of(seen.objects, numbers))
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
         shown = np.isin(labelled, np.concatenate([cloud.objects, sights.objects]))
-        annotations = Annotations(labelled[shown], self._classes[labelled[shown]], boxes[shown])
-        token = f"{street.name}/{keyframe:02d}"
-        return Shot(keyframe * KEYFRAME_S, token, sensor, street.motion[keyframe], annotations, sights, cloud)
+        annotations, hidden = (
+            Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept]) for kept in (shown, ~shown)
+        )
+        token, motion = f"{street.name}/{keyframe:02d}", street.motion[keyframe]
+        return Shot(keyframe * KEYFRAME_S, token, sensor, motion, annotations, sights, cloud), hidden
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Cells:
         """Put every body that is near where it is now; returns their numbers, ascending."""

@@ -10,6 +10,7 @@ import gymnasium
 from care_sim.conditions import DEFAULTS, Conditions
 from care_sim.envs.open_loop import UNFILMED, FilmEnv
 from care_sim.errors import InvalidInput
+from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.film import Film
 from care_sim.perception.registry import PROXY
 from care_sim.study.provenance import detector_digest
@@ -21,7 +22,8 @@ _FILMED = [name for name in CONDITIONS if name not in UNFILMED]
 
 @dataclass(frozen=True)
 class PlayConfig(Conditions, Task):
-    """Everything that decides a play: the scene of a source, the policy, the detector, the conditions.
+    """Everything that decides a play: the scene of a source, the policy, the detector, who counts as present at scene
+    start (`care_sim.evaluation.sightings`), the conditions.
 
     Raises InvalidInput for anything that environment, detector or policy does not accept; whether the scene can be
     read shows when it is played.
@@ -34,6 +36,7 @@ class PlayConfig(Conditions, Task):
     detector: str = PROXY
     detector_parameters: Parameters = ()
     policy_parameters: Parameters = ()
+    presence: str = ANNOTATED
 
     def __post_init__(self) -> None:
         self.settle("detector_parameters", "policy_parameters")
@@ -53,10 +56,13 @@ class PlayConfig(Conditions, Task):
         return FilmEnv(film, **self._arguments())
 
     def row(self) -> Row:
-        """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`."""
+        """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`. `presence` is a
+        column where it is not the rule.
+        """
         plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
         own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
-        return self.source.row(self.scene) | {"scene": self.scene.name} | plain | own
+        other = {} if self.presence == ANNOTATED else {"presence": self.presence}
+        return self.source.row(self.scene) | {"scene": self.scene.name} | plain | other | own
 
     def installed(self) -> list[str | None]:
         """Of the detector too, and of the files that it is given."""
@@ -91,8 +97,8 @@ class PlayConfig(Conditions, Task):
 
     def _arguments(self) -> dict[str, Any]:
         conditions = {name: getattr(self, name) for name in _FILMED}
-        parameters = dict(self.detector_parameters)
-        return {"budget": self.budget, "detector": self.detector, "detector_parameters": parameters} | conditions
+        own = {name: getattr(self, name) for name in ("budget", "detector", "presence")}
+        return own | {"detector_parameters": dict(self.detector_parameters)} | conditions
 
 
 PLAY_FIELDS = ["source", "scene", "policy", "budget", "detector", *_FILMED]

@@ -71,7 +71,8 @@ class PlayedScene:
 
         Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the same film was
         played, and `episode_hash`, over what was fired and detected; the fields of `Tally`, those of every stratum as
-        `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the events; `tracks` and `explained`;
+        `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the events; `emerging`, by how many events the two presences
+        differ (`care_sim.evaluation.sightings`); `tracks` and `explained`;
         `differing_keyframes` and `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s`
         with the share of the film's that falls to one of so many plays.
         """
@@ -88,6 +89,7 @@ class PlayedScene:
             **_strata(score),
             "ttfds": tuple(score.delays.tolist()),
             "sightings": _sightings(score),
+            "emerging": len(score.sightings.emerging),
             "tracks": playback.tracks,
             "explained": playback.explained,
             **self._difference(config, playback),

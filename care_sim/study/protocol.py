@@ -36,6 +36,9 @@ class Protocol(Running, PlayOptions):
     """So many random floors, over which the tallies of a scene are averaged."""
     camera_latencies: tuple[int, ...] = ()
     """Several of --camera-latency, in turn; 1 is the paper's strict-causal variant."""
+    presence: str = "annotated"
+    """Who is present at scene start, and so never a first sighting: whoever is `annotated` there (the paper's rule), or
+    only who is `visible`, so that somebody who then stands hidden counts when it shows itself."""
     out: Path = Path("runs/protocol")
     """Folder of the results; an interrupted run goes on there."""
 
@@ -48,7 +51,7 @@ class Protocol(Running, PlayOptions):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis} needs at least one value")
         check_whole("floor_seeds", self.floor_seeds, 1)
-        source, common = self.scene_source(), self.common()
+        source, common = self.scene_source(), self.common() | {"presence": self.presence}
         scenes = chosen(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)
         first = common.pop("floor_seed")

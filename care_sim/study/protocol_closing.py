@@ -7,7 +7,7 @@ from care_sim.study.contrasts import GATE_POINTS
 from care_sim.study.entries import percent
 from care_sim.study.gaps import Gap, Pair
 from care_sim.study.protocol_entries import whole
-from care_sim.study.protocol_notes import counts, on_intervals
+from care_sim.study.protocol_notes import by_both_counts, counts, on_intervals
 from care_sim.study.protocol_paper import BUDGETS, GATE
 from care_sim.study.protocol_rows import HISTORY, Plays, Setting, plays_of
 from care_sim.study.task import REFERENCE, Row
@@ -25,7 +25,7 @@ def _size(rows: Sequence[Row]) -> str:
     total, keyframes = counts(scenes.values()), sum(row["keyframes"] for row in scenes.values())
     return (
         f"Scenes: {len(scenes):,}, with {total.events:,.0f} first sightings and {total.frames:,.0f} object frames in "
-        f"{keyframes:,} keyframes; plays: {len(rows):,}."
+        f"{keyframes:,} keyframes; plays: {len(rows):,}.{by_both_counts(scenes.values())}"
     )
 
 

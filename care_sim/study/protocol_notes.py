@@ -1,9 +1,10 @@
 """What stands under the protocol's tables: how much was played, what is missing, where the paper's numbers stand."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
+from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
 from care_sim.study.entries import percent
 from care_sim.study.gaps import Gap
 from care_sim.study.protocol_entries import OVER_EVENTS
@@ -28,7 +29,24 @@ def played(plays: Plays) -> str:
     seeds = {len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets}
     return (
         f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} object frames; "
-        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene."
+        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene.{by_both_counts(plays.scenes.values())}"
+    )
+
+
+def by_both_counts(scenes: Collection[Row]) -> str:
+    """How many events there are by the other presence, given one row of every scene; nothing where rows do not tell."""
+    counted = [row.get("emerging") for row in scenes]
+    if None in counted:
+        return ""
+    emerging = sum(counted)
+    if any(row.get("presence") == VISIBLE for row in scenes):
+        return (
+            f" Of the events, {emerging:,} are of objects that were hidden within range at scene start, which "
+            f"presence {ANNOTATED} does not count."
+        )
+    return (
+        f" {_several(emerging, 'object')} hidden within range at scene start {'is' if emerging == 1 else 'are'} no "
+        f"event; presence {VISIBLE} counts them too, {counts(scenes).events + emerging:,.0f} in all."
     )
 
 

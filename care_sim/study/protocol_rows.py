@@ -11,6 +11,7 @@ from care_sim.errors import InvalidInput
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged, level
+from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.evaluation.strata import thirds
 from care_sim.frames import Floats
 from care_sim.perception.registry import PROXY
@@ -20,7 +21,10 @@ from care_sim.study.task import FULL, REFERENCE, Row
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 HISTORY = "history"
 """The policy that every other is held against."""
-_USUAL = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {"camera_detections": None}
+_USUAL = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {
+    "camera_detections": None,
+    "presence": ANNOTATED,
+}
 _COLUMNS = tuple(field.name for field in fields(Tally))
 
 

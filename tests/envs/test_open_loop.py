@@ -6,6 +6,7 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
+from av2_log import at, box, write
 from gymnasium.utils.env_checker import check_env
 
 import care_sim
@@ -97,7 +98,7 @@ def test_the_score_is_that_of_what_the_detector_reported(make):
     env = make(budget=0.2)
     played(env, "history")
     film, exposures = env.unwrapped.loop.film, env.unwrapped.exposures
-    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots])
+    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden)
     again = score(sightings, [exposure.detections for exposure in exposures])
     assert again.tally() == env.unwrapped.score.tally()
     assert again.event_rows() == env.unwrapped.score.event_rows()
@@ -111,6 +112,25 @@ def test_the_person_at_the_house_is_the_one_event_and_the_camera_finds_it(replay
     assert {outcome["events"] for outcome in outcomes.values()} == {1.0}
     assert [outcomes[policy]["sighted"] for policy in ("history", "care", "full")] == [0.0, 1.0, 1.0]
     assert outcomes["history"]["delay"] > outcomes["care"]["delay"] == 0
+
+
+def test_who_waits_hidden_from_the_start_is_an_event_by_presence_visible_alone(tmp_path):
+    """A person is annotated behind a van from the first sweep on, without a point until it walks out at the fifth."""
+    van = box("BOX_TRUCK", (20.0, -4.0, 0.9), (6.0, 2.2, 2.6), track="van")
+    waits = [box("PEDESTRIAN", (20.0, -7.0, 0.6), (0.6, 0.7, 1.8), track="p", points=0)] * 5
+    walks = [box("PEDESTRIAN", (14.0, -3.0, 0.6), (0.6, 0.7, 1.8), track="p")] * 6
+    log = write(tmp_path / "log", [[van, person] for person in (*waits, *walks)], [at()] * 11)
+    outcomes = {}
+    for presence in ("annotated", "visible"):
+        env = gymnasium.make("CARE-Replay-v0", source=f"argoverse2:{log}", presence=presence, budget=1.0)
+        infos, rewards = played(env, "full")
+        outcomes[presence] = infos[-1]["outcome"]
+        assert rewards == [0.0] * 3, "what is scored is the same"
+    assert outcomes["annotated"]["events"] == 0.0
+    assert (outcomes["visible"]["events"], outcomes["visible"]["sighted"]) == (1.0, 1.0)
+    assert {outcome["frames"] for outcome in outcomes.values()} == {5.0}
+    with pytest.raises(InvalidInput, match="presence must be 'annotated' or 'visible', got 'seen'"):
+        gymnasium.make("CARE-Replay-v0", source=f"argoverse2:{log}", presence="seen")
 
 
 def test_only_fired_cells_return(replay):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.errors import InvalidInput
-from care_sim.evaluation.sightings import Sightings
+from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings
 from care_sim.film import Annotations
 from care_sim.frames import turned
 from care_sim.types import CLASSES
@@ -52,6 +52,47 @@ def path(shown):
 )
 def test_when_an_object_is_first_sighted(path, distances, keyframe):
     assert events(path(*distances)) == ([] if keyframe is None else [(keyframe, 7)])
+
+
+@pytest.mark.parametrize(
+    ("hidden_at", "distances", "annotated", "visible", "emerging"),
+    [
+        pytest.param(20, (None, None, 15), None, 2, 1, id="behind a van from the start, walks out"),
+        pytest.param(20, (None, 60, 15), None, 2, 1, id="hidden within range, shown beyond it, enters by range"),
+        pytest.param(50.0, (None, 40), None, 1, 1, id="hidden at the range at start"),
+        pytest.param(50.01, (None, 40), 1, 1, 0, id="hidden just beyond the range at start"),
+        pytest.param(60, (None, None, 40), 2, 2, 0, id="hidden and beyond range, enters by range"),
+        pytest.param(20, (None, None, None), None, None, 0, id="hidden to the end"),
+        pytest.param(20, (None, 70, 60), None, None, 0, id="hidden within range, shown beyond it alone"),
+    ],
+)
+def test_who_is_annotated_at_the_start_is_present_though_nothing_shows_it(
+    shown, hidden_at, distances, annotated, visible, emerging
+):
+    keyframes = [shown() if x is None else shown((7, "pedestrian", x, 0.0)) for x in distances]
+    hidden = shown((7, "pedestrian", hidden_at, 0.0))
+    by_rule = Sightings.of("path", keyframes, hidden=hidden)
+    by_sight = Sightings.of("path", keyframes, hidden=hidden, presence=VISIBLE)
+    assert events(by_rule) == ([] if annotated is None else [(annotated, 7)])
+    assert events(by_sight) == ([] if visible is None else [(visible, 7)])
+    assert len(by_rule.emerging) == len(by_sight.emerging) == emerging
+    assert by_rule.frames.keyframes.tolist() == by_sight.frames.keyframes.tolist(), "what is scored is the same"
+
+
+def test_who_was_hidden_is_told_from_who_was_not(shown):
+    keyframes = [shown((1, "car", 9, 0)), shown((3, "car", 5, 5), (1, "car", 8, 0), (2, "pedestrian", 6, 0))]
+    scene = Sightings.of("two", keyframes, hidden=shown((2, "pedestrian", 7, 3)))
+    assert events(scene) == [(1, 3)]
+    assert scene.appearing(1).tolist() == [True, False, False]
+    assert scene.frames.objects[scene.emerging].tolist() == [2]
+
+
+def test_an_object_cannot_be_hidden_and_seen_at_once_nor_a_presence_made_up(shown):
+    with pytest.raises(InvalidInput, match="scene both, keyframe 0: object 4 is annotated more than once"):
+        Sightings.of("both", [shown((4, "car", 9, 0))], hidden=shown((4, "car", 9, 0)))
+    for other in ("seen", None, [ANNOTATED]):
+        with pytest.raises(InvalidInput, match="presence must be 'annotated' or 'visible', got"):
+            Sightings.of("any", [shown()], presence=other)
 
 
 def test_which_annotations_of_a_keyframe_are_first_sightings(shown):
@@ -136,3 +177,22 @@ def test_neither_the_order_of_objects_nor_a_turn_of_the_sensor_changes_the_event
     before, after = Sightings.of("a", keyframes), Sightings.of("b", changed)
     assert sorted(events(before)) == sorted(events(after))
     assert np.sort(before.frames.ranges) == pytest.approx(np.sort(after.frames.ranges))
+
+
+@given(SEEDS)
+def test_with_nobody_hidden_the_two_presences_agree_and_hiding_takes_events_alone_away(street, seed):
+    keyframes = street(seed)
+    plain = events(Sightings.of("any", keyframes))
+    assert events(Sightings.of("any", keyframes, presence=VISIBLE)) == plain
+    later = keyframes[1:]
+    hidden = keyframes[0]
+    by_rule, by_sight = (
+        Sightings.of("any", later, hidden=_without(hidden, later[0]), presence=p) for p in (ANNOTATED, VISIBLE)
+    )
+    assert set(events(by_rule)) <= set(events(by_sight)) == set(events(Sightings.of("any", later)))
+    assert len(by_sight.events) - len(by_rule.events) == len(by_rule.emerging)
+
+
+def _without(annotations, others):
+    kept = ~np.isin(annotations.objects, others.objects)
+    return Annotations(annotations.objects[kept], annotations.classes[kept], annotations.boxes[kept])

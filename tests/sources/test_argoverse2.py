@@ -89,6 +89,21 @@ def test_the_recording_car_and_boxes_without_a_point_are_left_out(tmp_path):
     assert not np.any(shot.cloud.points[:, 1] == pytest.approx(11.0, abs=1e-6))
 
 
+def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
+    waiting = box("PEDESTRIAN", (12.0, 5.0, 0.6), (0.6, 0.7, 1.8), track="w", points=0)
+    trailer = box("VEHICULAR_TRAILER", (20.0, -6.0, 1.17), (1.0, 8.0, 3.0), points=0)
+    late = box("REGULAR_VEHICLE", (0.0, 12.0, 0.42), track="late", points=0)
+    sweeps = [[CAR_AHEAD, waiting, trailer], *([[CAR_AHEAD, late]] * 4), [CAR_AHEAD, waiting | {"num_interior_pts": 3}]]
+    movie = film(write(tmp_path, sweeps, [at()] * 6))
+    assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
+    assert [CLASSES[n] for n in movie.hidden.classes] == ["pedestrian"]
+    assert (
+        movie.hidden.objects.tolist()
+        == np.setdiff1d(movie.shots[1].annotations.objects, movie.shots[0].annotations.objects).tolist()
+    )
+    assert movie.hidden.boxes[0, :2] == pytest.approx(np.subtract((12.0, 5.0), UP_LIDAR[:2]))
+
+
 def test_a_keyframe_in_which_nobody_is_seen_shows_the_road_alone(tmp_path):
     (shot,) = film(parked(tmp_path, CAR_AHEAD | {"num_interior_pts": 0})).shots
     assert (len(shot.annotations), len(shot.sights.objects)) == (0, 0)

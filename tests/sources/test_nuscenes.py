@@ -144,6 +144,19 @@ def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
     assert len(shot.annotations) == 1
 
 
+def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
+    waiting, seen = (
+        annotated("human.pedestrian.adult", (30.0, 4.0, 0.9), (0.7, 0.7, 1.8), instance="w", points=n) for n in (0, 5)
+    )
+    trailer = annotated("vehicle.trailer", (30, 0, 2), points=0)
+    samples = [([CAR, waiting, trailer], pose(), as_recorded(WORLD)), ([CAR, seen], pose(4.0), as_recorded(WORLD))]
+    movie = first(database(tmp_path, samples))
+    assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
+    assert movie.hidden.objects.tolist() == [number for number in movie.shots[1].annotations.objects if number]
+    world = movie.shots[0].sensor.boxes_to_world(movie.hidden.boxes)
+    assert world[0, :3] == pytest.approx([30.0, 4.0, 0.9])
+
+
 def test_the_validation_split_holds_the_150_scenes_of_the_devkit():
     assert len(VAL) == len(set(VAL)) == 150
     assert {VAL[0], VAL[-1], "scene-0103", "scene-0916"} <= set(VAL)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from care_sim.evaluation.sightings import Sightings
 from care_sim.film import NOBODY
 from care_sim.grid import AngularGrid
 from care_sim.sensors.camera import FULL_CONFIDENCE, MIN_PIXELS
@@ -139,6 +140,20 @@ def test_a_person_behind_a_house_is_not_annotated_until_it_steps_out():
     assert shot.annotations.objects.tolist() == [1]
     assert CLASSES[shot.annotations.classes[0]] == "pedestrian"
     assert set(shot.cloud.objects.tolist()) == {NOBODY, 1}
+
+
+def test_who_stands_hidden_at_the_first_keyframe_was_present_and_is_annotated_nowhere_until_it_shows():
+    house, waiting = ("building", 20.0, 10.0), ("pedestrian", 20.0, 16.0)
+    street = standing_street(house, waiting, ("car", 15.0, -5.0), ("pedestrian", 90.0, 0.0), keyframes=2)
+    street.poses[1, 1, 1] = 4.0
+    film = record(street)
+    assert film.hidden.objects.tolist() == [1]
+    assert CLASSES[film.hidden.classes[0]] == "pedestrian"
+    assert film.hidden.boxes[0, :2] == pytest.approx((20.0 - LIDAR_POSITION[0], 16.0))
+    assert [shot.annotations.objects.tolist() for shot in film.shots] == [[2], [1, 2]]
+    shots = [shot.annotations for shot in film.shots]
+    assert len(Sightings.of(film.name, shots, hidden=film.hidden).events) == 0
+    assert len(Sightings.of(film.name, shots, hidden=film.hidden, presence="visible").events) == 1
 
 
 def test_a_car_beyond_the_lidar_is_annotated_where_a_camera_shows_it():

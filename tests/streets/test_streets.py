@@ -174,7 +174,7 @@ def test_what_a_dozen_scenes_hold_lies_where_the_sources_put_it():
 def test_a_scene_has_about_as_many_entries_as_one_of_nuscenes(seed):
     """There 28 events a scene and 24 annotations of the five classes a keyframe, of any range."""
     film = record(make_street(seed))
-    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots])
+    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden)
     assert len(film.shots) == 40
     assert 28 / 3 < len(sightings.events) < 28 * 3
     assert 24 / 3 < len(sightings.frames) / 40 < 24 * 2

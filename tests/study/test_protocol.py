@@ -17,6 +17,7 @@ from care_sim.study import plays
 from care_sim.study.journal import Journal
 from care_sim.study.kinds import PLAYS
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
+from care_sim.study.protocol_rows import plays_of
 from care_sim.study.report import JOURNAL, conduct, reported
 from care_sim.study.runner import run_all
 from care_sim.study.scenes import Scene, Streets, chosen, source_of
@@ -114,6 +115,28 @@ def test_the_row_names_every_condition_and_the_label_what_departs(source):
         replace(config, detector="yolo")
     with pytest.raises(InvalidInput, match="k_safe"):
         replace(config, policy="care")
+
+
+def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rule(tmp_path):
+    van = box("BOX_TRUCK", (20.0, -4.0, 0.9), (6.0, 2.2, 2.6), track="van")
+    person = box("PEDESTRIAN", (14.0, 3.0, 0.6), (0.6, 0.7, 1.8), track="p", points=0)
+    write(tmp_path / "a", [[van, person]] * 5 + [[van, person | {"num_interior_pts": 4}]], [at()] * 6)
+    source = source_of(f"argoverse2:{tmp_path}")
+    rule, sight = (small(source, ["full"], presence=presence)[0] for presence in ("annotated", "visible"))
+    assert rule.digest() != sight.digest()
+    assert "presence" not in rule.row()
+    assert (sight.row()["presence"], sight.label) == ("visible", "a full 1 presence=visible")
+    by_rule, by_sight = attempted([rule, sight])
+    assert (by_rule["events"], by_rule["emerging"], by_rule["ttfds"]) == (0.0, 1, ())
+    assert (by_sight["events"], by_sight["emerging"], by_sight["ttfds"]) == (1.0, 1, (0,))
+    assert by_rule["episode_hash"] == by_sight["episode_hash"]
+    assert (by_rule["frames"], by_rule["found"]) == (by_sight["frames"], by_sight["found"]) == (3.0, 3.0)
+    assert [plays_of([row])[0].setting.label for row in (by_rule, by_sight)] == [
+        "Argoverse 2, detector returns",
+        "Argoverse 2, detector returns, presence visible",
+    ]
+    with pytest.raises(InvalidInput, match="presence must be 'annotated' or 'visible', got 'seen'"):
+        replace(rule, presence="seen")
 
 
 def test_a_damaged_scene_is_named_left_out_and_the_rest_goes_on(source, tmp_path, folder):

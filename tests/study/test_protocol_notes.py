@@ -84,3 +84,21 @@ def test_the_mark_is_in_all_three_forms(tmp_path, capsys):
         assert plain(BY_EVENTS) in " ".join(text.split())
     assert "]°** |" in markdown
     assert r"]\textdegree{}} \\" in latex
+
+
+def test_the_notes_tell_the_events_by_both_counts_where_the_rows_do():
+    def note(**more):
+        rows = study({"care": (5, 5), "history": (4, 5)}, scenes=6, events=20, **more)
+        return next(note for note in tables(rows)[CONTRASTS].notes if "events" in note)
+
+    assert note().endswith("6 scenes, 120 events, 1,200 object frames; 3 floor seeds, averaged per scene.")
+    assert note(emerging=2).endswith(
+        "averaged per scene. 12 objects hidden within range at scene start are no event; presence visible counts them "
+        "too, 132 in all."
+    )
+    assert note(emerging=2, presence="visible").endswith(
+        "averaged per scene. Of the events, 12 are of objects that were hidden within range at scene start, which "
+        "presence annotated does not count."
+    )
+    alone = protocol_closing([play("a", "full", [0], [1], emerging=1)])
+    assert "1 object hidden within range at scene start is no event" in alone[0]

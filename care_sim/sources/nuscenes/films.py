@@ -1,8 +1,8 @@
 """nuScenes scenes as films: recorded sweeps, annotations of the 2 Hz keyframes, six recorded cameras.
 
-Boxes without a LiDAR or radar point inside are left out, as the official evaluation leaves them out. The car's motion
-is that of the keyframes' poses. The cameras' pictures are taken within 50 ms of the sweep; the way that the car drives
-meanwhile is neglected.
+Boxes without a LiDAR or radar point inside are left out, as the official evaluation leaves them out; those of the first
+keyframe are in `Film.hidden`, since the objects were present. The car's motion is that of the keyframes' poses. The
+cameras' pictures are taken within 50 ms of the sweep; the way that the car drives meanwhile is neglected.
 """
 
 from dataclasses import dataclass
@@ -53,7 +53,8 @@ def film(
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
     egos = motions(times, cars)
     shots = tuple(stage.shot(*moment) for moment in zip(samples, data, times.tolist(), cars, egos, strict=True))
-    return Film(scene["name"], tuple(camera.pinhole for camera in stage.cameras), stage.lidar.z, KEYFRAME_S, shots)
+    cameras, hidden = tuple(camera.pinhole for camera in stage.cameras), stage.hidden(samples[0], cars[0])
+    return Film(scene["name"], cameras, stage.lidar.z, KEYFRAME_S, shots, hidden)
 
 
 @dataclass(frozen=True)
@@ -69,12 +70,22 @@ class _Stage:
 
     def shot(self, sample: Row, recordings: dict[str, Row], time_s: float, car: Frame, ego: Ego) -> Shot:
         sensor = car.holding(self.lidar.origin, self.lidar.rotation)
-        boxes = [box for box in self.database.annotations(sample["token"]) if _counts(self.database, box)]
+        boxes = self._boxes(sample, seen=True)
         annotations = _annotations(self.database, boxes, self.numbers, sensor)
         points = read_points(self.database.root / recordings[LIDAR]["filename"])
         cloud = recorded_cloud(points, self.grid, annotations, sensor)
         sights = self._sights(recordings, boxes, annotations)
         return Shot(time_s, sample["token"], sensor, ego, annotations, sights, cloud)
+
+    def hidden(self, sample: Row, car: Frame) -> Annotations:
+        """What is annotated without a point."""
+        boxes = self._boxes(sample, seen=False)
+        return _annotations(self.database, boxes, self.numbers, car.holding(self.lidar.origin, self.lidar.rotation))
+
+    def _boxes(self, sample: Row, seen: bool) -> list[Row]:
+        """The annotations of the five classes that hold a point, or those that hold none."""
+        boxes = self.database.annotations(sample["token"])
+        return [box for box in boxes if _has_points(box) == seen and _class_name(self.database, box) is not None]
 
     def _sights(self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations) -> Sights:
         if self.detections is None:
@@ -133,8 +144,8 @@ def _class_name(database: Database, box: Row) -> str | None:
         raise InvalidInput(f"{database.path('category')}: {token!r}: {error}") from None
 
 
-def _counts(database: Database, box: Row) -> bool:
-    return box["num_lidar_pts"] + box["num_radar_pts"] > 0 and _class_name(database, box) is not None
+def _has_points(box: Row) -> bool:
+    return bool(box["num_lidar_pts"] + box["num_radar_pts"] > 0)
 
 
 def _object_numbers(database: Database, samples: list[Row]) -> dict[str, int]:

@@ -16,7 +16,7 @@ from care_sim.study.task import Row
 CONFIG = "config.json"
 MANY = 12
 """Values of a parameter that are listed; of more the first and the last."""
-_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "camera_detections"})
+_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "camera_detections", "presence"})
 _PREFIXES = ("scenario.", "policy.", "detector.")
 
 
