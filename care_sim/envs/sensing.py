@@ -82,16 +82,13 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self.observed()
 
     def observed(self) -> Observed:
-        """The observation of the coming keyframe."""
-        self._observation = self.loop.belief.to_observation()
-        return self._observation
+        """The observation of the coming keyframe; the arrays are the caller's own."""
+        return self.loop.belief.to_observation()
 
     @property
     def belief(self) -> Belief:
-        """What the last observation says, for wrappers. Raises gymnasium.error.ResetNeeded before the first reset."""
-        if self._running is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
-        return Belief.from_observation(self._observation)
+        """What the last observation said, for wrappers, whatever was made of it since; raises as `loop` does."""
+        return Belief.from_observation(self.observed())
 
     def chosen(self, action: Action) -> Cells:
         """The cells that `action` fires at the coming keyframe.
@@ -101,15 +98,15 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
-        self.acted = scores = checked_scores(action, self.rig.grid.shape)
+        self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
         floor = self._floor.next()
         return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
 
     def reported(self, fired: Cells) -> Cells | list[int]:
-        """The fired cells as `info` holds them: without the floor a list, since Gymnasium's vector environments stack
-        arrays of one length.
+        """The fired cells as `info` holds them, a copy: without the floor a list, since Gymnasium's vector environments
+        stack arrays of one length.
         """
-        return fired if self.conditions.floor else fired.tolist()
+        return fired.copy() if self.conditions.floor else fired.tolist()
 
 
 def conditions_of(parameters: dict[str, Any]) -> Conditions:

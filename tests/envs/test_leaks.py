@@ -130,7 +130,7 @@ def test_what_was_dropped_in_the_middle_of_another_is_not_its_client():
     """Somebody else's last reference may go at any moment."""
     first, second = made(), made()
     first.reset(seed=0)
-    observation, _ = second.reset(seed=1)
+    second.reset(seed=1)
     del first
     third = made()
     third.reset(seed=0)
