@@ -16,6 +16,7 @@ from care_sim.floor import Floor
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import dead_cells
+from care_sim.streams import check_secret, streams
 from care_sim.truth import Truth
 from care_sim.types import Action, Belief, Rig
 
@@ -40,10 +41,16 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         sensor_height_m: float,
         budget: float,
         keyframe_s: float,
+        secret: str,
+        scoring_info: bool,
     ):
+        check_secret(secret)
+        if not isinstance(scoring_info, bool):
+            raise InvalidInput(f"scoring_info must be True or False, got {scoring_info!r}")
         grid = AngularGrid()
         dead_cells(grid, conditions.lidar_dead_rows)
-        self.conditions = conditions
+        self.conditions, self.scoring_info = conditions, scoring_info
+        self._secret = secret
         self.rig = Rig(
             grid,
             cameras,
@@ -74,6 +81,14 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     def entropy(self, seed: int | None) -> int:
         """The seed of an episode: the given one, else one that the environment's own generator draws."""
         return seed if seed is not None else int(self.np_random.integers(2**32))
+
+    def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
+        """`count` independent streams of an episode; see `care_sim.streams`."""
+        return streams(entropy, count, self._secret)
+
+    def told(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
+        """`info`: what the car itself knows, and, unless `scoring_info` is off, what only the scoring may."""
+        return own | scoring if self.scoring_info else own
 
     def begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
