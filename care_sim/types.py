@@ -158,14 +158,14 @@ class Belief:
         )
 
     def to_observation(self) -> dict[str, NDArray[np.float32]]:
-        """The fixed-shape float32 arrays of the environments' observation space."""
+        """The fixed-shape float32 arrays of the environments' observation space, new ones."""
         ego = np.array([self.ego.speed, self.ego.yaw_rate, self.ego.acceleration], np.float32)
         return {
             "ego": ego,
             "budget": np.array([self.budget / self.ranges.size], np.float32),
             "detections": _padded(self.detections.rows(), MAX_DETECTIONS),
             "tracks": _padded(self.tracks.rows(), MAX_TRACKS),
-            "ranges": self.ranges,
+            "ranges": self.ranges.copy(),
         }
 
 

@@ -42,25 +42,43 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ### Reward
     A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision, needless braking, and,
     with `reward_weights={"gain": ...}`, the first-detection distance against the full-scan bound. Every term is at
-    most 0, so is the best return.
+    most 0, so is the best return. It knows what no observation shows: a learner may learn from it, no policy may read
+    it while it plays.
 
     ### Episode end
-    Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes). `info` has
-    `fired` (cells; an array of B, with `floor=False` a list of at most B, because Gymnasium's vector
-    environments stack arrays of one length), `detected` (the first-sighting actor, at this keyframe),
-    `in_view`, `braking`, `clearance_m`, `speed_mps`, `time_s`, `reward_terms`; at the end
-    `info["outcome"]`, a dict of `care_sim.types.Outcome`.
+    Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes).
+
+    ### Info
+    What is for scoring alone tells of the world what no observation does, with a blind camera too: never a policy's
+    input. `scoring_info=False` leaves it out, but for the `outcome`.
+
+    | key | content | whose |
+    |---|---|---|
+    | `fired` | the cells of this keyframe (1) | the car's own |
+    | `braking` | whether the brake is on | the car's own |
+    | `time_s` | time of the keyframe, seconds from the start | the car's own |
+    | `detected` | whether the first-sighting actor is among what was detected at this keyframe (2) | scoring alone |
+    | `in_view` | whether a faultless camera shows that actor | scoring alone |
+    | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
+    | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
+    | `reward_terms` | `care_sim.reward.terms` | scoring alone |
+    | `seed` | of `reset`: repeats the episode, and so tells all of it | scoring alone |
+    | `outcome` | at the end: a dict of `care_sim.types.Outcome` | scoring alone |
+
+    (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector environments stack arrays of
+    one length. (2) A car knows what it detected, and has it as tracks; which one the episode is about it does not know.
 
     ### Arguments
     `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode` None or
-    "rgb_array"; any field of the scenario; and the conditions, any field of
-    `care_sim.conditions.Conditions`. Of these, the allocator: `reserve_fraction` rho, `floor`, `floor_seed`,
-    `azimuth_margin`, `elevation_margin`. The detectors: `engine`, `min_returns`, `camera_confidence`. Camera
-    faults: `false_negative_rate`, `false_negative_per_m`, `false_negative_burst` (keyframes),
-    `false_positive_rate` (a picture), `camera_latency` and `camera_jitter` (whole keyframes),
-    `blackout_start_s`, `blackout_s`, `camera_rotation_sigma_deg`, `camera_position_sigma_m`. LiDAR faults:
-    `lidar_range_sigma` (m), `lidar_dropout`, `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are
-    off by default and drawn by the seed. A value that is not allowed raises `care_sim.InvalidInput`.
+    "rgb_array"; `scoring_info` (above); `secret`, a text that enters everything that a seed draws, so that an agent
+    that holds this package cannot look its episodes up (`care_sim.streams`; none, unless given); any field of the
+    scenario; and the conditions, any field of `care_sim.conditions.Conditions`. Of these, the allocator:
+    `reserve_fraction` rho, `floor`, `floor_seed`, `azimuth_margin`, `elevation_margin`. The detectors: `engine`,
+    `min_returns`, `camera_confidence`. Camera faults: `false_negative_rate`, `false_negative_per_m`,
+    `false_negative_burst` (keyframes), `false_positive_rate` (a picture), `camera_latency` and `camera_jitter` (whole
+    keyframes), `blackout_start_s`, `blackout_s`, `camera_rotation_sigma_deg`, `camera_position_sigma_m`. LiDAR faults:
+    `lidar_range_sigma` (m), `lidar_dropout`, `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are off by
+    default and drawn by the seed. A value that is not allowed raises `care_sim.InvalidInput`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's interface)
@@ -73,6 +91,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         keyframe_s: float = 0.1,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
+        secret: str = "",
+        scoring_info: bool = True,
         **parameters: Any,
     ):
         whole_steps(keyframe_s)
@@ -80,7 +100,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
         conditions = conditions_of(parameters)
         check_engine(conditions.engine)
-        super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s)
+        super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info)
         self.scenario = make_scenario(self.scenario_name, **parameters)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
@@ -92,18 +112,18 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed.
 
-        `info` holds the seed that repeats the episode; there are no `options`.
+        `info` holds the seed that repeats the episode, unless `scoring_info` is off; there are no `options`.
         """
         super().reset(seed=seed)
         entropy = self.entropy(seed)
-        scenario, camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(5)
+        scenario, camera, lidar, floor, odometry = self.streams(entropy, count=5)
         self.close()
         world = self.scenario.build(np.random.default_rng(scenario))
         self._in_view = self._detected = False
         self._potential = rewards.Potential()
         self.keyframes = []
         loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
-        return self.begin(loop, floor), {"seed": entropy}
+        return self.begin(loop, floor), self.told({}, {"seed": entropy})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
@@ -144,16 +164,15 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         return rewards.terms(frame, self._in_view, self._detected, lost)
 
     def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
-        return {
-            "fired": self.reported(frame.fired),
+        own = {"fired": self.reported(frame.fired), "braking": frame.braking, "time_s": frame.time_s}
+        scoring = {
             "detected": frame.detected,
             "in_view": frame.in_view,
-            "braking": frame.braking,
             "clearance_m": frame.clearance_m,
             "speed_mps": frame.speed_mps,
-            "time_s": frame.time_s,
             "reward_terms": terms,
         }
+        return self.told(own, scoring)
 
 
 class DartoutEnv(ClosedLoopEnv):

@@ -41,17 +41,29 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs in both loops.
 
     ### Reward
-    Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at best.
+    Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at best. It knows what no
+    observation shows: a learner may learn from it, no policy may read it while it plays.
 
     ### Episode end
-    Truncated after the last keyframe. `info` has `fired` (cells), `time_s`, and `objects` and `found`: how many
-    annotated objects are within 50 m, and how many of them were found; at the end `info["outcome"]`, a dict of
-    `care_sim.evaluation.recall.Tally`. `env.unwrapped.score` then holds event by event what was found.
+    Truncated after the last keyframe. `env.unwrapped.score` then holds event by event what was found.
+
+    ### Info
+    What is for scoring alone is never a policy's input; `scoring_info=False` leaves it out, but for the `outcome`.
+
+    | key | content | whose |
+    |---|---|---|
+    | `fired` | the cells of this keyframe | the car's own |
+    | `time_s` | time of the keyframe, seconds from the start | the car's own |
+    | `objects` | how many annotated objects are within 50 m | scoring alone |
+    | `found` | how many of them were found at this keyframe | scoring alone |
+    | `seed`, `scene` | of `reset`: they repeat the episode, and so tell all of it | scoring alone |
+    | `outcome` | at the end: a dict of `care_sim.evaluation.recall.Tally` | scoring alone |
 
     ### Arguments
-    `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `detector` by name
-    (`care_sim.perception.registry.detector_names`) and `detector_parameters`; `presence` "annotated" or "visible", who
-    is present at scene start and so never a first sighting (`care_sim.evaluation.sightings`); any field of
+    `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in the closed loop;
+    `detector` by name (`care_sim.perception.registry.detector_names`) and `detector_parameters`; `presence`
+    "annotated" or "visible", who is present at scene start and so never a first sighting
+    (`care_sim.evaluation.sightings`); any field of
     `care_sim.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the
     cameras' mount, the engine. `min_returns` is the `returns` detector's. A value that is not allowed raises
     `care_sim.InvalidInput`.
@@ -70,6 +82,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         detector_parameters: Mapping[str, object] | None = None,
         presence: str = ANNOTATED,
         render_mode: str | None = None,
+        secret: str = "",
+        scoring_info: bool = True,
         **parameters: Any,
     ):
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -83,7 +97,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
         if detector != PROXY and conditions.min_returns != MIN_RETURNS:
             raise InvalidInput(f"min_returns is of the detector {PROXY}, {detector} does not know it")
-        super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s)
+        super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s, secret, scoring_info)
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
         self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
@@ -101,12 +115,11 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """Begin an episode over a film. Camera faults, noise and floor have independent streams, which the scene's
         name and the seed decide.
         """
-        entropy = seed, crc32(film.name.encode())
-        camera, lidar, floor, odometry = np.random.SeedSequence(entropy).spawn(4)
+        camera, lidar, floor, odometry = self.streams(seed, crc32(film.name.encode()), count=4)
         self._sightings = _sightings(film, self.presence)
         self.exposures, self._masks = [], []
         loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._detector)
-        return self.begin(loop, floor), {"seed": seed, "scene": film.name}
+        return self.begin(loop, floor), self.told({}, {"seed": seed, "scene": film.name})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
@@ -118,8 +131,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks.append(found)
         scored = found[self._sightings.scored(exposure.index)]
         self._over = loop.over
-        info: dict[str, Any] = {"fired": self.reported(fired), "time_s": shot.time_s}
-        info |= {"objects": len(scored), "found": int(scored.sum())}
+        own = {"fired": self.reported(fired), "time_s": shot.time_s}
+        info = self.told(own, {"objects": len(scored), "found": int(scored.sum())})
         if self._over:
             info["outcome"] = asdict(self.score.tally())
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
@@ -148,7 +161,7 @@ class FilmEnv(OpenLoopEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
-        """Begin the scene anew. `info` holds the seed that repeats the episode; there are no `options`."""
+        """Begin the scene anew. `info` holds what repeats the episode; there are no `options`."""
         super().reset(seed=seed)
         return self.start(self.film, self.entropy(seed))
 
@@ -162,7 +175,8 @@ class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
     The seed of `reset` draws the street (`care_sim.streets`) and everything else that is random. Seeds 0 to 149 are the
-    evaluation's: train on others. `learned-scorer` learned from 1000 to 1019, the calibration's.
+    evaluation's: train on others. `learned-scorer` learned from 1000 to 1019, the calibration's. With a `secret`
+    all are other streets, none of them in the published tables.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -173,10 +187,10 @@ class StreetEnv(OpenLoopEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode in the street of a seed. `info` holds the seed that repeats it; there are no `options`."""
+        """Begin an episode in the street of a seed. `info` holds what repeats it; there are no `options`."""
         super().reset(seed=seed)
         entropy = self.entropy(seed)
-        return self.start(street_film(entropy), entropy)
+        return self.start(street_film(entropy, self._secret), entropy)
 
 
 class ReplayEnv(FilmEnv):

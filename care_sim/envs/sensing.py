@@ -16,6 +16,7 @@ from care_sim.floor import Floor
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import dead_cells
+from care_sim.streams import check_secret, streams
 from care_sim.truth import Truth
 from care_sim.types import Action, Belief, Rig
 
@@ -40,10 +41,16 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         sensor_height_m: float,
         budget: float,
         keyframe_s: float,
+        secret: str,
+        scoring_info: bool,
     ):
+        check_secret(secret)
+        if not isinstance(scoring_info, bool):
+            raise InvalidInput(f"scoring_info must be True or False, got {scoring_info!r}")
         grid = AngularGrid()
         dead_cells(grid, conditions.lidar_dead_rows)
-        self.conditions = conditions
+        self.conditions, self.scoring_info = conditions, scoring_info
+        self._secret = secret
         self.rig = Rig(
             grid,
             cameras,
@@ -75,6 +82,14 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """The seed of an episode: the given one, else one that the environment's own generator draws."""
         return seed if seed is not None else int(self.np_random.integers(2**32))
 
+    def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
+        """`count` independent streams of an episode; see `care_sim.streams`."""
+        return streams(entropy, count, self._secret)
+
+    def told(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
+        """`info`: what the car itself knows, and, unless `scoring_info` is off, what only the scoring may."""
+        return own | scoring if self.scoring_info else own
+
     def begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
         self._running, self._over = loop, False
@@ -82,16 +97,13 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self.observed()
 
     def observed(self) -> Observed:
-        """The observation of the coming keyframe."""
-        self._observation = self.loop.belief.to_observation()
-        return self._observation
+        """The observation of the coming keyframe; the arrays are the caller's own."""
+        return self.loop.belief.to_observation()
 
     @property
     def belief(self) -> Belief:
-        """What the last observation says, for wrappers. Raises gymnasium.error.ResetNeeded before the first reset."""
-        if self._running is None:
-            raise gymnasium.error.ResetNeeded("call reset() before stepping or rendering")
-        return Belief.from_observation(self._observation)
+        """What the last observation said, for wrappers, whatever was made of it since; raises as `loop` does."""
+        return Belief.from_observation(self.observed())
 
     def chosen(self, action: Action) -> Cells:
         """The cells that `action` fires at the coming keyframe.
@@ -101,15 +113,15 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
-        self.acted = scores = checked_scores(action, self.rig.grid.shape)
+        self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
         floor = self._floor.next()
         return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
 
     def reported(self, fired: Cells) -> Cells | list[int]:
-        """The fired cells as `info` holds them: without the floor a list, since Gymnasium's vector environments stack
-        arrays of one length.
+        """The fired cells as `info` holds them, a copy: without the floor a list, since Gymnasium's vector environments
+        stack arrays of one length.
         """
-        return fired if self.conditions.floor else fired.tolist()
+        return fired.copy() if self.conditions.floor else fired.tolist()
 
 
 def conditions_of(parameters: dict[str, Any]) -> Conditions:

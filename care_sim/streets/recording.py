@@ -1,6 +1,7 @@
 """The film of a street: at every keyframe the whole grid is cast once, and six cameras are rendered."""
 
 from contextlib import closing
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.streams import closed
 from care_sim.streets.draft import KEYFRAME_S
 from care_sim.streets.street import Street, make_street
 from care_sim.types import CLASSES
@@ -38,10 +40,18 @@ def record(
     return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots, hidden[0])
 
 
+def street_film(seed: int, secret: str = "") -> Film:
+    """The film of the street of a seed; the last one is kept, for policies that meet the same street in turn. With a
+    secret it is another street, of a seed that cannot be told; its name says no more than that.
+    """
+    return _street_film(seed, secret)
+
+
 @lru_cache(maxsize=1)
-def street_film(seed: int) -> Film:
-    """The film of the street of a seed; the last one is kept, for policies that meet the same street in turn."""
-    return record(make_street(seed))
+def _street_film(seed: int, secret: str) -> Film:
+    if not secret:
+        return record(make_street(seed))
+    return record(replace(make_street(closed((seed,), secret)), name=f"street-{seed:04d}-secret"))
 
 
 class _Stage:

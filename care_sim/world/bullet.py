@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from care_sim.frames import Floats, Frame, Pose
 from care_sim.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.clients import borrow, give_back
+from care_sim.world.clients import borrow, give_back, leave
 from care_sim.world.looks import Looks
 from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
@@ -30,7 +31,7 @@ FAR_M = 120.0
 
 class BulletWorld:
     """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False. Not to be shared between
-    processes.
+    processes. Whoever forgets to close it leaves the client with the last reference.
 
     The ground, transparent bodies and backdrops have no look: no camera needs their ids, and rendering them
     costs more than everything else in the picture.
@@ -40,6 +41,8 @@ class BulletWorld:
 
     def __init__(self, ground: bool = True) -> None:
         self._client = borrow()
+        self._abandoned = finalize(self, leave, self._client)
+        self._abandoned.atexit = False
         self.primitives = Primitives()
         self.looks = Looks()
         self._moved: set[int] = set()
@@ -53,7 +56,7 @@ class BulletWorld:
 
     def close(self) -> None:
         """Give the client back; calling it again does nothing."""
-        if self._client >= 0:
+        if self._abandoned.detach():
             give_back(self._client)
             self._client = -1
 
