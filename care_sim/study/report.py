@@ -38,14 +38,14 @@ def conduct(
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
-    kind = study.kind
+    configs, kind = [config.changed() for config in configs], study.kind
     _check_kind(folder, kind)
     if workers < 1:
         raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
     with _journal(folder) as journal:
         _say_what_is_found(configs, journal, folder, kind.unit)
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
-        rows = [journal[digest] for digest in (config.digest() for config in configs) if digest in journal]
+        rows = [journal[digest] for digest in (config.key for config in configs) if digest in journal]
     if rows:
         left_out = summary(failures, kind.unit)
         (folder / "config.json").write_text(_description(configs, study, failures))
@@ -124,7 +124,7 @@ def _journal(folder: Path) -> Journal:
 
 def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, unit: str) -> None:
     """One line when tasks will not be played again, or others share the journal."""
-    found = sum(config.digest() in journal for config in configs)
+    found = sum(config.key in journal for config in configs)
     others = len(journal) - found
     if found or others:
         rest = f"; {others} of other options or code stay in its journal" if others else ""
