@@ -35,7 +35,7 @@ SESSION = uuid4().hex
 
 def code_digest() -> str:
     """Hash of the package's sources and weights, so that no row of an edited program passes for a new one."""
-    return _combined([_sources_digest(Path(care_sim.__file__).parent), file_digest(SHIPPED)])
+    return _combined([_sources_digest(Path(care_sim.__file__).parent), str(file_digest(SHIPPED))])
 
 
 def policy_digest(policy: str) -> str | None:
