@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from care_sim.errors import InvalidInput, is_number
 from care_sim.grid import AngularGrid
+from care_sim.json_text import parsed
 from care_sim.types import Rig
 
 FORMAT = "care-sim weights 1"
@@ -54,7 +55,7 @@ class Card:
     @classmethod
     def from_json(cls, text: str) -> "Card":
         """Read text back. Raises ValueError for anything but a card."""
-        plain = json.loads(text)
+        plain = parsed(text)
         if not isinstance(plain, dict) or plain.pop("format", None) != FORMAT:
             raise ValueError(f"its card is not of the format {FORMAT!r}")
         if wrong := set(plain) ^ {column.name for column in fields(cls)}:

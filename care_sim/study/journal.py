@@ -1,31 +1,46 @@
-"""The journal of a study: a line for every finished episode, so that nothing computed is lost."""
+"""The journal of a study: a line for every finished task, so that nothing computed is lost.
+
+A line is a row as JSON, the name of its study, and last a checksum of all before it.
+"""
 
 import fcntl
+import hashlib
 import json
+import re
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from care_sim.errors import InvalidInput
+from care_sim.json_text import parsed
 from care_sim.study.rows import with_tuples
 from care_sim.study.task import Row
+
+STUDY, CHECK = "study", "check"
+_LINE = re.compile(rf'(\{{.*), "{CHECK}": "([0-9a-f]{{16}})"\}}')
 
 
 class Journal:
     """Finished rows by digest, in a file of JSON lines that only ever grows.
 
-    Opening it reads the rows of earlier runs. A line that was torn by a crash is passed over, so its
-    episode runs again. Raises OSError when the folder cannot be written, InvalidInput while another study
+    Opening it reads the rows of earlier runs. A line that was torn by a crash, or whose checksum is not that of its
+    text, is passed over, so that its task runs again; `damaged` counts them. `studies` are those of the rows, `study`
+    is the one whose rows are added. Raises OSError when the folder cannot be written, InvalidInput while another study
     writes there.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, study: str = "sweep"):
+        self._study = study
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = path.open("a+", encoding="utf-8", errors="replace")
         self._lock(path.parent)
         self._file.seek(0)
         text = self._file.read()
-        self._rows = {row["digest"]: row for line in text.splitlines() if (row := _parsed(line)) is not None}
+        lines = [line for line in text.split("\n") if line]
+        sound = [row for line in lines if (row := _read(line)) is not None]
+        self.damaged = len(lines) - len(sound)
+        self.studies = {row.pop(STUDY) for row in sound}
+        self._rows = {row["digest"]: row for row in sound}
         if text and not text.endswith("\n"):
             self._write("\n")
 
@@ -48,7 +63,7 @@ class Journal:
 
     def append(self, row: Row) -> None:
         """Keep a finished episode; with the operating system when this returns."""
-        self._write(json.dumps(row) + "\n")
+        self._write(_line(row | {STUDY: self._study}))
         self._rows[row["digest"]] = row
 
     def _lock(self, folder: Path) -> None:
@@ -68,9 +83,23 @@ class Journal:
         self._file.flush()
 
 
-def _parsed(line: str) -> Row | None:
-    try:
-        row = json.loads(line)
-    except json.JSONDecodeError:
+def _line(row: Row) -> str:
+    text = json.dumps(row).removesuffix("}")
+    return f'{text}, "{CHECK}": "{_checksum(text)}"}}\n'
+
+
+def _read(line: str) -> Row | None:
+    """The row of a line with the name of its study, None of a damaged one."""
+    whole = _LINE.fullmatch(line)
+    if whole is None or _checksum(whole[1]) != whole[2]:
         return None
-    return with_tuples(row) if isinstance(row, dict) and "digest" in row else None
+    try:
+        row = parsed(whole[1] + "}")
+    except ValueError:
+        return None
+    named = all(isinstance(row.get(name), str) for name in ("digest", STUDY))
+    return with_tuples(row) if named else None
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -51,3 +51,11 @@ KINDS = (EPISODES, PLAYS)
 def kind_in(folder: Path) -> Kind:
     """The kind of the results in a folder; episodes where there are none."""
     return next((kind for kind in KINDS if (folder / kind.file).is_file()), EPISODES)
+
+
+def is_parameter(name: str) -> bool:
+    """Whether a column of rows holds what a task was given."""
+    return name in _PARAMETERS or name.startswith(("scenario.", "policy.", "detector."))
+
+
+_PARAMETERS = frozenset({*config.PLAIN_FIELDS, *play_config.PLAY_FIELDS, "scene", "camera_detections", "presence"})

@@ -33,8 +33,8 @@ def run_with_progress(
 
     Returns those that failed; see `care_sim.study.runner.run_all`.
     """
-    found = [(config, journal[config.digest()]["wall_s"]) for config in configs if config.digest() in journal]
-    forecast = Forecast((config for config in configs if config.digest() not in journal), found)
+    found = [(config, journal[config.key]["wall_s"]) for config in configs if config.key in journal]
+    forecast = Forecast((config for config in configs if config.key not in journal), found)
     unit = kind.unit
     with bar(len(configs), unit) if sys.stderr.isatty() else nullcontext(Lines(len(configs), unit)) as show:
         reporter = Reporter(forecast, show, len(configs))

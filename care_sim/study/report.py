@@ -2,22 +2,27 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from matplotlib.figure import Figure
 from rich.console import Console
 
 from care_sim.errors import InvalidInput
+from care_sim.files import replacing
+from care_sim.study.entries import counted
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import remove_others, save
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import KINDS, Kind, kind_in
+from care_sim.study.kinds import kind_in
 from care_sim.study.latex import PREAMBLE, latex, paragraph
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import read_notes, read_rows, write_columns, write_rows
 from care_sim.study.runner import Failure
 from care_sim.study.studies import STUDIES, SWEEP, Study, study_of
+from care_sim.study.takeover import check_journal, check_kind, check_results
 from care_sim.study.task import Row, Task
 
 JOURNAL = "journal.jsonl"
@@ -29,32 +34,45 @@ def conduct(
     workers: int,
     make_executor: ExecutorFactory = processes,
     study: Study = SWEEP,
+    force: bool = False,
 ) -> list[Failure]:
     """Run a study into `folder`, going on where an earlier run stopped; returns the tasks that failed.
 
     Writes `journal.jsonl` as they finish; then, if there are any, `config.json` with the configurations and what
     failed, the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`, `tables.tex`
-    and the figures of `study`. Raises InvalidInput for no task or no worker, and when the folder cannot be written.
+    and the figures of `study`; the folder is this study's until all that is written. Raises InvalidInput for no task
+    or no worker, when the folder cannot be written, and unless `force` when it holds another study, or rows of this one
+    that are none of `configs`.
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
-    kind = study.kind
-    _check_kind(folder, kind)
     if workers < 1:
         raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
-    with _journal(folder) as journal:
+    configs, kind = [config.changed() for config in configs], study.kind
+    _check(folder, configs, study, force)
+    with _journal(folder, study) as journal:
+        _check(folder, configs, study, force, journal)
         _say_what_is_found(configs, journal, folder, kind.unit)
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
-        rows = [journal[digest] for digest in (config.digest() for config in configs) if digest in journal]
-    if rows:
-        left_out = summary(failures, kind.unit)
-        (folder / "config.json").write_text(_description(configs, study, failures))
-        for name, columns in kind.aside(rows).items():
-            write_columns(columns, folder / name)
-        rows = kind.finish(rows)
-        write_rows(rows, folder / kind.file, study.name, left_out)
-        write_report(rows, folder, study, left_out)
+        rows = [journal[config.key] for config in configs if config.key in journal]
+        if rows:
+            _write(rows, configs, folder, study, failures)
     return failures
+
+
+def _write(
+    rows: Sequence[Row], configs: Sequence[Task], folder: Path, study: Study, failures: Sequence[Failure]
+) -> None:
+    """Write the results of a study: everything is made before the first file is replaced."""
+    kind = study.kind
+    left_out, finished, aside = summary(failures, kind.unit), kind.finish(rows), kind.aside(rows)
+    report = Report.of(finished, study, left_out)
+    with replacing(folder / "config.json") as unfinished:
+        unfinished.write_text(_description(configs, study, failures))
+    for name, columns in aside.items():
+        write_columns(columns, folder / name)
+    write_rows(finished, folder / kind.file, study.name, left_out)
+    report.write(folder)
 
 
 def summary(failures: Sequence[Failure], unit: str) -> list[str]:
@@ -74,18 +92,35 @@ def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
     return read_rows(path, kind.required), study_of(path), read_notes(path)[1]
 
 
+@dataclass(frozen=True)
+class Report:
+    """What a study makes of its rows: the texts of its files of tables by name, and its figures."""
+
+    texts: Mapping[str, str]
+    figures: Mapping[str, Figure]
+
+    @classmethod
+    def of(cls, rows: Sequence[Row], study: Study = SWEEP, left_out: Sequence[str] = ()) -> "Report":
+        """The report of a study that lacks what is `left_out`."""
+        tables, closing = study.tables(rows), [*study.closing(rows), *map(_left_out, left_out)]
+        statements = "## Statements\n\n" + "".join(f"- {sentence}\n" for sentence in closing)
+        pages = [f"{study.caption}\n", *(table.markdown() for table in tables), statements]
+        texts = [PREAMBLE, paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
+        return cls({"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows))
+
+    def write(self, folder: Path) -> None:
+        """Write tables and figures into a folder; then figures of an earlier study are removed."""
+        for name, text in self.texts.items():
+            with replacing(folder / name) as unfinished:
+                unfinished.write_text(text)
+        for name, figure in self.figures.items():
+            save(figure, folder / name)
+        remove_others(folder, (name for known in STUDIES.values() for name in known.figure_names), self.figures)
+
+
 def write_report(rows: Sequence[Row], folder: Path, study: Study = SWEEP, left_out: Sequence[str] = ()) -> None:
-    """Write tables and figures into a folder; figures of an earlier study are removed."""
-    tables, closing = study.tables(rows), [*study.closing(rows), *map(_left_out, left_out)]
-    statements = "## Statements\n\n" + "".join(f"- {sentence}\n" for sentence in closing)
-    pages = [f"{study.caption}\n", *(table.markdown() for table in tables), statements]
-    (folder / "tables.md").write_text("\n".join(pages))
-    texts = [paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
-    (folder / "tables.tex").write_text("\n".join([PREAMBLE, *texts]))
-    figures = study.figures(rows)
-    remove_others(folder, (name for known in STUDIES.values() for name in known.figure_names), figures)
-    for name, figure in figures.items():
-        save(figure, folder / name)
+    """Make a report and write it into a folder."""
+    Report.of(rows, study, left_out).write(folder)
 
 
 def print_report(rows: Sequence[Row], console: Console, study: Study = SWEEP, left_out: Sequence[str] = ()) -> None:
@@ -107,24 +142,36 @@ def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failu
     return json.dumps(settings | study.kind.listed(configs), indent=1) + "\n"
 
 
-def _check_kind(folder: Path, kind: Kind) -> None:
-    for other in KINDS:
-        if other is not kind and (folder / other.file).exists():
-            raise InvalidInput(f"{folder} holds {other.unit} of another study; {kind.unit} need another --out")
+def _check(folder: Path, configs: Sequence[Task], study: Study, force: bool, journal: Journal | None = None) -> None:
+    """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves a file there, and
+    after.
+    """
+    check_kind(folder, study)
+    if not force:
+        check_results(folder, configs, study)
+        if journal is not None:
+            check_journal(folder, journal, study)
 
 
-def _journal(folder: Path) -> Journal:
+def _journal(folder: Path, study: Study) -> Journal:
     if folder.is_file():
         raise InvalidInput(f"{folder} is a file, --out wants a folder")
     try:
-        return Journal(folder / JOURNAL)
+        return Journal(folder / JOURNAL, study.name)
     except OSError as error:
         raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
 
 
 def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, unit: str) -> None:
-    """One line when tasks will not be played again, or others share the journal."""
-    found = sum(config.digest() in journal for config in configs)
+    """One line when tasks will not be played again, or others share the journal; one for what is damaged there."""
+    if journal.damaged:
+        lines = counted(journal.damaged, "line")
+        print(
+            f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no checksums; what they "
+            "held is played again where it is asked for",
+            file=sys.stderr,
+        )
+    found = sum(config.key in journal for config in configs)
     others = len(journal) - found
     if found or others:
         rest = f"; {others} of other options or code stay in its journal" if others else ""

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 
 from care_sim.errors import InvalidInput
 from care_sim.files import replacing
+from care_sim.json_text import parsed
 from care_sim.study.task import Row
 
 STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"
@@ -35,7 +36,11 @@ def write_columns(columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, 
 
 def with_tuples(row: Row) -> Row:
     """The row with ranges as tuples again, which Parquet and JSON hold as lists."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in row.items()}
+    return {name: _with_tuples(value) for name, value in row.items()}
+
+
+def _with_tuples(value: Any) -> Any:
+    return tuple(map(_with_tuples, value)) if isinstance(value, list) else value
 
 
 def read_rows(path: Path, required: Collection[str] = ()) -> list[Row]:
@@ -53,7 +58,7 @@ def read_notes(path: Path) -> tuple[str | None, list[str]]:
     damaged file.
     """
     notes = _read(path).schema.metadata or {}
-    return (notes[STUDY].decode() if STUDY in notes else None), json.loads(notes.get(LEFT_OUT, b"[]"))
+    return (notes[STUDY].decode() if STUDY in notes else None), parsed(notes.get(LEFT_OUT, b"[]"))
 
 
 def _read(path: Path) -> pa.Table:

@@ -19,6 +19,7 @@ Flying = dict[Future[list[Row | str]], Batch]
 """The batches in flight."""
 
 DIED = "the worker process died"
+OTHER_CODE = "the worker runs another version of care-sim or of the policy, or their files changed while the study ran"
 DEADLY = 3
 """Workers that a policy may kill before the rest of its tasks is not tried any more."""
 PATIENCE_S = 2.0
@@ -64,7 +65,7 @@ def run_all(
     of a policy that has killed DEADLY workers is not tried. Raises ClusterLost when a cluster's scheduler is gone.
     """
     run = _Run(journal, workers, make_executor, audience or Audience(), attempt)
-    waiting = deque(batches([config for config in configs if config.digest() not in journal]))
+    waiting = deque(batches([config for config in configs if config.key not in journal]))
     while waiting:
         for suspect in run.together(waiting):
             run.alone(suspect)
@@ -160,8 +161,8 @@ class _Run:
     def _record(self, config: Task, ending: Row | str) -> None:
         if isinstance(ending, str):
             self._fail([config], ending)
-        elif ending["digest"] != config.digest():
-            self._fail([config], "the worker runs another version of care-sim or of the policy")
+        elif ending["digest"] != config.key:
+            self._fail([config], OTHER_CODE)
         else:
             self._journal.append(ending)
             self._audience.finished(config, ending)

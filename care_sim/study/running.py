@@ -28,6 +28,9 @@ class Running:
     """Processes that play at the same time on this machine; a cluster plays as many as it has threads."""
     cluster: str | None = None
     """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
+    force: bool = False
+    """Play into a folder that holds another study, or rows that are not asked for now: its tables, figures and Parquet
+    files are replaced at the end; its journal stays."""
 
     def conduct(self, study: str, configs: "Sequence[Task]", out: Path, left_out: Sequence[str] = ()) -> int:
         """Play the tasks, print their tables, name those that failed and the policies that were left out."""
@@ -36,7 +39,7 @@ class Running:
         from care_sim.study.studies import STUDIES
 
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
-        failures = conduct(configs, out, self.workers, make_executor, STUDIES[study])
+        failures = conduct(configs, out, self.workers, make_executor, STUDIES[study], self.force)
         if len(failures) < len(configs):
             rows, _, missing = reported(out)
             print_report(rows, console(), STUDIES[study], missing)

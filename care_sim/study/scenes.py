@@ -82,7 +82,7 @@ class Recorded:
 
     def row(self, scene: Scene) -> dict[str, Any]:
         """The kind, the hash of the scene's files, and that of the camera detections where there are some."""
-        own = {"source": self.kind, "recording": data_digest(self.recordings.files(scene.name))}
+        own: dict[str, Any] = {"source": self.kind, "recording": data_digest(self.recordings.files(scene.name))}
         if isinstance(self.recordings, NuScenes) and self.recordings.camera_detections:
             own["camera_detections"] = file_digest(self.recordings.camera_detections)
         return own

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from copy import copy
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Self
 
 import gymnasium
@@ -17,6 +16,7 @@ from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
 from care_sim.errors import check_whole
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
+from care_sim.study.belongings import paths
 from care_sim.study.provenance import SESSION, code_digest, file_digest, policy_digest
 
 Parameters = tuple[tuple[str, Any], ...]
@@ -86,6 +86,16 @@ class Task(ABC):
         return [policy_digest(self.policy), *files_in(self.policy_parameters)]
 
     @cached_property
+    def key(self) -> str:
+        """The digest when this process first asked for it: what a study files the row under, whatever changes while it
+        runs. A worker works out its own.
+        """
+        return self.digest()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "key"}
+
+    @cached_property
     def _session(self) -> str:
         """The run that first asked for the digest, which the workers keep."""
         return SESSION
@@ -132,10 +142,9 @@ def own(policy: str, parameters: Parameters) -> Parameters:
     return tuple((name, value) for owner, point, name, value in parted if not point or owner == policy)
 
 
-def files_in(parameters: Parameters) -> list[str]:
-    """Hashes of the files and folders that parameters name."""
-    paths = (Path(value) for _, value in parameters if isinstance(value, str))
-    return [file_digest(path) for path in paths if path.exists()]
+def files_in(parameters: Parameters) -> list[str | None]:
+    """Hashes of the files and folders that parameters name; None of a folder with too many files to be read."""
+    return [file_digest(path) for _, value in parameters for path in paths(value)]
 
 
 def flat(prefix: str, parameters: Parameters) -> Row:

@@ -10,7 +10,7 @@ import tyro
 
 from care_sim.errors import InvalidInput
 from care_sim.training.config import HOW_LONG
-from care_sim.training.folder import CONFIG, CURVE, RULES, Evaluation, read_curve, read_json
+from care_sim.training.folder import CONFIG, CURVE, RULES, Evaluation, read_config, read_curve, read_rules
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,10 @@ def read(folder: Path) -> Run:
     for name in (CONFIG, RULES, CURVE):
         if not (folder / name).is_file():
             raise InvalidInput(f"{folder} holds no evaluated training run: no {name}")
-    return Run(read_json(folder / CONFIG), read_json(folder / RULES), read_curve(folder / CURVE))
+    run = Run(read_config(folder / CONFIG), read_rules(folder / RULES), read_curve(folder / CURVE))
+    if not run.curve:
+        raise InvalidInput(f"{folder} holds no evaluated training run: {CURVE} has no evaluation")
+    return run
 
 
 def together(runs: Iterable[Run]) -> list[list[Run]]:

@@ -20,7 +20,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import LARGEST, InvalidInput, is_number
+from care_sim.json_text import parsed
 from care_sim.policies.weights import Card, save
 from care_sim.training.config import AgentConfig
 from care_sim.training.evaluation import Score
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
 COLUMNS = ("steps", "seconds", "return", "distance_m")
+MOST = 1e30
+"""What a return or a distance may be and still be drawn."""
 Evaluation = tuple[int, float, float, float | None]
 """Of `COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open loop)."""
 
@@ -63,7 +66,7 @@ class Folder:
         if not path.exists():
             text = json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
             _put(path, lambda beside: beside.write_text(text))
-        return {name: Score(**plain) for name, plain in read_json(path).items()}
+        return {name: Score(**plain) for name, plain in read_rules(path).items()}
 
     @property
     def seconds(self) -> float:
@@ -116,15 +119,46 @@ class Folder:
         for file in (self.path / CONFIG, self.checkpoint):
             if not file.exists():
                 raise InvalidInput(f"{self.path} holds no run to be resumed: no {file.name}")
-        self.config.check_same(read_json(self.path / CONFIG))
+        self.config.check_same(read_config(self.path / CONFIG))
 
 
-def read_json(path: Path) -> Any:
-    """What a file of the folder says. Raises InvalidInput for a damaged one."""
+def read_config(path: Path) -> dict[str, Any]:
+    """The configuration of a run. Raises InvalidInput for a damaged file, or one of something else."""
+    config = _read_map(path)
+    kinds: dict[str, Callable[[Any], bool]] = {
+        "algorithm": _is_text,
+        "env": _is_text,
+        "budget": lambda budgets: isinstance(budgets, list) and bool(budgets) and all(map(_is_finite, budgets)),
+        "episodes": _is_finite,
+    }
+    for name, is_kind in kinds.items():
+        if not is_kind(config.get(name)):
+            raise InvalidInput(f"{path} is no configuration of a training run: {name} is {config.get(name)!r:.80}")
+    return config
+
+
+def read_rules(path: Path) -> dict[str, dict[str, Any]]:
+    """What rules score. Raises InvalidInput for a damaged file, or one of something else."""
+    rules = _read_map(path)
+    for name, score in rules.items():
+        if not isinstance(score, dict) or {*score} != {*Score.__dataclass_fields__}:
+            raise InvalidInput(
+                f"{path} holds no scores of rules: {name!r:.80} has not {', '.join(Score.__dataclass_fields__)}"
+            )
+        for column, value in score.items():
+            if not (_is_finite(value) or (column == "distance_m" and value is None)):
+                raise InvalidInput(f"{path} holds no scores of rules: {column} of {name!r:.80} is {value!r:.80}")
+    return rules
+
+
+def _read_map(path: Path) -> dict[str, Any]:
     try:
-        return json.loads(path.read_text())
+        content = parsed(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
+    if not isinstance(content, dict):
+        raise InvalidInput(f"{path} is no file of a training run: it holds no map")
+    return content
 
 
 def read_curve(path: Path) -> list[Evaluation]:
@@ -132,13 +166,30 @@ def read_curve(path: Path) -> list[Evaluation]:
     if not path.exists():
         return []
     try:
-        with path.open(newline="") as file:
+        with path.open(newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
         if tuple(head) != COLUMNS:
             raise ValueError(f"its columns are not {', '.join(COLUMNS)}")
-        return [(int(n), float(s), float(r), float(d) if d else None) for n, s, r, d in rows]
-    except ValueError as error:
+        return [_evaluation(row) for row in rows]
+    except (ValueError, csv.Error) as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
+
+
+def _evaluation(row: list[str]) -> Evaluation:
+    """A row of the curve. Raises ValueError for what is no number that can be drawn."""
+    steps, seconds, value, distance = row
+    numbers = (float(seconds), float(value), *([float(distance)] if distance else []))
+    if not (0 <= int(steps) <= LARGEST and all(map(_is_finite, numbers))):
+        raise ValueError(f"{', '.join(row)} are no numbers of an evaluation")
+    return int(steps), float(seconds), float(value), float(distance) if distance else None
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _is_finite(value: object) -> bool:
+    return is_number(value) and abs(value) <= MOST  # type: ignore[arg-type]
 
 
 def _put(path: Path, write: Callable[[Path], object]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from care_sim.errors import InvalidInput
-from care_sim.study import provenance
+from care_sim.study import belongings, provenance
 from care_sim.study.config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, listed
 
 GOOD = EpisodeConfig("dense", "care")
@@ -100,7 +100,7 @@ def package(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text("[care_sim.policies]\nnear = ours_policy.near:Near\n")
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path / "ours_policy"
-    provenance._content_digest.cache_clear()
+    provenance._loaded.cache_clear()
     for name in [name for name in sys.modules if name.startswith("ours_policy")]:
         del sys.modules[name]
 
@@ -112,13 +112,13 @@ def test_the_digest_covers_the_package_of_an_installed_policy(package, edited):
     assert before == EpisodeConfig("dense", "near").digest()
     with (package / edited).open("a") as file:
         file.write("# edited")
-    provenance._content_digest.cache_clear()
+    provenance._loaded.cache_clear()
     assert ours.digest() != before
     assert GOOD.digest() == built_in
 
 
 def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers(package, monkeypatch):
-    monkeypatch.setattr(provenance, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
+    monkeypatch.setattr(belongings, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
     ours = EpisodeConfig("dense", "near")
     before = ours.digest()
     monkeypatch.setattr("care_sim.study.task.SESSION", "another run")

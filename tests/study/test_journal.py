@@ -4,9 +4,11 @@ import subprocess
 import sys
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from care_sim.errors import InvalidInput
-from care_sim.study.journal import Journal
+from care_sim.study.journal import Journal, _line
 
 HOLDS_AND_DIES = """
 import os, signal, sys
@@ -41,3 +43,61 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
     with Journal(tmp_path / "journal.jsonl") as journal:
         journal.append({"digest": "a"})
         assert "a" in journal
+
+
+ROW = {"digest": "a", "seed": 3, "detection_distance_m": 16.25, "scenario.gap_m": (0.5, 0.6), "policy": "care"}
+
+
+def written(path):
+    with Journal(path, "paper") as journal:
+        journal.append(ROW)
+        journal.append(ROW | {"digest": "b"})
+    return path.read_bytes()
+
+
+def test_rows_come_back_with_their_study(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    written(path)
+    with Journal(path) as journal:
+        assert (journal["a"], journal["b"]["digest"]) == (ROW, "b")
+        assert (journal.studies, journal.damaged) == ({"paper"}, 0)
+
+
+@given(place=st.integers(0, 10_000), bit=st.integers(0, 7))
+def test_no_flipped_bit_gives_another_row(tmp_path_factory, place, bit):
+    path = tmp_path_factory.mktemp("flipped") / "journal.jsonl"
+    content = bytearray(written(path))
+    place %= len(content)
+    content[place] ^= 1 << bit
+    path.write_bytes(content)
+    with Journal(path) as journal:
+        kept = [journal[digest] for digest in "ab" if digest in journal]
+        assert kept == [ROW | {"digest": row["digest"]} for row in kept]
+        assert len(kept) == len(journal) < 2
+        assert journal.damaged >= 1
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"\xff\xfe",
+        b"[1]",
+        b"3",
+        b'{"no": 1}',
+        b'{"digest": "old", "seed": 1}',
+        b"[" * 100_000,
+        b'{"digest": "a", "study": "sweep", "check": "0123456789abcdef"}',
+        _line({"study": "sweep"}).rstrip().encode(),
+        _line({"digest": ["a"], "study": "sweep"}).rstrip().encode(),
+        _line({"digest": "deep", "study": "sweep", "x": 0})
+        .rstrip()
+        .encode()
+        .replace(b'"x": 0', b'"x": ' + b"[" * 9999),
+    ],
+)
+def test_a_line_of_anything_else_is_passed_over_and_counted(tmp_path, line):
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(line + b"\n")
+    written(path)
+    with Journal(path) as journal:
+        assert (len(journal), journal.damaged) == (2, 1)

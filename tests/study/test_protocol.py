@@ -304,5 +304,5 @@ def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
 
 def test_a_folder_of_another_kind_of_study_is_refused(source, tmp_path):
     (tmp_path / "episodes.parquet").touch()
-    with pytest.raises(InvalidInput, match="holds episodes of another study; plays need another --out"):
-        conduct(small(source), tmp_path, workers=1, study=PROTOCOL)
+    with pytest.raises(InvalidInput, match="holds episodes of another study; the plays of the study protocol need"):
+        conduct(small(source), tmp_path, workers=1, study=PROTOCOL, force=True)

@@ -93,3 +93,52 @@ def test_a_damaged_file_is_named(folders, name, text):
     with pytest.raises(InvalidInput, match=f"{name} is damaged") as error:
         read(folders[0])
     assert "\n" not in str(error.value)
+
+
+DEEP = '{"a": ' + "[" * 100_000
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("config.json", DEEP),
+        ("config.json", "[1]"),
+        ("config.json", '{"study": "sweep", "configurations": []}'),
+        ("config.json", '{"algorithm": "ppo", "env": "E", "budget": [], "episodes": 2}'),
+        ("config.json", '{"algorithm": "ppo", "env": "E", "budget": ["a"], "episodes": 2}'),
+        ("config.json", '{"algorithm": ["ppo"], "env": "E", "budget": [0.1], "episodes": 2}'),
+        ("rules.json", DEEP),
+        ("rules.json", "3"),
+        ("rules.json", '{"care": 3}'),
+        ("rules.json", '{"care": {"mean_return": 1, "distance_m": 2}}'),
+        ("rules.json", '{"care": {"episodes": 2, "mean_return": "1", "distance_m": 2}}'),
+        ("rules.json", '{"care": {"episodes": 2, "mean_return": NaN, "distance_m": null}}'),
+        ("curve.csv", "steps,seconds,return,distance_m\n"),
+        ("curve.csv", "steps,seconds,return,distance_m\n1,2,nan,3\n"),
+        ("curve.csv", "steps,seconds,return,distance_m\n1,2,1e300,3\n"),
+        ("curve.csv", f"steps,seconds,return,distance_m\n{10**300},2,1,3\n"),
+        ("curve.csv", "steps,seconds,return,distance_m\n-1,2,1,3\n"),
+        ("curve.csv", "steps,seconds,return,distance_m\n1,2,1,3,4\n"),
+        ("curve.csv", "steps,seconds,return,distance_m\n1,2\0,1,3\n"),
+        ("curve.csv", "\udcff"),
+        ("curve.csv", f'steps,seconds,return,distance_m\n1,2,"{"x" * 200_000}",3\n'),
+    ],
+)
+def test_files_of_somebody_else_are_one_line(folders, name, text, capsys, tmp_path):
+    (folders[0] / name).write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(SystemExit) as end:
+        main(["train", "curves", str(folders[0]), "--out", str(tmp_path / "curves.png")])
+    said = capsys.readouterr().err
+    assert (end.value.code, said.count("\n")) == (2, 1)
+    assert len(said) < 500
+    assert "run-0" in said
+
+
+def test_names_are_drawn_as_they_are(folders, tmp_path):
+    rules = json.loads((folders[0] / "rules.json").read_text())
+    (folders[0] / "rules.json").write_text(json.dumps(rules | {"my $rule_{": rules["care"]}))
+    config = json.loads((folders[0] / "config.json").read_text())
+    (folders[0] / "config.json").write_text(json.dumps(config | {"env": "E $x^$ $\\frac$"}))
+    with pytest.raises(SystemExit) as end:
+        main(["train", "curves", str(folders[0]), "--out", str(tmp_path / "curves.png")])
+    assert end.value.code == 0

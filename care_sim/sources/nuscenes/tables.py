@@ -1,6 +1,5 @@
 """The JSON tables of a nuScenes v1.0 database; a token that points nowhere is named with its file."""
 
-import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
@@ -11,6 +10,7 @@ import numpy as np
 
 from care_sim.errors import InvalidInput
 from care_sim.frames import Floats
+from care_sim.json_text import parsed
 
 Row = dict[str, Any]
 
@@ -158,7 +158,7 @@ def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
     Raises InvalidInput for a file that is missing or truncated.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"), object_hook=taken)
+        return parsed(path.read_text(encoding="utf-8"), taken)
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:

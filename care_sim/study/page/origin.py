@@ -1,23 +1,19 @@
 """Where the rows of a page come from: machine, versions, code, configuration, and what of it is missing."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from care_sim.conditions import DEFAULTS
-from care_sim.study.config import PLAIN_FIELDS
-from care_sim.study.kinds import Kind
-from care_sim.study.play_config import PLAY_FIELDS
+from care_sim.json_text import parsed
+from care_sim.study.kinds import Kind, is_parameter
 from care_sim.study.provenance import code_digest
 from care_sim.study.task import Row
 
 CONFIG = "config.json"
 MANY = 12
 """Values of a parameter that are listed; of more the first and the last."""
-_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "camera_detections", "presence"})
-_PREFIXES = ("scenario.", "policy.", "detector.")
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ def origin(folder: Path, rows: Sequence[Row], kind: Kind, left_out: Sequence[str
 
 def settings(rows: Sequence[Row]) -> dict[str, str]:
     """Parameters by name, with their values in the rows; those at their defaults throughout are left out."""
-    names = [name for name in rows[0] if name in _PARAMETERS or name.startswith(_PREFIXES)]
+    names = [*filter(is_parameter, rows[0])]
     values = {name: list(dict.fromkeys(row.get(name) for row in rows)) for name in names}
     return {name: _listed(held) for name, held in values.items() if held != [DEFAULTS.get(name)]}
 
@@ -70,7 +66,7 @@ def _text(value: Any) -> str:
 def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
     """The file that a study writes first of all, and what is wrong with it."""
     try:
-        description = json.loads(path.read_text())
+        description = parsed(path.read_text())
     except FileNotFoundError:
         return {}, [f"{CONFIG} is missing: machine, versions and the list of what was to be played are not known."]
     except (OSError, ValueError) as error:

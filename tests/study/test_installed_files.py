@@ -1,0 +1,158 @@
+"""What an installed policy or detector ships, or names as a default, counts in the key of a row."""
+
+import numpy as np
+import pytest
+
+from care_sim.study.config import EpisodeConfig
+from care_sim.study.journal import Journal
+from care_sim.study.kinds import EPISODES
+from care_sim.study.play_config import play_grid
+from care_sim.study.provenance import code_digest, detector_digest, policy_digest
+from care_sim.study.report import JOURNAL, conduct
+from care_sim.study.rows import read_rows
+from care_sim.study.runner import run_all
+from care_sim.study.scenes import source_of
+from care_sim.study.task import files_in
+
+HEAD = """
+from pathlib import Path
+import numpy as np
+from care_sim.policies.beam_reduce import BeamReduce
+HERE = Path(__file__).parent
+"""
+BODY = """
+class Mine(BeamReduce):
+    name = "mine"
+    {constant}
+
+    def __init__(self, rig, {parameter}):
+        super().__init__(rig)
+        with np.load({opened}) as file:
+            self._stride = int(file["stride"])
+"""
+FORMS = {
+    "a default beside where it is played": ("", 'path="weights.npz"', "path"),
+    "an absolute default": ("", "path=HERE / 'weights.npz'", "path"),
+    "a default beside its module": ("", 'path="weights.npz"', "HERE / path"),
+    "a default among others": ("", 'paths=("none.npz", "weights.npz")', "HERE / paths[1]"),
+    "a default folder": ("", 'folder="."', 'HERE / folder / "weights.npz"'),
+    "a constant of the class": ('PATH = HERE / "weights.npz"', "n=1", "self.PATH"),
+    "nothing but code": ("", "n=1", 'Path(__file__).with_name("weights.npz")'),
+}
+
+
+@pytest.fixture
+def site(install, tmp_path, monkeypatch):
+    """Installs a policy that opens `weights.npz` in one of the forms; returns the folder of its module."""
+
+    def put(form):
+        constant, parameter, opened = FORMS[form]
+        install("mine_policy", HEAD + BODY.format(constant=constant, parameter=parameter, opened=opened), mine="Mine")
+        monkeypatch.chdir(tmp_path / "mine_policy")
+        write(tmp_path / "mine_policy", 1)
+        return tmp_path / "mine_policy"
+
+    return put
+
+
+def write(folder, stride):
+    np.savez(folder / "weights.npz", stride=np.array(stride))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_weights_that_change_give_another_key_and_their_return_the_old_one(site, form):
+    folder = site(form)
+    config = EpisodeConfig("dartout", "mine")
+    before = config.digest()
+    assert config.digest() == before
+    write(folder, 2)
+    assert config.digest() != before
+    write(folder, 1)
+    assert config.digest() == before
+
+
+def test_the_same_command_plays_again_with_new_weights(site, tmp_path, capsys):
+    folder, out = site("a default beside its module"), tmp_path / "out"
+    config = EpisodeConfig("dartout", "mine", scenario_parameters=(("duration_s", 0.2),))
+    hashes = []
+    for stride in (1, 3, 3):
+        write(folder, stride)
+        assert conduct([config], out, workers=1) == []
+        hashes.append(read_rows(out / EPISODES.file)[0]["digest"])
+    assert hashes[0] != hashes[1] == hashes[2]
+    assert len((out / JOURNAL).read_text().splitlines()) == 2
+
+
+def test_a_file_that_changes_while_a_study_runs_fails_what_met_it_late(site, tmp_path):
+    folder = site("an absolute default")
+    configs = [EpisodeConfig("dartout", "mine", seed=n, scenario_parameters=(("duration_s", 0.1),)) for n in range(2)]
+    assert [config.key for config in configs] == [config.digest() for config in configs]
+    write(folder, 2)
+    with Journal(tmp_path / JOURNAL) as journal:
+        failures = run_all(configs, journal, 1)
+        assert len(journal) == 0
+    assert {failure.reason for failure in failures} == {
+        "the worker runs another version of care-sim or of the policy, or their files changed while the study ran"
+    }
+
+
+def test_all_files_of_the_distribution_count_wherever_they_lie(site):
+    folder = site("nothing but code")
+    info = folder / "mine_policy-1.5.dist-info"
+    (folder / "tables").mkdir()
+    (folder / "tables" / "a.csv").write_text("1")
+    (folder / "stranger.txt").touch()
+    (info / "RECORD").write_text(
+        "mine_policy.py,,\ntables/a.csv,,\nweights.npz,,\nmine_policy-1.5.dist-info/RECORD,,\n"
+    )
+    before = policy_digest("mine")
+    (folder / "stranger.txt").write_text("of another distribution")
+    (folder / "__pycache__").mkdir(exist_ok=True)
+    (folder / "__pycache__" / "mine.nbi").touch()
+    assert policy_digest("mine") == before
+    (folder / "tables" / "a.csv").write_text("2")
+    assert policy_digest("mine") != before
+
+
+def test_code_counts_as_this_process_has_it_loaded(site):
+    folder = site("nothing but code")
+    before = policy_digest("mine")
+    (folder / "mine_policy.py").write_text("edited = True\n")
+    assert policy_digest("mine") == before
+
+
+DETECTOR = """
+class Near:
+    def __init__(self, file="model.bin"):
+        self.file = file
+
+    def detect(self, points):
+        return []
+"""
+
+
+def test_a_detector_is_known_by_its_files_too(install, tmp_path, monkeypatch):
+    install("near_detector", DETECTOR, group="care_sim.detectors", near="Near")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.bin").write_text("1")
+    source = source_of("streets")
+    (config,) = play_grid(source, source.scenes()[:1], ["care"], [0.1], detector="near")
+    before, theirs = config.digest(), detector_digest("near")
+    (tmp_path / "model.bin").write_text("2")
+    assert config.digest() != before
+    assert detector_digest("near") != theirs
+
+
+def test_parameters_name_files_alone_among_others_and_never_the_folder_that_is_nowhere(tmp_path):
+    file = tmp_path / "weights.npz"
+    file.write_text("1")
+    assert files_in((("a", ""), ("b", "care"), ("c", 3), ("d", "x" * 5000), ("e", "a\0b"))) == []
+    assert len(files_in((("a", str(file)), ("b", (0.5, str(file)))))) == 2
+
+
+def test_the_shipped_weights_are_looked_at_again(monkeypatch, tmp_path):
+    (tmp_path / "a.npz").write_text("1")
+    monkeypatch.setattr("care_sim.study.provenance.SHIPPED", tmp_path)
+    before = code_digest()
+    (tmp_path / "a.npz").write_text("2")
+    assert code_digest() != before
