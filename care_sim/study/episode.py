@@ -14,6 +14,7 @@ import numpy as np
 
 import care_sim
 from care_sim.errors import InvalidInput
+from care_sim.imprint import imprint
 from care_sim.loop import ClosedLoop
 from care_sim.policies.base import Policy
 from care_sim.study.config import EpisodeConfig
@@ -49,7 +50,7 @@ def run_episode(config: EpisodeConfig) -> Row:
 
     Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields of
     `care_sim.types.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far; and
-    `episode_hash` over cells fired, ranges returned and poses, equal wherever the episode is repeated.
+    `episode_hash` over cells fired, ranges returned and poses (`care_sim.imprint`).
     """
     return trace(config)[0]
 
@@ -103,8 +104,7 @@ class Seal:
     def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
         """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
         poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
-        for part in (np.asarray(fired), observation["ranges"], np.array(poses)):
-            self._content.update(part.tobytes())
+        self._content.update(imprint(np.asarray(fired, np.int64), observation["ranges"], poses))
 
     def hexdigest(self) -> str:
         """The hash so far."""

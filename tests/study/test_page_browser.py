@@ -88,7 +88,7 @@ def test_a_page_opens_at_once_and_says_what_was_played(opened, played):
     assert page.evaluate("performance.now()") < MOST_MS
     text = page.inner_text("body")
     assert "Sweep of the closed loop" in text
-    assert "4 of 5 are the same to the last bit as in the results" in text
+    assert "4 of 5 are the same as in the results" in text
     assert "Episodes that end otherwise when played again here, which are marked: 1." in text
     assert "config.json is missing" in text
     assert "never" not in page.inner_text("table.episodes")

@@ -112,7 +112,7 @@ class Page:
 
     @property
     def identical(self) -> int:
-        """How many of them went to the last bit as in the results."""
+        """How many of them fired, measured and moved as in the results."""
         return sum(episode.identical for episode in self.episodes)
 
     @property

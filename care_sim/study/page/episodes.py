@@ -31,7 +31,7 @@ class Episode:
 
     @property
     def identical(self) -> bool:
-        """Whether the replay fired, measured and moved to the last bit as the episode did, and ends as the row does."""
+        """Whether the replay fired, measured and moved as the episode did (its hash), and ends as the row does."""
         if self.replay is None or self.differences:
             return False
         return bool(self.replay.row["episode_hash"] == self.row.get("episode_hash"))
