@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_number, is_number
+from care_sim.errors import InvalidInput, check_number, check_whole, is_number, shown
 from care_sim.grid import Cells, cell_indices
 from care_sim.types import Action, Demand
 
@@ -15,16 +16,18 @@ RESERVE_FRACTION = 0.3
 HIGHEST_CELL = 2**24
 """A thousand times the cells of the paper's grid."""
 
+
+SETS = "a list of sets of cells"
 _NO_CELLS = np.empty(0, np.int64)
 
 
 def budget_cells(budget: float, cells: int) -> int:
     """B = round(beta * N) (Eq. 1). Raises InvalidInput for a fraction outside (0, 1] or without a cell."""
-    if not (is_number(budget) and 0.0 < budget <= 1.0):
-        raise InvalidInput(f"budget must lie in (0, 1], got {budget!r}")
-    if round(budget * cells) < 1:
+    if not (is_number(budget) and 0 < budget <= 1):
+        raise InvalidInput(f"budget must lie in (0, 1], got {shown(budget)}")
+    if round(float(budget) * cells) < 1:
         raise InvalidInput(f"budget {budget} leaves no cell of {cells}; the least is {1 / cells:.2g}")
-    return round(budget * cells)
+    return round(float(budget) * cells)
 
 
 def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterable[int] | None = None) -> Cells:
@@ -33,13 +36,23 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterab
     Exploitation sets fill at most round((1 - rho) B) cells, round-robin; then each reserve layer in
     order, round-robin, up to B; then `floor`, a permutation of all cells, up to B. Within a set cells
     are taken in ascending order, and a cell already taken costs the set no turn. rho = 0 keeps no
-    reserve: layers then take only what exploitation leaves.
+    reserve: layers then take only what exploitation leaves. Raises InvalidInput for a demand of another form.
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
-    stages: list[Sequence[Cells]] = [demand.exploitation, *demand.layers]
-    limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(demand.layers)
+    check_whole("budget", budget, 0, HIGHEST_CELL)
+    layers = _listed("layers", "a list of layers", demand.layers)
+    stages = [_listed("exploitation", SETS, demand.exploitation), *(_listed("a layer", SETS, one) for one in layers)]
+    limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(layers)
     chosen = _in_turns(stages, limits)
     return chosen if floor is None else np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
+
+
+def _listed(name: str, form: str, given: Any) -> Sequence[Any]:
+    """What a demand holds there. Raises InvalidInput unless it is a sequence."""
+    if not (given.ndim if isinstance(given, np.ndarray) else isinstance(given, Sequence)):
+        raise InvalidInput(f"{name} must be {form}, got {shown(given)}")
+    sequence: Sequence[Any] = given
+    return sequence
 
 
 def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:

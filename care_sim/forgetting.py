@@ -1,11 +1,11 @@
 """Algorithm 3 of the paper: safety-bounded forgetting (SBF) shrinks the hulls of harmless tracks."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import check_number
+from care_sim.bounds import bounded, settle
 from care_sim.frames import Floats
 from care_sim.grid import AZIMUTH_MARGIN, Cells
 from care_sim.types import Ego, Tracks
@@ -15,24 +15,23 @@ from care_sim.types import Ego, Tracks
 class ForgettingRules:
     """Thresholds of SBF with the paper's values and sources (Remark 3)."""
 
-    k_safe: float = 2.0
+    k_safe: float = bounded(2.0, 0, 1000)
     """Scale of the guard distance; 0 removes the guard."""
-    standstill_m: float = 2.0
+    standstill_m: float = bounded(2.0, 0, 1000)
     """s_0, jam distance of the intelligent driver model (Treiber et al. 2000)."""
-    headway_s: float = 2.0
+    headway_s: float = bounded(2.0, 0, 1000)
     """T_h, the two-second rule (Vogel 2003)."""
-    static_mps: float = 0.5
+    static_mps: float = bounded(0.5, 0, 1000)
     """tau_static, below adult walking speed (Bohannon 1997)."""
-    receding_mps: float = 1.0
+    receding_mps: float = bounded(1.0, 0, 1000)
     """tau_receding, clear radial departure."""
-    position_sigma_m: float = 0.0
+    position_sigma_m: float = bounded(0.0, 0, 1000)
     """sigma_pos of Eq. 4: zero in simulation, 0.4 on the paper's vehicle."""
-    decay_per_keyframe: float = 1.0
+    decay_per_keyframe: float = bounded(1.0, 0, 1000)
     """Columns of margin forgotten with each consecutive safe keyframe."""
 
     def __post_init__(self) -> None:
-        for rule in fields(self):
-            check_number(rule.name, getattr(self, rule.name), 0)
+        settle(self)
 
     def guard_distance(self, ego_speed: float) -> float:
         """Eq. 3, metres: inside it nothing is ever forgotten."""

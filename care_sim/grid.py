@@ -13,7 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.bounds import bounded, settle
+from care_sim.errors import InvalidInput, as_array
 from care_sim.frames import Floats
 
 Cells = NDArray[np.int64]
@@ -22,6 +23,8 @@ AZIMUTH_MARGIN = 2
 """Dilation of hulls and wedges, in columns (paper, Remark 2)."""
 ELEVATION_MARGIN = 1
 """Dilation of hulls and wedges, in rows (paper, Remark 2)."""
+MOST_COLUMNS, MOST_ROWS = 2**14, 2**10
+"""Of a grid: a thousand times the cells of the paper's."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +35,16 @@ class AngularGrid:
     nuScenes sensor from +10.67 to -30.67 degrees in equal steps. `range_m` is the reach of a ray.
     """
 
-    columns: int = 512
-    rows: int = 32
-    top: float = np.deg2rad(10.67)
-    bottom: float = np.deg2rad(-30.67)
-    range_m: float = 50.0
+    columns: int = bounded(512, 1, MOST_COLUMNS)
+    rows: int = bounded(32, 2, MOST_ROWS)
+    top: float = bounded(float(np.deg2rad(10.67)), -np.pi / 2, np.pi / 2)
+    bottom: float = bounded(float(np.deg2rad(-30.67)), -np.pi / 2, np.pi / 2)
+    range_m: float = bounded(50.0, 1, 10_000)
+
+    def __post_init__(self) -> None:
+        settle(self, " of the grid")
+        if self.bottom >= self.top:
+            raise InvalidInput(f"bottom of the grid must lie below its top, {self.top:g}, got {self.bottom:g}")
 
     @property
     def size(self) -> int:
@@ -138,7 +146,7 @@ class AngularGrid:
 
 def cell_indices(cells: Sequence[int] | Cells) -> NDArray[np.integer]:
     """`cells` as an array. Raises InvalidInput for what is no list of indices."""
-    array = np.asarray(cells)
+    array = as_array("a set of cells", cells)
     if array.ndim != 1 or not (array.dtype.kind in "iu" or array.size == 0):
         raise InvalidInput(
             f"a set of cells must be a list of cell indices, got {array.dtype} of shape {array.shape}"

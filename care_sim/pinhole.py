@@ -12,10 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from care_sim.bounds import bounded, settle
+from care_sim.errors import InvalidInput, check_number, shown
 from care_sim.frames import Floats, Frame
 
 NEAR_M = 0.1
 """Nothing nearer to the image plane than this is seen."""
+MOST_PIXELS = 2**14
+"""A side of a picture: of the largest a gigabyte of numbers."""
+FARTHEST_M = 1000.0
+"""A camera of the car lies within this of its LiDAR."""
+_TURNS = 100 * np.pi
+"""Angles may go round, as long as a float tells them apart."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +34,20 @@ class PinholeCamera:
     about z, `pitch` raises it and `roll` lowers the camera's right (radians). `horizontal_fov` in radians.
     """
 
-    width: int = 320
-    height: int = 180
-    horizontal_fov: float = np.pi / 2
+    width: int = bounded(320, 1, MOST_PIXELS)
+    height: int = bounded(180, 1, MOST_PIXELS)
+    horizontal_fov: float = bounded(np.pi / 2, 0.001, 3.14)
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    yaw: float = 0.0
-    pitch: float = 0.0
-    roll: float = 0.0
+    yaw: float = bounded(0.0, -_TURNS, _TURNS)
+    pitch: float = bounded(0.0, -_TURNS, _TURNS)
+    roll: float = bounded(0.0, -_TURNS, _TURNS)
+
+    def __post_init__(self) -> None:
+        settle(self, " of the camera")
+        if not (isinstance(self.position, tuple | list | np.ndarray) and len(self.position) == 3):
+            raise InvalidInput(f"position of the camera must be x, y and z in metres, got {shown(self.position)}")
+        for metres in self.position:
+            check_number("position of the camera", metres, -FARTHEST_M, FARTHEST_M)
 
     @property
     def focal(self) -> float:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from care_sim.errors import check_number, unknown
+from care_sim.errors import InvalidInput, check_known, check_number, shown
 from care_sim.types import Keyframe
 
 KEEP_CLEAR_M = 2.0
@@ -12,15 +12,19 @@ WEIGHTS: dict[str, float] = {"delay": 1.0, "clearance": 1.0, "collision": 10.0, 
 """Default weight of every term. `gain` is off, since the reward of these environments was published without it;
 then it is not measured, which would cost rays, and reads 0."""
 
+HEAVIEST = 1e6
+"""A return stays far from where sums of floats lose the other terms."""
+
 
 def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
     """The default weights with some changed. Raises InvalidInput for an unknown term or no finite number."""
-    changes = changes or {}
+    changes = {} if changes is None else changes
+    if not isinstance(changes, Mapping):
+        raise InvalidInput(f"reward_weights must map terms to numbers, got {shown(changes)}")
     for name, value in changes.items():
-        if name not in WEIGHTS:
-            raise unknown("reward term", name, WEIGHTS)
-        check_number(f"reward weight {name}", value)
-    return {**WEIGHTS, **changes}
+        check_known("reward term", name, WEIGHTS)
+        check_number(f"reward weight {name}", value, -HEAVIEST, HEAVIEST)
+    return {**WEIGHTS, **{name: float(value) for name, value in changes.items()}}
 
 
 def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> dict[str, float]:

@@ -8,13 +8,15 @@ body id of the simulator: truth stays in the world and in the scoring.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_number, check_whole
+from care_sim.bounds import bounded, settle
+from care_sim.errors import InvalidInput, as_array, shown
 from care_sim.frames import Floats
-from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS, AngularGrid, Cells
 from care_sim.pinhole import Lenses, PinholeCamera
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
@@ -23,6 +25,10 @@ CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
 MAX_DETECTIONS = 128
 """Rows of the observation; six cameras in dense traffic saw up to 67 boxes in recorded drives."""
 MAX_TRACKS = 64
+OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
+"""What an observation consists of."""
+HIGHEST = 2.0**24
+"""No number of an observation is larger: the largest count that float32 holds exactly."""
 
 Observation = Mapping[str, NDArray[np.float32]]
 Action = NDArray[np.float32]
@@ -145,15 +151,18 @@ class Belief:
     @classmethod
     def from_observation(cls, observation: Observation) -> "Belief":
         """Read an observation of the environments back, without loss. Raises InvalidInput for another."""
-        if not isinstance(observation, Mapping) or "ranges" not in observation:
+        if not (isinstance(observation, Mapping) and all(key in observation for key in OBSERVED)):
             raise InvalidInput("an observation of CARE-Sim's environments is needed, as they give it without wrappers")
-        ranges = observation["ranges"]
-        speed, yaw_rate, acceleration = (float(value) for value in observation["ego"])
+        speed, yaw_rate, acceleration = _read(observation, "ego", (3,)).tolist()
+        (budget,) = _read(observation, "budget", (1,)).tolist()
+        ranges = _read(observation, "ranges", (None, None)).astype(np.float32, copy=False)
+        if not (0 <= budget <= 1 and ranges.min(initial=0) >= 0):
+            raise InvalidInput("an observation's budget must lie in [0, 1], its ranges must not be below 0")
         return cls(
             Ego(speed, yaw_rate, acceleration),
-            round(float(observation["budget"][0]) * ranges.size),
-            ImageDetections.from_rows(observation["detections"]),
-            Tracks.from_rows(observation["tracks"]),
+            round(budget * ranges.size),
+            ImageDetections.from_rows(_rows(observation, "detections", ImageDetections.COLUMNS)),
+            Tracks.from_rows(_rows(observation, "tracks", Tracks.COLUMNS)),
             ranges,
         )
 
@@ -167,6 +176,34 @@ class Belief:
             "tracks": _padded(self.tracks.rows(), MAX_TRACKS),
             "ranges": self.ranges.copy(),
         }
+
+
+def _read(observation: Observation, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another shape, and for what no
+    sensor says.
+    """
+    array = as_array(f"{key} of an observation", observation[key])
+    fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+    if not (fits and array.dtype.kind in "iuf"):
+        wanted = " x ".join("any" if n is None else str(n) for n in shape)
+        raise InvalidInput(f"{key} of an observation must be {wanted} numbers, got {array.dtype} of {array.shape}")
+    if not (array.min(initial=0) >= -HIGHEST and array.max(initial=0) <= HIGHEST):
+        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+    return array
+
+
+def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray[Any]:
+    """A table of an observation. Raises InvalidInput for rows that are neither padding nor of a known class."""
+    rows = _read(observation, key, (None, len(columns)))
+    leads = rows[:, 0]
+    classes = rows[leads >= 0, columns.index("class")]
+    for numbers, least, most in ((leads, -1, HIGHEST), (classes, 0, len(CLASSES) - 1)):
+        if numbers.min(initial=0) < least or numbers.max(initial=0) > most or (numbers != np.floor(numbers)).any():
+            raise InvalidInput(
+                f"{key} of an observation: a row must begin with a whole number, -1 where it is padding, and be of a "
+                f"class 0 to {len(CLASSES) - 1}"
+            )
+    return rows
 
 
 def _padded(rows: Floats, length: int) -> NDArray[np.float32]:
@@ -207,17 +244,30 @@ class Rig:
 
     grid: AngularGrid = field(default_factory=AngularGrid)
     cameras: tuple[PinholeCamera, ...] = ()
-    budget: int = 1638
-    reserve_fraction: float = 0.3
-    keyframe_s: float = 0.1
-    azimuth_margin: int = AZIMUTH_MARGIN
-    elevation_margin: int = ELEVATION_MARGIN
-    sensor_height_m: float = 1.84
+    budget: int = bounded(1638, 0, MOST_COLUMNS * MOST_ROWS)
+    reserve_fraction: float = bounded(0.3, 0, 1)
+    keyframe_s: float = bounded(0.1, 0.001, 60)
+    azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
+    elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
+    sensor_height_m: float = bounded(1.84, 0, 100)
 
     def __post_init__(self) -> None:
-        check_number("reserve_fraction", self.reserve_fraction, 0, 1)
-        check_whole("azimuth_margin", self.azimuth_margin, 0)
-        check_whole("elevation_margin", self.elevation_margin, 0)
+        settle(self)
+        if not isinstance(self.grid, AngularGrid):
+            raise InvalidInput(f"grid must be an AngularGrid, got {shown(self.grid)}")
+        if not (isinstance(self.cameras, tuple | list) and all(isinstance(c, PinholeCamera) for c in self.cameras)):
+            raise InvalidInput(f"cameras must be a tuple of PinholeCamera, got {shown(self.cameras)}")
+        object.__setattr__(self, "cameras", tuple(self.cameras))
+
+    def read(self, observation: Observation) -> Belief:
+        """The belief of an observation. Raises InvalidInput for one of another grid or other cameras."""
+        belief = Belief.from_observation(observation)
+        if belief.ranges.shape != self.grid.shape:
+            raise InvalidInput(f"ranges of an observation must be {self.grid.shape}, got {belief.ranges.shape}")
+        numbers = belief.detections.cameras
+        if numbers.min(initial=0) < 0 or numbers.max(initial=-1) >= len(self.cameras):
+            raise InvalidInput(f"detections of an observation must be of cameras 0 to {len(self.cameras) - 1}")
+        return belief
 
     @cached_property
     def lenses(self) -> Lenses:

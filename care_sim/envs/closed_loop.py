@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from care_sim import reward as rewards
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
-from care_sim.errors import InvalidInput
+from care_sim.errors import check_choice, check_number
 from care_sim.evaluation.metrics import outcome
 from care_sim.loop import ClosedLoop
 from care_sim.scenarios import make_scenario
@@ -17,7 +17,10 @@ from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.types import Action, Keyframe
-from care_sim.world.world import whole_steps
+from care_sim.world.world import STEP_S, whole_steps
+
+LONGEST_KEYFRAME_S = 1.0
+"""A car at 30 km/h would be 8 m further on, past what it brakes for."""
 
 
 class ClosedLoopEnv(SensingEnv[ClosedLoop]):
@@ -95,9 +98,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         scoring_info: bool = True,
         **parameters: Any,
     ):
+        check_number("keyframe_s", keyframe_s, STEP_S, LONGEST_KEYFRAME_S)
         whole_steps(keyframe_s)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
+        check_choice("render_mode", render_mode, self.metadata["render_modes"])
         conditions = conditions_of(parameters)
         check_engine(conditions.engine)
         super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info)

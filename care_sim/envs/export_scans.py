@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 
 from care_sim.envs.watching import Watching, numbered
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_path
 from care_sim.extras import import_open3d
 from care_sim.frames import Floats
 from care_sim.loop import ClosedLoop
@@ -52,6 +52,7 @@ class ExportScans(Watching):
 
     def __init__(self, env: gymnasium.Env[Any, Action], path: "str | PathLike[str]", policy: Policy | None = None):
         super().__init__(env, policy)
+        check_path("path", path)
         self._open3d: ModuleType = import_open3d()
         self._path = self._folder = Path(path)
 

@@ -46,10 +46,10 @@ class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any], RecordCo
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], columns: int = 64, rows: int = 8):
-        RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
-        gymnasium.ObservationWrapper.__init__(self, env)
         self._sensing = sensing(env)
         self.features = GridFeatures(self._sensing.rig, columns, rows)
+        RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
+        gymnasium.ObservationWrapper.__init__(self, env)
         shown: spaces.Space[Any] = spaces.Dict(
             {
                 "grid": spaces.Box(0.0, 1.0, (int(np.prod(self.features.shape)),), np.float32),

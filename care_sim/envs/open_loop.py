@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from care_sim.conditions import MIN_RETURNS
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_choice, shown
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import Score
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.film import Film
 from care_sim.openloop import Exposure, OpenLoop
-from care_sim.perception.registry import PROXY, make_detector
+from care_sim.perception.registry import PROXY, check_detector, make_detector
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -86,8 +86,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         scoring_info: bool = True,
         **parameters: Any,
     ):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidInput(f"render_mode must be None or 'rgb_array', got {render_mode!r}")
+        check_choice("render_mode", render_mode, self.metadata["render_modes"])
         for name in UNFILMED:
             if name in parameters:
                 raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
@@ -95,10 +94,13 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         conditions = conditions_of(parameters)
         if parameters:
             raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
+        check_detector(detector)
         if detector != PROXY and conditions.min_returns != MIN_RETURNS:
             raise InvalidInput(f"min_returns is of the detector {PROXY}, {detector} does not know it")
         super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s, secret, scoring_info)
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
+        if not isinstance(detector_parameters, Mapping | None):
+            raise InvalidInput(f"detector_parameters must map names to values, got {shown(detector_parameters)}")
         self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
         self.render_mode = render_mode
@@ -155,6 +157,8 @@ class FilmEnv(OpenLoopEnv):
     """The open loop over a film that is there already; `care_sim.study` plays all policies of a scene so."""
 
     def __init__(self, film: Film, **parameters: Any):
+        if not isinstance(film, Film):
+            raise InvalidInput(f"film must be a care_sim.film.Film, got {shown(film)}")
         self.film = film
         super().__init__(film.cameras, film.sensor_height_m, film.keyframe_s, **parameters)
 
@@ -214,6 +218,8 @@ class ReplayEnv(FilmEnv):
         camera_detections: str | PathLike[str] | None = None,
         **parameters: Any,
     ):
+        if not isinstance(scene, str | None):
+            raise InvalidInput(f"scene must be a name, got {shown(scene)}")
         options = {"split": split, "version": version, "camera_detections": camera_detections}
         recorded = recordings(source, options)
         super().__init__(film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters)

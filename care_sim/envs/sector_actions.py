@@ -20,10 +20,10 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
     """Scores a sector, from -1 to 1: the range in which learners are at home."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
-        RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
-        gymnasium.ActionWrapper.__init__(self, env)
         self._sensing = sensing(env)
         self.sectors = Tiling(self._sensing.rig.grid, azimuths, elevations)
+        RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
+        gymnasium.ActionWrapper.__init__(self, env)
         self.action_space = spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
 
     def _cells(self, demand: Demand) -> Action:

@@ -11,7 +11,7 @@ from care_sim.allocation import budget_cells, fired_cells
 from care_sim.conditions import Conditions
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.envs.truth import EpisodeTruth, Loop
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_seed, shown
 from care_sim.floor import Floor
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
@@ -78,9 +78,17 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """What privileged policies may ask for; `make_policy` hands it to them and to nobody else."""
         return EpisodeTruth(lambda: self.loop)
 
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Begin the environment's own generator anew where there is a seed. Raises InvalidInput unless it is a whole
+        number of 0 to 2^63 - 1.
+        """
+        if seed is not None:
+            check_seed(seed)
+            super().reset(seed=int(seed))
+
     def entropy(self, seed: int | None) -> int:
         """The seed of an episode: the given one, else one that the environment's own generator draws."""
-        return seed if seed is not None else int(self.np_random.integers(2**32))
+        return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
         """`count` independent streams of an episode; see `care_sim.streams`."""
@@ -132,7 +140,7 @@ def conditions_of(parameters: dict[str, Any]) -> Conditions:
 
 def sensing(env: gymnasium.Env[Any, Any]) -> SensingEnv[Any]:
     """The environment under the wrappers. Raises InvalidInput for one that is none of CARE-Sim."""
-    inner = env.unwrapped
-    if not isinstance(inner, SensingEnv):
-        raise InvalidInput(f"wrappers of CARE-Sim need one of its environments, got {env}")
+    inner = getattr(env, "unwrapped", None)
+    if not (isinstance(env, gymnasium.Env) and isinstance(inner, SensingEnv)):
+        raise InvalidInput(f"wrappers of CARE-Sim need one of its environments, got {shown(env)}")
     return inner

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, as_array
 from care_sim.types import CLASSES, MAX_DETECTIONS, MAX_TRACKS, Rig
 
 MAX_SPEED_MPS = 100.0
@@ -45,14 +45,16 @@ def observation_space(rig: Rig) -> spaces.Space[Any]:
 
 def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDArray[np.float32]:
     """The action as float32 scores; a boolean mask is one too. Raises InvalidInput otherwise."""
-    scores = np.asarray(action)
+    scores = as_array("action", action)
     if scores.shape != shape:
         raise InvalidInput(f"action must have shape {shape} (rows, columns), got {scores.shape}")
-    if not (np.issubdtype(scores.dtype, np.number) or scores.dtype == bool):
+    if scores.dtype.kind not in "biuf":
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
+    with np.errstate(over="ignore"):
+        scores = scores.astype(np.float32, copy=False)
     if not np.isfinite(scores).all():
-        raise InvalidInput("action must not hold NaN or infinity; score a cell 0 to leave it out")
-    return scores.astype(np.float32, copy=False)
+        raise InvalidInput("action must not hold NaN or infinity (of float32); score a cell 0 to leave it out")
+    return scores
 
 
 def _box(bounds: Sequence[Sequence[float]]) -> spaces.Box:

@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, shown
 from care_sim.loop import ClosedLoop
 from care_sim.moments import Moment, Witness
 from care_sim.policies.base import Policy
@@ -23,10 +23,12 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
     """
 
     def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
+        inner, name = getattr(env, "unwrapped", None), type(self).__name__
+        if not (isinstance(env, gymnasium.Env) and isinstance(inner, ClosedLoopEnv)):
+            raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {shown(env)}")
+        if not isinstance(policy, Policy | None):
+            raise InvalidInput(f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}")
         super().__init__(env)
-        inner, name = env.unwrapped, type(self).__name__
-        if not isinstance(inner, ClosedLoopEnv):
-            raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {env}")
         self._closed_loop, self._policy = inner, policy
         self._witness: Witness | None = None
         self._begun, self._episodes = False, 0

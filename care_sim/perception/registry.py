@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 
-from care_sim.errors import InvalidInput, MissingExtra, unknown
+from care_sim.errors import InvalidInput, MissingExtra, check_known
 from care_sim.perception.cluster import ClusterDetector
 from care_sim.perception.detectors import Detector, ReturnsProxy
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
@@ -28,13 +28,19 @@ def detector_names() -> list[str]:
     return [*BUILT_IN, *sorted(set(entries()) - set(BUILT_IN))]
 
 
-def make_detector(name: str, sensor_height_m: float, **parameters: object) -> Detector:
+def check_detector(name: object) -> None:
+    """Raise InvalidInput for a name that is not a detector."""
+    check_known("detector", name, detector_names())
+
+
+def make_detector(name: str, sensor_height_m: float, /, **parameters: object) -> Detector:
     """The detector for a film whose LiDAR stands `sensor_height_m` above the road.
 
     All but the proxy are handed points alone, whoever wrote them. Raises InvalidInput for an unknown name or
     parameter, or a value that is not allowed; BrokenDetector for one that cannot be loaded or made; MissingExtra for
     one whose library is not installed.
     """
+    check_detector(name)
     if name == PROXY:
         _check_parameters(name, ReturnsProxy, parameters)
         return ReturnsProxy(**parameters)  # type: ignore[arg-type]
@@ -68,10 +74,7 @@ def _summary(name: str) -> str:
 def _maker(name: str) -> Maker:
     if name in _REAL:
         return _REAL[name]
-    installed = entries()
-    if name not in installed:
-        raise unknown("detector", name, detector_names())
-    return _load(name, installed[name])
+    return _load(name, entries()[name])
 
 
 def _load(name: str, entry: EntryPoint) -> Maker:
@@ -98,8 +101,7 @@ def _check_parameters(name: str, make: Callable[..., object], parameters: dict[s
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return
     for given in parameters:
-        if given not in signature.parameters:
-            raise unknown(f"parameter of detector {name}", given, signature.parameters)
+        check_known(f"parameter of detector {name}", given, signature.parameters)
     for parameter in accepted:
         needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_POSITIONAL
         if needed and parameter.name not in parameters:

@@ -2,7 +2,7 @@
 
 import gymnasium
 
-from care_sim.errors import BrokenPolicy, InvalidInput, MissingExtra, unknown
+from care_sim.errors import BrokenPolicy, InvalidInput, MissingExtra, check_known, shown
 from care_sim.policies.all_camera import AllCamera
 from care_sim.policies.base import Policy
 from care_sim.policies.beam_reduce import BeamReduce
@@ -54,8 +54,8 @@ def policy_names() -> list[str]:
 
 def check_policy(name: str) -> None:
     """Raise InvalidInput for a name that is not a policy."""
-    if name not in BUILT_IN and name not in policy_names():
-        raise unknown("policy", name, policy_names())
+    if not (isinstance(name, str) and name in BUILT_IN):
+        check_known("policy", name, policy_names())
 
 
 def tags_of(name: str) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ def tags_of(name: str) -> tuple[str, ...]:
     return tags
 
 
-def make_policy(name: str, env: gymnasium.Env, **parameters: object) -> Policy:
+def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy:
     """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its rig alone.
 
     Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an environment without
@@ -101,8 +101,7 @@ def maker(name: str) -> Maker:
     """What makes the policy. Raises InvalidInput with the reason for one that cannot be loaded."""
     if name in BUILT_IN:
         return BUILT_IN[name]
-    if name not in entries():
-        raise unknown("policy", name, policy_names())
+    check_known("policy", name, policy_names())
     return load(entries()[name])
 
 
@@ -119,4 +118,6 @@ def _of_environment(name: str, env: gymnasium.Env, attribute: str) -> object:
     try:
         return env.get_wrapper_attr(attribute)
     except AttributeError as error:
-        raise InvalidInput(f"policy {name} needs an environment of CARE-Sim with a {attribute}, got {env}") from error
+        raise InvalidInput(
+            f"policy {name} needs an environment of CARE-Sim with a {attribute}, got {shown(env)}"
+        ) from error

@@ -38,9 +38,10 @@ class Policy(ABC):
     def __call__(self, observation: Observation) -> Action:
         """The action (E, A) of the environments for an observation.
 
-        Raises InvalidInput when `demand` returns no Demand, or a cell that the grid does not have.
+        Raises InvalidInput for what is no observation of its rig, and when `demand` returns no Demand, or a cell that
+        the grid does not have.
         """
-        belief = Belief.from_observation(observation)
+        belief = self.rig.read(observation)
         try:
             return scores_of(self._cells(belief), self.rig.grid.shape)
         except InvalidInput as error:

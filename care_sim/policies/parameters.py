@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, check_known
 from care_sim.policies.base import Policy
 from care_sim.policies.privileged import PrivilegedPolicy
 
@@ -32,8 +32,7 @@ def check_parameters(name: str, make: Maker, parameters: Mapping[str, object]) -
         return
     known = [parameter.name for parameter in accepted]
     for parameter in parameters:
-        if parameter not in known:
-            raise unknown(f"parameter of policy {name}", parameter, known)
+        check_known(f"parameter of policy {name}", parameter, known)
 
 
 def _given(make: Maker) -> int:

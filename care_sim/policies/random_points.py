@@ -4,7 +4,7 @@ from zlib import crc32
 
 import numpy as np
 
-from care_sim.errors import check_whole
+from care_sim.errors import check_seed
 from care_sim.frames import Floats
 from care_sim.grid import Cells
 from care_sim.policies.matched_fraction import MatchedFraction
@@ -23,7 +23,7 @@ class RandomPoints(MatchedFraction):
 
     def __init__(self, rig: Rig, truth: Truth, seed: int = 0):
         super().__init__(rig, truth)
-        check_whole("seed", seed, 0)
+        check_seed(seed)
         self._seed = seed
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, fields
 
-from care_sim.errors import InvalidInput, check_whole, unknown
+from care_sim.errors import InvalidInput, check_known, check_whole
 
 ACTIONS = ("SectorReserve", "SectorScores")
 _TEXT = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")
@@ -24,8 +24,7 @@ class Wrapping:
     rows: int = 8
 
     def __post_init__(self) -> None:
-        if self.action not in ACTIONS:
-            raise unknown("action", self.action, ACTIONS)
+        check_known("action", self.action, ACTIONS)
         for name in ("azimuths", "elevations", "columns", "rows"):
             check_whole(name, getattr(self, name), 1)
         for blocks, sectors in (("columns", "azimuths"), ("rows", "elevations")):

@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from care_sim.bounds import bounded, settle
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
 Range = tuple[float, float]
-SIGNED = {"signed": True}
-"""Metadata of a range whose values may be negative although the default's are not."""
+LONGEST_S = 60.0
+"""Of an episode: a car at 60 km/h comes to the end of the road, and a picture is as old as an observation can say."""
+EGO_SPEEDS_MPS = (0.5, 60.0)
+"""From a walk to far beyond any street's traffic: what the ego's speed may be."""
 
 SPEED_LIMIT_MPS = 30 / 3.6
 """All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
@@ -32,7 +35,10 @@ LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
 class Scenario(ABC):
     """The physics of a scenario; a seeded generator places and times what its ranges leave open."""
 
-    duration_s: float = 6.0
+    duration_s: float = bounded(6.0, 0.05, LONGEST_S)
+
+    def __post_init__(self) -> None:
+        settle(self, f" of {type(self).__name__.lower()}")
 
     @abstractmethod
     def build(self, rng: np.random.Generator) -> World:

@@ -1,20 +1,21 @@
 """A person who runs across the ego's lane from behind an occluder: the physics of two scenarios."""
 
 from abc import abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.bounds import bounded
+from care_sim.errors import InvalidInput, check_known
 from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
+    EGO_SPEEDS_MPS,
     LANE_WIDTH_M,
     LEFT_PARKING_Y,
     NO_LIMIT_MPS,
     PARKING_WIDTH_M,
     PAVEMENT_WIDTH_M,
     RIGHT_PARKING_Y,
-    SIGNED,
     Range,
     Scenario,
     draw,
@@ -42,19 +43,20 @@ class CrossingScenario(Scenario):
 
     occluder: str = "trailer"
     occluder_reported: bool = False
-    ego_speed_mps: Range = EGO_SPEED_MPS
-    crossing_m: Range = (37.0, 41.0)
+    ego_speed_mps: Range = bounded(EGO_SPEED_MPS, *EGO_SPEEDS_MPS)
+    crossing_m: Range = bounded((37.0, 41.0), 5, 200)
     """From the ego's first position to the person's line: four to five seconds of approach, so that every
     track has settled."""
-    gap_m: Range = (0.8, 1.2)
+    gap_m: Range = bounded((0.8, 1.2), 0.05, 20)
     """From the end of the occluder to the person's line: about a step."""
-    run_mps: Range = (2.6, 2.8)
-    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050)."""
-    run_up_mps2: float = 5.0
+    run_mps: Range = bounded((2.6, 2.8), 0.1, 12.5)
+    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050); no sprinter exceeds
+    12.5."""
+    run_up_mps2: float = bounded(5.0, 0.1, 20)
     """Full speed after half a second and 0.7 m, all of it in the occluder's shade."""
-    kerb_offset_m: Range = (-0.2, 0.2)
+    kerb_offset_m: Range = bounded((-0.2, 0.2), -1, 1)
     """How far the occluder stands off the middle of the parking lane."""
-    encroachment_s: Range = field(default=(0.3, 0.6), metadata=SIGNED)
+    encroachment_s: Range = bounded((0.3, 0.6), -10, 10)
     """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes: a near miss. Above 0
     nobody is hit by a car that does nothing, so a collision can only come from the braking; below 0 is a
     collision course. Both bounds were picked, from geometry alone, so that a full scan sees the person at
@@ -62,8 +64,8 @@ class CrossingScenario(Scenario):
     """
 
     def __post_init__(self) -> None:
-        if self.occluder not in OCCLUDERS:
-            raise unknown("occluder", self.occluder, OCCLUDERS)
+        super().__post_init__()
+        check_known("occluder", self.occluder, OCCLUDERS)
         if self.occluder_reported and CATALOGUE[self.occluder].label is None:
             raise InvalidInput(f"occluder_reported needs occluder='truck' or 'van', a {self.occluder} has no class")
 

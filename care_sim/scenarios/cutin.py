@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from care_sim.bounds import bounded
 from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
+    EGO_SPEEDS_MPS,
     LANE_WIDTH_M,
     SPEED_LIMIT_MPS,
     Range,
@@ -28,12 +30,12 @@ class CutIn(Scenario):
     """
 
     occluder_reported: bool = True
-    ego_speed_mps: Range = EGO_SPEED_MPS
-    stop_m: Range = (42.0, 46.0)
+    ego_speed_mps: Range = bounded(EGO_SPEED_MPS, *EGO_SPEEDS_MPS)
+    stop_m: Range = bounded((42.0, 46.0), 5, 200)
     """From the ego's first position to the front of the bus: far enough for the bus to hide the car."""
-    gap_m: Range = (2.0, 3.0)
+    gap_m: Range = bounded((2.0, 3.0), 0.05, 50)
     """Between bus and car, as behind a bus that has closed up at its stop."""
-    pull_out_s: Range = (2.0, 2.5)
+    pull_out_s: Range = bounded((2.0, 2.5), -10, 20)
     """Time gap of the ego to the car's rear when it pulls out. UN Regulation 157 (5.2.5.2) counts a
     cut-in at this closing speed as avoidable down to about 1 s."""
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
+from care_sim.bounds import bounded
 from care_sim.scenarios.base import LANE_WIDTH_M, LEFT_PARKING_Y, RIGHT_PARKING_Y, Range, draw
 from care_sim.scenarios.crossing import CrossingScenario
 from care_sim.world.bodies import CATALOGUE
@@ -60,14 +60,9 @@ class Dense(CrossingScenario):
     when the person appears, and a driver who follows the ego.
     """
 
-    vehicles: int = 7
-    place_jitter_m: Range = (-0.4, 0.4)
+    vehicles: int = bounded(7, 0, len(PLACES))
+    place_jitter_m: Range = bounded((-0.4, 0.4), -3, 3)
     """How far a standing vehicle is off its place along the street; across, a quarter of that."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 <= self.vehicles <= len(PLACES):
-            raise InvalidInput(f"vehicles must lie in 0..{len(PLACES)}, got {self.vehicles}")
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""

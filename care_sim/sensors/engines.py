@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from care_sim.errors import unknown
+from care_sim.errors import check_known
 from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
@@ -58,5 +58,4 @@ ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], Engine]] = {"bullet": Bu
 
 def check_engine(name: str) -> None:
     """Raise InvalidInput for a name that is not an engine."""
-    if name not in ENGINES:
-        raise unknown("engine", name, ENGINES)
+    check_known("engine", name, ENGINES)

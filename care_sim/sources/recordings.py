@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, check_known, check_path, shown
 from care_sim.film import Film
 from care_sim.sources import argoverse2
 from care_sim.sources.argoverse2_tables import ANNOTATION_FILES, POSE_FILE
@@ -51,8 +51,7 @@ class Argoverse2(Recordings):
     def film(self, scene: str) -> Film:
         """See `care_sim.sources.argoverse2.film`."""
         logs = {log.name: log for log in argoverse2.logs(self.folder)}
-        if scene not in logs:
-            raise unknown(f"log in {self.folder}", scene, logs)
+        check_known(f"log in {self.folder}", scene, logs)
         return argoverse2.film(logs[scene])
 
     def files(self, scene: str) -> list[Path]:
@@ -80,8 +79,7 @@ class NuScenes(Recordings):
     def film(self, scene: str) -> Film:
         """See `care_sim.sources.nuscenes.films.film`."""
         rows = self._rows()
-        if scene not in rows:
-            raise unknown(f"scene of the split {self.split} in {self.folder}", scene, rows)
+        check_known(f"scene of the split {self.split} in {self.folder}", scene, rows)
         detections = _detections(self.camera_detections) if self.camera_detections else None
         return films.film(_database(self.folder, self.version), rows[scene], detections=detections)
 
@@ -103,7 +101,8 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
     kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
     if not (colon and folder) or kind not in KINDS:
         known = " or ".join(f"{name}:FOLDER" for name in KINDS)
-        raise InvalidInput(f"source must be {known}, got {text!r}")
+        raise InvalidInput(f"source must be {known}, got {shown(text)}")
+    check_path("source", folder)
     if not Path(folder).is_dir():
         raise InvalidInput(f"source {text}: {folder} is no folder")
     given = {name: value for name, value in (options or {}).items() if value is not None}
@@ -111,7 +110,11 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
         if name not in {field.name for field in fields(KINDS[kind])}:
             raise InvalidInput(f"{name} says nothing to {kind} recordings")
     if "camera_detections" in given:
+        check_path("camera_detections", given["camera_detections"])
         given["camera_detections"] = Path(str(given["camera_detections"]))
+    for name in {"split", "version"} & set(given):
+        if not isinstance(given[name], str):
+            raise InvalidInput(f"{name} must be a name, got {shown(given[name])}")
     return KINDS[kind](Path(folder), **given)
 
 

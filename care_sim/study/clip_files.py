@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, check_known
 from care_sim.extras import import_imageio_ffmpeg
 from care_sim.files import replacing
 
@@ -20,8 +20,7 @@ def check_clip(path: Path) -> None:
     """Raise InvalidInput for a folder and for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its
     library; make the folder that it will be in.
     """
-    if path.suffix not in ENDINGS:
-        raise unknown("ending of a clip", path.suffix, ENDINGS)
+    check_known("ending of a clip", path.suffix, ENDINGS)
     if path.is_dir():
         raise InvalidInput(f"{path} is a folder, a file is wanted")
     if path.suffix == ".mp4":

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, check_known, shown
 from care_sim.film import Film
 from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
 from care_sim.streets.recording import record
@@ -88,6 +88,8 @@ class Recorded:
         return own
 
 
+LONGEST_NUMBER = 20
+"""Digits that are read of a number of scenes."""
 SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
 
@@ -106,8 +108,7 @@ def source_of(text: str, **options: object) -> Source:
     split = str(given.pop("split", "evaluation"))
     if given:
         raise InvalidInput(f"{', '.join(given)} says nothing to streets")
-    if split not in SPLITS:
-        raise unknown("split of the streets", split, SPLITS)
+    check_known("split of the streets", split, SPLITS)
     return Streets(split)
 
 
@@ -118,11 +119,11 @@ def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     if not names:
         return scenes
     if len(names) == 1 and names[0].isdecimal():
-        if not 1 <= int(names[0]) <= len(scenes):
-            raise InvalidInput(f"scenes must be a number from 1 to {len(scenes)} or names, got {names[0]}")
-        return scenes[: int(names[0])]
+        count = int(names[0][:LONGEST_NUMBER])
+        if not 1 <= count <= len(scenes):
+            raise InvalidInput(f"scenes must be a number from 1 to {len(scenes)} or names, got {shown(names[0])}")
+        return scenes[:count]
     known = {scene.name: scene for scene in scenes}
     for name in names:
-        if name not in known:
-            raise unknown("scene", name, known)
+        check_known("scene", name, known)
     return [known[name] for name in dict.fromkeys(names)]

@@ -12,7 +12,7 @@ import care_sim
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.grid_observation import GridObservation
 from care_sim.envs.sector_actions import SectorReserve, SectorScores
-from care_sim.errors import unknown
+from care_sim.errors import check_known
 from care_sim.training.config import AgentConfig
 from care_sim.training.seeds import TrainingSeeds
 
@@ -28,8 +28,7 @@ def bare(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any,
     Raises InvalidInput for an unknown one or a wrong argument.
     """
     known = care_sim.envs.IDS
-    if config.env not in known:
-        raise unknown("environment", config.env, known)
+    check_known("environment", config.env, known)
     reward: dict[str, Any] = {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
     arguments = {"budget": config.budget[0] if budget is None else budget} | reward | config.arguments
     return gymnasium.make(f"care_sim:{config.env}", disable_env_checker=True, **arguments)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 
 from care_sim.envs.watching import Watching, numbered
+from care_sim.errors import InvalidInput, check_path, shown
 from care_sim.extras import import_rerun
 from care_sim.loop import ClosedLoop
 from care_sim.moments import Moment
@@ -60,6 +61,12 @@ class RecordRerun(Watching):
     ):
         super().__init__(env, policy)
         import_rerun()
+        from care_sim.viewer.recording import Recording
+
+        if not isinstance(path, Recording):
+            check_path("path", path)
+        if not isinstance(name, str | None):
+            raise InvalidInput(f"name must be a text, got {shown(name)}")
         self._path = Path(fspath(path)) if isinstance(path, str | PathLike) else None
         self._recording = None if isinstance(path, str | PathLike) else path
         self._name = name or (policy.name if policy is not None else "") or "agent"

@@ -1,12 +1,11 @@
 """The world of one episode: every body, who moves it, and what the scoring reads off it."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, is_number, unknown
+from care_sim.errors import InvalidInput, check_known
 from care_sim.frames import Floats, Pose
 from care_sim.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
@@ -90,8 +89,7 @@ class World:
         """
         pose_at = _motion(pose)
         place = pose_at(self.time)
-        if kind not in CATALOGUE:
-            raise unknown("kind of body", kind, CATALOGUE)
+        check_known("kind of body", kind, CATALOGUE)
         body = self.bullet.add(CATALOGUE[kind], place, backdrop=backdrop)
         self._footprints.add(body, CATALOGUE[kind].size, place)
         actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
@@ -165,7 +163,7 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 
 def whole_steps(duration: float) -> int:
     """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide it."""
-    steps = round(duration / STEP_S) if is_number(duration) and math.isfinite(duration) else 0
+    steps = round(duration / STEP_S)
     if steps < 1 or abs(steps * STEP_S - duration) > 1e-9:
         raise InvalidInput(f"keyframe_s must be a multiple of the world step {STEP_S} s, got {duration!r}")
     return steps

@@ -335,7 +335,7 @@ def test_step_before_reset_says_so():
         ({"keyframe_s": 0.12}, "multiple of the world step"),
         ({"render_mode": "ascii"}, "render_mode must be"),
         ({"occluder": "cloud"}, "unknown occluder"),
-        ({"vehicles": 99}, "vehicles must lie in"),
+        ({"vehicles": 99}, "vehicles of dense must be a whole number >= 0 and <= 12"),
         ({"weather": "rain"}, "unknown parameter of dense 'weather'; known: "),
         ({"reward_weights": {"speed": 1.0}}, "unknown reward term"),
     ],

@@ -171,8 +171,8 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones(name, parameter):
     ("name", "parameters", "named"),
     [
         ("dartout", {"occluder": "bush"}, r"occluder 'bush'; known: hoarding, trailer, truck, van"),
-        ("dense", {"vehicles": -1}, r"vehicles must lie in 0\.\.12, got -1"),
-        ("dense", {"vehicles": 13}, r"vehicles must lie in 0\.\.12, got 13"),
+        ("dense", {"vehicles": -1}, r"vehicles of dense must be a whole number >= 0 and <= 12, got -1"),
+        ("dense", {"vehicles": 13}, r"vehicles of dense must be a whole number >= 0 and <= 12, got 13"),
         ("dense", {"vehicles": "five"}, "dense"),
         ("roundabout", {}, r"scenario 'roundabout'; known: cutin, dartout, dense"),
     ],

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.errors import InvalidInput, check_known
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
 
 _VAL_NUMBERS = (
@@ -24,8 +24,7 @@ def scenes(database: Database, split: str = "val") -> list[Row]:
     by_name = {row["name"]: row for row in database.rows("scene").values()}
     own = _own_splits(database)
     known = {"all": sorted(by_name), "val": [name for name in VAL if name in by_name], **own}
-    if split not in known:
-        raise unknown("split", split, known)
+    check_known("split", split, known)
     for name in known[split]:
         if name not in by_name:
             where, table = _own_file(database), database.path("scene")
