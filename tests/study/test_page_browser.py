@@ -242,7 +242,8 @@ def test_a_page_fits_a_phone_and_reads_in_any_light(scheme, opened, played):
 
 
 def test_a_colour_names_the_same_policy_in_light_and_dark(opened, played):
-    colours = {name: drawn.colour for name, drawn in styles((name, ("causal",)) for name in ("history", "care")).items()}
+    drawn = styles([("history", ("causal",)), ("care", ("causal",))])
+    colours = {policy: style.colour for policy, style in drawn.items()}
     for scheme in ("light", "dark"):
         page = opened(played[0], READY, color_scheme=scheme)
         picture = Image.open(BytesIO(page.locator(".plot[data-drawn]").first.screenshot())).convert("RGB")
