@@ -34,8 +34,8 @@ class ForgettingRules:
         settle(self)
 
     def guard_distance(self, ego_speed: float) -> float:
-        """Eq. 3, metres: inside it nothing is ever forgotten."""
-        return self.k_safe * (self.standstill_m + ego_speed * self.headway_s)
+        """Eq. 3, metres: inside it nothing is ever forgotten, whichever way the car goes."""
+        return self.k_safe * (self.standstill_m + abs(ego_speed) * self.headway_s)
 
 
 class Forgetting:

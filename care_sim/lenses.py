@@ -47,21 +47,23 @@ def box_rays(boxes, cameras, lenses):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def matched(detections, forecasts, lenses):  # type: ignore[no-untyped-def]
-    """(n,) which image boxes hold the centre of a same-class forecast (Eq. 2).
+def explainers(detections, forecasts, lenses):  # type: ignore[no-untyped-def]
+    """(n,) the row of the first same-class forecast whose centre each image box holds (Eq. 2), -1 without one.
 
     `detections` are their boxes (n, 4), classes, cameras and how far the car has turned since their pictures;
     `forecasts` their centres (m, 3) and classes.
     """
     boxes, classes, cameras, yaw_changes = detections
     centres, kinds = forecasts
-    found = np.zeros(len(boxes), np.bool_)
+    found = np.full(len(boxes), -1)
     for n, (left, top, right, bottom) in enumerate(boxes):
         lens, cos, sin = _of(lenses, cameras[n]), math.cos(yaw_changes[n]), math.sin(yaw_changes[n])
         for m, (x, y, z) in enumerate(centres):
             if kinds[m] == classes[n]:
                 u, v, _ = _pixel(cos * x - sin * y, sin * x + cos * y, z, lens)
-                found[n] |= left <= u <= right and top <= v <= bottom
+                if left <= u <= right and top <= v <= bottom:
+                    found[n] = m
+                    break
     return found
 
 

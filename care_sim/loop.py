@@ -9,6 +9,7 @@ from care_sim.conditions import Sensing
 from care_sim.control import BrakingController
 from care_sim.frames import Floats, Frame
 from care_sim.grid import Cells
+from care_sim.limits import Limits
 from care_sim.odometry import Odometry
 from care_sim.perception.detectors import ReturnsDetector
 from care_sim.perception.identities import Identities
@@ -17,7 +18,7 @@ from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_on
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
-from care_sim.types import Belief, Keyframe, Rig, Scan, Tracks
+from care_sim.types import Keyframe, Rig, Scan, Tracks
 from care_sim.world.bullet import Integers
 from care_sim.world.world import World
 
@@ -39,6 +40,7 @@ class ClosedLoop:
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns
+        self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
         self._identities = Identities()
         length, width, _ = world.ego_kind.size
@@ -110,9 +112,8 @@ class ClosedLoop:
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
         self.sights = sights_of([taken], self._labels)
         """What the camera as it stands shows, before misses, false boxes and delay. Truth: for people and scoring."""
-        self.belief = Belief(
+        self.belief = self._limits.belief(
             self._odometry.reading(self.world.ego_motion),
-            self.rig.budget,
             self._camera.detect(self.sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
             self._memory.tracks(sensor),
             ranges,

@@ -8,13 +8,18 @@ from care_sim.types import Ego
 
 
 class Odometry:
-    """Reads the true motion with Gaussian noise of `speed_sigma` m/s on the speed; without noise, as it is."""
+    """Reads the true motion with Gaussian noise of `speed_sigma` m/s on how fast the car is; without noise, as it is.
+
+    Which way it goes is known from the gear: noise leads to standstill at most.
+    """
 
     def __init__(self, speed_sigma: float, seed: np.random.SeedSequence):
         self._speed_sigma, self._rng = speed_sigma, np.random.default_rng(seed)
 
     def reading(self, motion: Ego) -> Ego:
-        """What is read now; no speed below 0."""
+        """What is read now."""
         if not self._speed_sigma:
             return motion
-        return replace(motion, speed=max(motion.speed + self._speed_sigma * self._rng.standard_normal(), 0.0))
+        way = -1.0 if motion.speed < 0 else 1.0
+        pace = max(abs(motion.speed) + self._speed_sigma * self._rng.standard_normal(), 0.0)
+        return replace(motion, speed=way * pace)

@@ -10,13 +10,14 @@ from care_sim.conditions import Sensing
 from care_sim.film import Cloud, Film, Shot
 from care_sim.frames import Floats
 from care_sim.grid import Cells
+from care_sim.limits import Limits
 from care_sim.odometry import Odometry
 from care_sim.perception.detectors import Detector
 from care_sim.perception.identities import Identities
 from care_sim.perception.memory import TrackMemory
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.recorded import RecordedLidar
-from care_sim.types import Belief, Detections, Rig, Scan, Tracks
+from care_sim.types import Detections, Rig, Scan, Tracks
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class OpenLoop:
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = detector
+        self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
         self._identities = Identities()
         self.index = 0
@@ -91,9 +93,8 @@ class OpenLoop:
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
-        self.belief = Belief(
+        self.belief = self._limits.belief(
             self._odometry.reading(shot.ego),
-            self.rig.budget,
             self._camera.detect(shot.sights, shot.sensor.yaw, self._distances(shot), shot.time_s),
             self._memory.tracks(shot.sensor),
             ranges,

@@ -11,19 +11,24 @@ from care_sim.types import Belief, ImageDetections, Rig, Tracks
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[np.bool_]:
-    """(n,) whether a same-class forecast centre projects into each image box (Eq. 2).
+    """(n,) whether a same-class forecast centre projects into each image box (Eq. 2)."""
+    return explainers(detections, tracks, rig) >= 0
+
+
+def explainers(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Cells:
+    """(n,) the first forecast, by row, that explains each image box (Eq. 2), -1 without one.
 
     Matching uses the full forecasts, never hulls that forgetting has shrunk. Centres are turned back
     by the yaw change since the picture was taken.
     """
     if not len(detections):
-        return np.zeros(0, bool)
-    from care_sim.lenses import matched
+        return np.zeros(0, np.int64)
+    from care_sim import lenses
 
     columns = detections.boxes, detections.classes, detections.cameras, detections.yaw_changes
     forecasts = tracks.boxes[:, :3], tracks.classes
-    result: NDArray[np.bool_] = matched(_contiguous(*columns), _contiguous(*forecasts), rig.lenses)
-    return result
+    found: Cells = lenses.explainers(_contiguous(*columns), _contiguous(*forecasts), rig.lenses)
+    return found
 
 
 def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:

@@ -24,11 +24,12 @@ CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
 
 MAX_DETECTIONS = 128
 """Rows of the observation; six cameras in dense traffic saw up to 67 boxes in recorded drives."""
-MAX_TRACKS = 64
+MAX_TRACKS = 256
+"""Rows of the observation: one that explains every detection, and as many again."""
 OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
 """What an observation consists of."""
 HIGHEST = 2.0**24
-"""No number of an observation is larger: the largest count that float32 holds exactly."""
+"""No number of an observation is larger: the largest whole number that float32 holds beside all smaller ones."""
 
 Observation = Mapping[str, NDArray[np.float32]]
 Action = NDArray[np.float32]
@@ -36,7 +37,7 @@ Action = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Ego:
-    """The car's own motion: speed m/s, yaw rate rad/s, acceleration m/s^2."""
+    """The car's own motion: speed m/s along its heading (below 0 backwards), yaw rate rad/s, acceleration m/s^2."""
 
     speed: float = 0.0
     yaw_rate: float = 0.0
@@ -139,7 +140,8 @@ class Belief:
     """All a policy may know when it chooses: what Gymnasium shows, and nothing else.
 
     `budget` is B, the number of cells that may fire; `detections` are the camera's, `tracks` the
-    forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return.
+    forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return. The loops make
+    it with `care_sim.limits`, within what an observation can hold.
     """
 
     ego: Ego
@@ -167,13 +169,16 @@ class Belief:
         )
 
     def to_observation(self) -> dict[str, NDArray[np.float32]]:
-        """The fixed-shape float32 arrays of the environments' observation space, new ones."""
+        """The fixed-shape float32 arrays of the environments' observation space, new ones.
+
+        Raises InvalidInput for more rows than a table has, since what were left out would be missed in silence.
+        """
         ego = np.array([self.ego.speed, self.ego.yaw_rate, self.ego.acceleration], np.float32)
         return {
             "ego": ego,
             "budget": np.array([self.budget / self.ranges.size], np.float32),
-            "detections": _padded(self.detections.rows(), MAX_DETECTIONS),
-            "tracks": _padded(self.tracks.rows(), MAX_TRACKS),
+            "detections": _padded("detections", self.detections.rows(), MAX_DETECTIONS),
+            "tracks": _padded("tracks", self.tracks.rows(), MAX_TRACKS),
             "ranges": self.ranges.copy(),
         }
 
@@ -206,10 +211,12 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray
     return rows
 
 
-def _padded(rows: Floats, length: int) -> NDArray[np.float32]:
+def _padded(what: str, rows: Floats, length: int) -> NDArray[np.float32]:
+    if len(rows) > length:
+        raise InvalidInput(f"an observation holds {length} {what} at most, got {len(rows)}")
     table = np.zeros((length, rows.shape[1]), np.float32)
     table[:, 0] = -1
-    table[: len(rows)] = rows[:length]
+    table[: len(rows)] = rows
     return table
 
 

@@ -22,7 +22,7 @@ def settled(tracks, ego=STANDING, keyframes=6, **rules):
     return margins.tolist(), low.tolist()
 
 
-@pytest.mark.parametrize(("speed", "guard"), [(0.0, 4.0), (10.0, 44.0), (8.0, 36.0)])
+@pytest.mark.parametrize(("speed", "guard"), [(0.0, 4.0), (10.0, 44.0), (8.0, 36.0), (-8.0, 36.0)])
 def test_guard_distance_of_the_paper(speed, guard):
     assert ForgettingRules().guard_distance(speed) == guard
 

@@ -24,6 +24,9 @@ def test_noise_is_on_the_speed_alone_and_seeded():
     assert again.reading(MOTION) == readings[0] != other.reading(MOTION)
 
 
-def test_no_speed_is_read_below_zero():
+def test_noise_never_turns_the_way_that_the_car_goes():
     noisy = odometry(0.5)
     assert min(noisy.reading(Ego(0.1)).speed for _ in range(200)) == 0.0
+    backwards = [noisy.reading(Ego(-0.1)).speed for _ in range(200)]
+    assert max(backwards) == 0.0
+    assert min(backwards) < -0.5

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.errors import InvalidInput
 from care_sim.grid import AngularGrid
 from care_sim.types import CLASSES, MAX_DETECTIONS, MAX_TRACKS, Belief, Ego, ImageDetections, Tracks
 
@@ -76,14 +77,18 @@ def test_nothing_known_is_nothing_read():
     assert (len(read.tracks), len(read.detections)) == (0, 0)
 
 
-def test_more_than_the_table_holds_keeps_the_first_rows_and_the_shape():
-    tracks = [[n, 0, n, *[0] * 10] for n in range(MAX_DETECTIONS + 6)]
-    detections = [[0, 1, n, *[0] * 6] for n in range(MAX_DETECTIONS + 6)]
-    observation = belief(tracks, detections).to_observation()
+def test_tables_hold_what_they_can_and_refuse_more_in_one_line():
+    tracks = [[n, 0, n, *[0] * 10] for n in range(MAX_TRACKS + 1)]
+    detections = [[0, 1, n, *[0] * 6] for n in range(MAX_DETECTIONS + 1)]
+    observation = belief(tracks[:-1], detections[:-1]).to_observation()
     read = Belief.from_observation(observation)
     assert observation["tracks"].shape == (MAX_TRACKS, 13)
     assert read.tracks.ids.tolist() == list(range(MAX_TRACKS))
     assert read.detections.boxes[:, 0].tolist() == list(range(MAX_DETECTIONS))
+    with pytest.raises(InvalidInput, match="an observation holds 256 tracks at most, got 257"):
+        belief(tracks).to_observation()
+    with pytest.raises(InvalidInput, match="an observation holds 128 detections at most, got 129"):
+        belief(detections=detections).to_observation()
 
 
 def test_take_by_index_and_by_mask():

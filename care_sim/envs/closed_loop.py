@@ -36,11 +36,13 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     | key | shape | content |
     |---|---|---|
-    | `ego` | (3,) | speed m/s, yaw rate rad/s, acceleration m/s^2 |
+    | `ego` | (3,) | speed m/s (below 0 backwards), yaw rate rad/s, acceleration m/s^2 |
     | `budget` | (1,) | B / N, the share of cells that may fire |
     | `detections` | (128, 9) | camera detections, columns `ImageDetections.COLUMNS`; class -1 pads |
-    | `tracks` | (64, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
+    | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
+
+    What is kept of more rows, and of numbers that no sensor can tell: `care_sim.limits`.
 
     ### Reward
     A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision, needless braking, and,

@@ -1,6 +1,5 @@
 """The spaces of the environments, and the check of an action at their door."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,36 +7,20 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from care_sim.errors import InvalidInput, as_array
-from care_sim.types import CLASSES, MAX_DETECTIONS, MAX_TRACKS, Rig
-
-MAX_SPEED_MPS = 100.0
-MAX_COUNT = 2.0**24
-"""The largest count float32 holds exactly."""
+from care_sim.frames import Floats
+from care_sim.limits import Limits
+from care_sim.types import MAX_DETECTIONS, MAX_TRACKS, Rig
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:
-    """The bounded observation space of a rig; keys and columns as in `care_sim.types`."""
-    grid = rig.grid
-    far, size, turn = 2 * grid.range_m, 50.0, 4 * np.pi
-    width = max(camera.width for camera in rig.cameras)
-    height = max(camera.height for camera in rig.cameras)
-    classes = len(CLASSES) - 1
-    ego = [[0.0, -turn, -MAX_SPEED_MPS], [MAX_SPEED_MPS, turn, MAX_SPEED_MPS]]
-    detections = [
-        [-1, 0, 0, 0, 0, 0, 0, 0, -turn],
-        [classes, 1, width, height, width, height, max(len(rig.cameras) - 1, 1), 60, turn],
-    ]
-    speed = MAX_SPEED_MPS
-    tracks = [
-        [-1, 0, -far, -far, -far, 0, 0, 0, -turn, -speed, -speed, 0, 0],
-        [MAX_COUNT, classes, far, far, far, size, size, size, turn, speed, speed, MAX_COUNT, MAX_COUNT],
-    ]
+    """The bounded observation space of a rig; keys and columns as in `care_sim.types`, bounds of `care_sim.limits`."""
+    grid, limits = rig.grid, Limits(rig)
     return spaces.Dict(
         {
-            "ego": _box(ego),
+            "ego": _box(limits.ego),
             "budget": spaces.Box(0.0, 1.0, (1,), np.float32),
-            "detections": _table(detections, MAX_DETECTIONS),
-            "tracks": _table(tracks, MAX_TRACKS),
+            "detections": _table(limits.detections, MAX_DETECTIONS),
+            "tracks": _table(limits.tracks, MAX_TRACKS),
             "ranges": spaces.Box(0.0, grid.range_m, grid.shape, np.float32),
         }
     )
@@ -57,11 +40,11 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDAr
     return scores
 
 
-def _box(bounds: Sequence[Sequence[float]]) -> spaces.Box:
+def _box(bounds: Floats) -> spaces.Box:
     low, high = (np.asarray(bound, np.float32) for bound in bounds)
     return spaces.Box(low, high, dtype=np.float32)
 
 
-def _table(bounds: Sequence[Sequence[float]], rows: int) -> spaces.Box:
+def _table(bounds: Floats, rows: int) -> spaces.Box:
     low, high = (np.tile(np.asarray(bound, np.float32), (rows, 1)) for bound in bounds)
     return spaces.Box(low, high, dtype=np.float32)

@@ -7,7 +7,7 @@ from scipy.optimize import linear_sum_assignment
 
 from care_sim.frames import Floats, Frame, turned
 from care_sim.grid import Cells
-from care_sim.types import MAX_TRACKS, Detections, Tracks
+from care_sim.types import Detections, Tracks
 
 _EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
 
@@ -34,13 +34,13 @@ class TrackMemory:
         self._next_id = 0
 
     def tracks(self, sensor: Frame) -> Tracks:
-        """Current tracks in the sensor frame at `sensor`, nearest first, at most MAX_TRACKS.
+        """Current tracks in the sensor frame at `sensor`, nearest first.
 
         After `predict` they are the forecasts for the coming keyframe, after `update` its estimates.
         """
         tracks = self._tracks
         boxes = sensor.boxes_to_local(tracks.boxes)
-        nearest = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")[:MAX_TRACKS]
+        nearest = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
         return Tracks(
             tracks.ids[nearest],
             tracks.classes[nearest],

@@ -53,7 +53,8 @@ class Uncertainty(Policy):
 
 def _travelled(ego: Ego, duration: float) -> Frame:
     """The sensor frame of now in that of `duration` seconds ago."""
-    way = max(ego.speed - ego.acceleration * duration / 2, 0.0) * duration
+    mean = ego.speed - ego.acceleration * duration / 2
+    way = (max(mean, 0.0) if ego.speed >= 0 else min(mean, 0.0)) * duration
     yaw = ego.yaw_rate * duration
     return Frame(way * np.cos(yaw / 2), way * np.sin(yaw / 2), 0.0, yaw)
 

@@ -35,10 +35,9 @@ def played(plays: Plays) -> str:
 
 def by_both_counts(scenes: Collection[Row]) -> str:
     """How many events there are by the other presence, given one row of every scene; nothing where rows do not tell."""
-    counted = [row.get("emerging") for row in scenes]
-    if None in counted:
+    if any("emerging" not in row for row in scenes):
         return ""
-    emerging = sum(counted)
+    emerging = sum(row["emerging"] for row in scenes)
     if any(row.get("presence") == VISIBLE for row in scenes):
         return (
             f" Of the events, {emerging:,} are of objects that were hidden within range at scene start, which "

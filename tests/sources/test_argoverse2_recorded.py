@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pyarrow import feather
 
+from care_sim.envs.open_loop import FilmEnv
 from care_sim.film import NOBODY
 from care_sim.grid import AngularGrid
 from care_sim.sources.argoverse2 import SENSOR_HEIGHT_M, UP_LIDAR, film
@@ -22,6 +23,18 @@ def test_real_logs_load(recorded, log):
     ]
     assert np.mean(np.concatenate(hits)) > 0.75
     assert min(spread(movie)) < 1.0, "a parked car stays in its place while ours moves"
+
+
+@pytest.mark.parametrize("log", ["3bffdcff-c3a7-38b6-a0f2-64196d130958", "adcf7d18-0510-35b0-a2fa-b4cea13a6d76"])
+def test_real_logs_stay_within_the_observation_space(recorded, log):
+    """The noise of their poses rolls a standing car back, and boxes that jump make tracks race."""
+    env = FilmEnv(loaded(recorded / "argoverse2" / log))
+    observation, _ = env.reset(seed=0)
+    over = False
+    while not over:
+        assert env.observation_space.contains(observation)
+        observation, _, _, over, _ = env.step(np.ones((32, 512), np.float32))
+    assert env.observation_space.contains(observation)
 
 
 def spread(movie):

@@ -129,7 +129,12 @@ def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
     sensor = movie.shots[0].sensor
     shown, depth = camera.project(sensor.vectors_to_local(points - sensor.origin))
     assert np.all(depth > 0)
-    assert shown - (np.array([800.0, 450.0]) - (u, v)) == pytest.approx(pixels, abs=0.1)
+    shift = np.array([camera.width, camera.height]) / 2 - (u, v)
+    assert shown - shift == pytest.approx(pixels, abs=0.1)
+    assert (shift >= 0).all(), "the recorded picture lies within"
+    spare = np.array([camera.width, camera.height]) - (1600, 900)
+    assert (shift <= spare).all()
+    assert (spare < 110).all()
 
 
 def test_every_category_of_the_taxonomy_has_its_place():

@@ -16,9 +16,10 @@ def picture(channel):
 
 def whole_box(root):
     """The projected box of CAR in the front picture, in recorded pixels, and its film."""
-    shot = first(root).shots[0]
+    movie = first(root)
+    shot, front = movie.shots[0], movie.cameras[0]
     _, _, (_, u, v) = SENSORS["CAM_FRONT"]
-    shift = np.tile(np.array([800.0, 450.0]) - (u, v), 2)
+    shift = np.tile(np.array([front.width, front.height]) / 2 - (u, v), 2)
     return (shot.sights.detections.boxes[0] - shift).tolist(), shot
 
 

@@ -121,7 +121,16 @@ def test_a_wrong_box_is_named(tmp_path, field, value, reason):
 
 
 @pytest.mark.parametrize(
-    "intrinsic", [[[1, 2], [3]], [["a"] * 3] * 3, [[float("nan")] * 3] * 3, [[0.0] * 3] * 3], ids=str
+    "intrinsic",
+    [
+        [[1, 2], [3]],
+        [["a"] * 3] * 3,
+        [[float("nan")] * 3] * 3,
+        [[0.0] * 3] * 3,
+        [[1e3, 0, 1e300], [0, 1e3, 450], [0, 0, 1]],
+        [[1e3, 0, 800], [0, 1e3, -1], [0, 0, 1]],
+    ],
+    ids=str,
 )
 def test_wrong_intrinsics_are_named(tmp_path, intrinsic):
     root = database(tmp_path)

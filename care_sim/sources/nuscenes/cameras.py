@@ -1,5 +1,6 @@
 """The cameras of a recorded car, and what they saw when no detector was run: projected boxes with visibility."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,15 +32,18 @@ class RecordedCamera:
 
     @cached_property
     def pinhole(self) -> PinholeCamera:
-        """The same camera with its principal point in the middle of the picture."""
-        frame, (width, height) = self.frame, PICTURE
+        """The same camera with its principal point in the middle of a picture that holds the recorded one."""
+        frame = self.frame
+        width, height = (
+            2 * math.ceil(max(middle, size - middle)) for middle, size in zip(self.centre, PICTURE, strict=True)
+        )
         position, angle = (frame.x, frame.y, frame.z), float(2 * np.arctan(width / 2 / self.focal))
         return PinholeCamera(width, height, angle, position, frame.yaw, -frame.pitch, frame.roll)
 
     @property
     def shift(self) -> Floats:
         """(4,) from a box in the recorded picture to one in `pinhole`'s."""
-        return np.tile(np.array(PICTURE) / 2 - self.centre, 2)
+        return np.tile(np.array([self.pinhole.width, self.pinhole.height]) / 2 - self.centre, 2)
 
 
 def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCamera:

@@ -17,6 +17,7 @@ from care_sim.grid import AngularGrid
 from care_sim.sources.motion import motions
 from care_sim.sources.nuscenes.cameras import (
     CHANNELS,
+    PICTURE,
     VISIBLE_SHARES,
     RecordedCamera,
     projected_sights,
@@ -132,6 +133,11 @@ def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
     if intrinsic[0, 0] <= 0:
         raise InvalidInput(
             f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic without focal length"
+        )
+    if not all(0 <= middle <= size for middle, size in zip(intrinsic[:2, 2], PICTURE, strict=True)):
+        raise InvalidInput(
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose principal point lies "
+            f"outside the picture of {PICTURE[0]} x {PICTURE[1]}"
         )
     return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
 
