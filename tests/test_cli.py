@@ -5,7 +5,7 @@ import time
 import pytest
 
 from care_sim.cli import main
-from care_sim.policies import BUILT_IN
+from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.commands import Reproduce
 from care_sim.study.config import EpisodeConfig, grid
@@ -137,7 +137,7 @@ def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_name
     assert code == 1
     assert err.count("care-sim: left out: policy torn cannot be loaded: ModuleNotFoundError") == 2
     rows = read_rows(out / EPISODES.file)
-    assert {row["policy"] for row in rows} == set(BUILT_IN)
+    assert {row["policy"] for row in rows} == set(contenders()) - {"torn"}
     assert {row["scenario"] for row in rows} == set(SCENARIOS)
     code, _, err = run(capsys, "sweep", "--policies", "torn", "--seeds", "1", "--out", out)
     assert code == 2

@@ -20,9 +20,10 @@ from care_sim.policies.parameters import Maker, check_parameters, is_privileged
 from care_sim.policies.ppo import Ppo, PpoDartout
 from care_sim.policies.random import Random
 from care_sim.policies.random_points import RandomPoints
+from care_sim.policies.seed_finder import SeedFinder
 from care_sim.policies.uncertainty import Uncertainty
 
-__all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "make_policy", "policy_names", "tags_of"]
+__all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "contenders", "make_policy", "policy_names", "tags_of"]
 
 BUILT_IN: dict[str, Maker] = {
     policy.name: policy
@@ -43,6 +44,7 @@ BUILT_IN: dict[str, Maker] = {
         LearnedScorer,
         Ppo,
         PpoDartout,
+        SeedFinder,
     )
 }
 
@@ -50,6 +52,11 @@ BUILT_IN: dict[str, Maker] = {
 def policy_names() -> list[str]:
     """Names that `make_policy` knows: the built-in ones, then those of installed packages."""
     return [*BUILT_IN, *sorted(set(entries()) - set(BUILT_IN))]
+
+
+def contenders() -> list[str]:
+    """Those that are compared where all are asked for: no controls."""
+    return [name for name in policy_names() if "control" not in tags_of(name)]
 
 
 def check_policy(name: str) -> None:

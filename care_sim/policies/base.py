@@ -8,8 +8,10 @@ from care_sim.errors import InvalidInput
 from care_sim.grid import Cells
 from care_sim.types import Action, Belief, Demand, Observation, Rig
 
-TAGS = ("causal", "privileged", "non-causal", "learned")
-"""What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan, learned."""
+TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
+"""What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan, learned, playing by the
+generator of the scenes, or no contender but a control, which `all` leaves out.
+"""
 
 
 class Policy(ABC):

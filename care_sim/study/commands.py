@@ -91,7 +91,7 @@ class Sweep(_Study):
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
     """`care-sim scenarios` lists them; `all`."""
     policies: tuple[str, ...] = ("history", "all-camera", "care", "full")
-    """`care-sim policies` lists them; `all`. `full` always runs with budget 1.0."""
+    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget 1.0."""
     budgets: tuple[float, ...] = (0.1,)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     false_negative_rates: tuple[float, ...] = ()

@@ -39,7 +39,7 @@ class Compare:
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense or cutin; `care-sim scenarios` lists them."""
     policies: tuple[str, ...] = ("history", "care")
-    """`care-sim policies` lists them; `all`. `full` always runs with budget 1.0."""
+    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget 1.0."""
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     seed: int = 0

@@ -8,11 +8,12 @@ from care_sim.study.contrasts import Contrast
 from care_sim.study.table import Bold
 
 NOT_DETECTED = "not detected"
-MARKS = {"privileged": "†", "non-causal": "‡"}
+MARKS = {"privileged": "†", "non-causal": "‡", "generator": "§"}
 """Marks of the policies that no car can have."""
 MEANINGS = {
     "privileged": "† knows the truth: no policy of a car.",
     "non-causal": "‡ saw the full scan first: saves no sensing.",
+    "generator": "§ looks the episode up in the public generator: a warning, no contender.",
 }
 
 

@@ -17,6 +17,7 @@ _SPECIAL = {
     "≥": r"$\ge$",
     "†": r"\textdagger{}",
     "‡": r"\textdaggerdbl{}",
+    "§": r"\S{}",
     "°": r"\textdegree{}",
     "±": r"$\pm$",
     "<": r"\textless{}",

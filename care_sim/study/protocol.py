@@ -28,8 +28,8 @@ class Protocol(Running, PlayOptions):
     scenes: tuple[str, ...] = ()
     """One number: that many scenes, from the first. Else scenes by name. All of them, unless given."""
     policies: tuple[str, ...] = (*PAPERS, "full")
-    """`care-sim policies` lists them; `all`. `full` always runs with budget 1.0. Allocations are compared with those of
-    `care`, which is played for that in any case."""
+    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget 1.0. Allocations are
+    compared with those of `care`, which is played for that in any case."""
     budgets: tuple[float, ...] = (0.1, 0.2, 0.35)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     floor_seeds: int = 3

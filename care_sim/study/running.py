@@ -53,10 +53,10 @@ def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[
 
     Raises InvalidInput where something else is wrong.
     """
-    from care_sim.policies import policy_names
-    from care_sim.study.selection import expanded, made
+    from care_sim.policies import contenders
+    from care_sim.study.selection import ALL, expanded, made
 
-    policies, broken = made(expanded(names, policy_names()), make)
+    policies, broken = made(expanded(names, contenders() if ALL in names else ()), make)
     left_out = [f"left out: {reason}" for reason in broken.values()]
     report_problems(left_out)
     return policies, left_out

@@ -9,8 +9,8 @@ ALL = "all"
 
 
 def expanded(names: Sequence[str], known: Collection[str]) -> list[str]:
-    """The names, each once; all that are known where `all` is among them."""
-    return list(dict.fromkeys(known if ALL in names else names))
+    """The names, each once; `all` stands for those that are known."""
+    return list(dict.fromkeys(each for name in names for each in (known if name == ALL else [name])))
 
 
 def made(policies: Iterable[str], make: Callable[[str], object]) -> tuple[list[str], dict[str, str]]:
