@@ -14,7 +14,7 @@ class Odometry:
         self._speed_sigma, self._rng = speed_sigma, np.random.default_rng(seed)
 
     def reading(self, motion: Ego) -> Ego:
-        """What is read now; no speed below 0."""
+        """What is read now. No sign is read: cut at 0, half the readings of a standing car would be exact."""
         if not self._speed_sigma:
             return motion
-        return replace(motion, speed=max(motion.speed + self._speed_sigma * self._rng.standard_normal(), 0.0))
+        return replace(motion, speed=abs(motion.speed + self._speed_sigma * self._rng.standard_normal()))
