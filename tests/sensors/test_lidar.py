@@ -148,12 +148,11 @@ def test_noisy_returns_near_the_ends_do_not_heap_up(grid, bullet, lidar, distanc
     length = CATALOGUE["truck"].size[0]
     bullet.add(CATALOGUE["truck"], (distance + length / 2, 0.0, 0.0))
     clean, bodies = lidar(grid, bullet).fire(everything(grid), SENSOR)
-    scan, _ = lidar(grid, bullet, lidar_range_sigma=0.5).fire(everything(grid), SENSOR)
     hit = np.isfinite(clean.ranges) & (bodies == bodies.max())
-    assert hit.sum() > 10
-    assert np.isfinite(scan.ranges[hit]).all()
-    assert len(np.unique(scan.ranges[hit])) == hit.sum()
-    assert (scan.ranges[hit].min() > 0) & (scan.ranges[hit].max() < 50)
+    erring = lidar(grid, bullet, lidar_range_sigma=0.5)
+    ranges = np.concatenate([erring.fire(everything(grid), SENSOR)[0].ranges[hit] for _ in range(5)])
+    assert len(np.unique(ranges)) == len(ranges) > 10
+    assert 0 < ranges.min() < ranges.max() < 50
 
 
 def test_a_peek_sees_no_more_than_live_rows_can_return(grid, street, lidar):
