@@ -1,6 +1,7 @@
 """False boxes: how many come, where from, and that nothing about one of them says that it is false."""
 
 import itertools
+import json
 from collections import Counter
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nuscenes_drive import write_drive
 from telling_apart import CHANCE, areas_under_the_curve
 
 from care_sim.conditions import Sensing
@@ -18,6 +20,9 @@ from care_sim.scenarios.dense import Dense
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.ghosts import NOTHING_TO_HAUNT, TRIES, Ghosts, Pool
 from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.sources import argoverse2
+from care_sim.sources.nuscenes.cameras import CHANNELS
+from care_sim.sources.recordings import recordings
 from care_sim.streets.recording import record
 from care_sim.streets.street import make_street
 from care_sim.types import CLASSES, ImageDetections
@@ -304,3 +309,75 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
         sights = Sights(ImageDetections.from_rows(true), np.array([0]))
         orders.append(camera.detect(sights, 0.0, np.empty(0), 0.0).boxes.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
+
+
+@pytest.fixture(scope="module")
+def nuscenes(tmp_path_factory):
+    """The folder of two drives past objects of all classes, five keyframes each."""
+    return write_drive(tmp_path_factory.mktemp("nuscenes"))
+
+
+def ghosts_of(film, rate=1.0, seeds=range(4)):
+    """A table of the false boxes of plays of a film."""
+    env = FilmEnv(film, budget=1.0, false_positive_rate=rate)
+    return np.concatenate([false for seed in seeds for _, false in played(env, seed)]).astype(float)
+
+
+def true_of(film):
+    return np.concatenate([shot.sights.detections.rows() for shot in film.shots])
+
+
+def pixels_of_area(rows):
+    return 36 * rows[:, 1] / (1 - rows[:, 1]) / np.prod(rows[:, 4:6] - rows[:, 2:4], axis=1)
+
+
+def test_ghosts_of_an_argoverse_log_are_like_its_pictures(drive):
+    film = argoverse2.film(drive)
+    ghosts = ghosts_of(film)
+    pixels = 36 * ghosts[:, 1] / (1 - ghosts[:, 1])
+    assert len(ghosts) > 50
+    assert np.array_equal(ghosts[:, 2:6], np.rint(ghosts[:, 2:6]))
+    assert pixels == pytest.approx(np.rint(pixels), rel=1e-4)
+    assert set(map(tuple, ghosts[:, [0, 6]])) <= set(map(tuple, true_of(film)[:, [0, 6]]))
+
+
+def test_ghosts_of_projected_annotations_have_their_visible_shares_and_edges(nuscenes):
+    film = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
+    ghosts, true = ghosts_of(film), true_of(film)
+    assert len(ghosts) > 50
+    assert pixels_of_area(ghosts) == pytest.approx(pixels_of_area(true)[0], rel=1e-3), "all are wholly visible"
+    assert not {tuple(row) for row in ghosts[:, 2:6]} & {tuple(row) for row in true[:, 2:6].astype(np.float32)}
+    for camera in np.unique(ghosts[:, 6]):
+        ours, theirs = (rows[rows[:, 6] == camera] for rows in (ghosts, true))
+        assert np.all(ours[:, 2:4] >= theirs[:, 2:4].min(axis=0) - 1e-3)
+        assert np.all(ours[:, 4:6] <= theirs[:, 4:6].max(axis=0) + 1e-3)
+
+
+def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
+    """Its boxes have one decimal, its scores two; one lies on nobody."""
+    annotated = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
+    rng, rows = np.random.default_rng(0), []
+    for shot in annotated.shots:
+        seen = shot.sights.detections
+        for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
+            found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
+            found["sample_data_token"] = f"{shot.token}-{CHANNELS[camera]}"
+            rows.append(found | {"bbox_corners": np.round(box + [20, 20, 25, 25], 1).tolist()})
+    (tmp_path / "found.json").write_text(json.dumps(rows))
+    film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film("scene-0103")
+    ghosts, true = ghosts_of(film), true_of(film)
+    assert len(ghosts) > 50
+    assert ghosts[:, 1] == pytest.approx(np.round(ghosts[:, 1], 2), abs=1e-6)
+    for camera in np.unique(ghosts[:, 6]):
+        off = true[true[:, 6] == camera][0, 2:6]
+        apart = ghosts[ghosts[:, 6] == camera][:, 2:6] - off
+        assert apart == pytest.approx(np.round(apart, 1), abs=1e-3)
+
+
+@pytest.mark.parametrize("keyframes", [1, 2])
+def test_a_film_too_short_to_lend_other_times_has_fewer_ghosts_and_no_duplicates(drive, keyframes):
+    film = argoverse2.film(drive)
+    short = replace(film, shots=film.shots[:keyframes])
+    for true, false in played(FilmEnv(short, budget=1.0, false_positive_rate=5.0), 0):
+        assert len(false) < 30
+        assert not np.any(overlaps(false, true) >= 0.5)
