@@ -362,7 +362,7 @@ def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
         for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
             found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
             found["sample_data_token"] = f"{shot.token}-{CHANNELS[camera]}"
-            rows.append(found | {"bbox_corners": np.round(box + [20, 20, 25, 25], 1).tolist()})
+            rows.append(found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()})
     (tmp_path / "found.json").write_text(json.dumps(rows))
     film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film("scene-0103")
     ghosts, true = ghosts_of(film), true_of(film)
