@@ -37,7 +37,9 @@ class CameraFaults:
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
     false_positive_rate: float = bounded(0.0, 0, MOST_GHOSTS)
-    """Mean number of boxes in a picture that show nothing."""
+    """Mean number of boxes in a picture that show nothing; else they are like the true ones, which they are drawn from
+    (`care_sim.sensors.ghosts`), so that where the camera never sees anybody there are none.
+    """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
@@ -61,7 +63,9 @@ class LidarFaults:
     """What the LiDAR gets wrong."""
 
     lidar_range_sigma: float = bounded(0.0, 0, 50)
-    """Gaussian noise on every range, metres; policies meet it, the proxy detector, whose boxes are true, does not."""
+    """Gaussian noise on every range, metres, folded back at 0 and at the reach; policies meet it, the proxy detector,
+    whose boxes are true, does not.
+    """
     lidar_dropout: float = bounded(0.0, 0, 1)
     """Share of returns that are lost, 0 to 1."""
     lidar_dead_rows: tuple[int, ...] = ()
@@ -81,7 +85,7 @@ class Sensing(CameraFaults, LidarFaults):
     """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and odometry."""
 
     ego_speed_sigma: float = bounded(0.0, 0, 10)
-    """Gaussian noise on the car's own speed, as policy and controller read it, m/s."""
+    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign."""
     engine: str = "fast"
     """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
     reference.

@@ -17,6 +17,7 @@ from care_sim.perception.memory import TrackMemory
 from care_sim.pinhole import PinholeCamera
 from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_on
 from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.ghosts import NOTHING_TO_HAUNT, Pool
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
 from care_sim.types import Keyframe, Rig, Scan, Tracks
 from care_sim.world.bullet import Integers
@@ -26,7 +27,14 @@ from care_sim.world.world import World
 class ClosedLoop:
     """A world, the sensors and the car's software over the keyframes of one episode."""
 
-    def __init__(self, world: World, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence]):
+    def __init__(
+        self,
+        world: World,
+        rig: Rig,
+        sensing: Sensing,
+        seeds: Sequence[np.random.SeedSequence],
+        pool: Pool = NOTHING_TO_HAUNT,
+    ):
         self.world, self.rig = world, rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
         self._reported = np.array(list(labels), np.int64)
@@ -34,9 +42,7 @@ class ClosedLoop:
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
         self._labels = labels
-        self._camera = CameraDetector(
-            list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, rig.sensor_height_m
-        )
+        self._camera = CameraDetector(list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool)
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns

@@ -17,9 +17,11 @@ class Odometry:
         self._speed_sigma, self._rng = speed_sigma, np.random.default_rng(seed)
 
     def reading(self, motion: Ego) -> Ego:
-        """What is read now."""
+        """What is read now. Noise never turns the way that the car goes. It is folded back at 0: cut there, half the
+        readings of a standing car would be exact.
+        """
         if not self._speed_sigma:
             return motion
         way = -1.0 if motion.speed < 0 else 1.0
-        pace = max(abs(motion.speed) + self._speed_sigma * self._rng.standard_normal(), 0.0)
+        pace = abs(abs(motion.speed) + self._speed_sigma * self._rng.standard_normal())
         return replace(motion, speed=way * pace)

@@ -8,7 +8,7 @@ import pytest
 
 import care_sim
 from care_sim.envs.watching import Watching
-from care_sim.sensors.camera import MIN_PIXELS
+from care_sim.sensors.pixels import MIN_PIXELS
 
 
 class Notes(Watching):

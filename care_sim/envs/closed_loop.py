@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim import reward as rewards
+from care_sim.companion import seen_on_a_drive
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
 from care_sim.errors import check_choice, check_number
 from care_sim.evaluation.metrics import outcome
@@ -15,6 +16,7 @@ from care_sim.loop import ClosedLoop
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import check_engine
+from care_sim.sensors.ghosts import NOTHING_TO_HAUNT, Pool
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.types import Action, Keyframe
 from care_sim.world.world import STEP_S, whole_steps
@@ -123,11 +125,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         entropy = self.entropy(seed)
         scenario, camera, lidar, floor, odometry = self.streams(entropy, count=5)
         self.close()
+        pool = self._pool(entropy)
         world = self.scenario.build(np.random.default_rng(scenario))
         self._in_view = self._detected = False
         self._potential = rewards.Potential()
         self.keyframes = []
-        loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry))
+        loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry), pool)
         return self.begin(loop, floor), self.told({}, {"seed": entropy})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
@@ -161,6 +164,16 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         if self._running is not None:
             self._running.world.close()
             self._running = None
+
+    def _pool(self, entropy: int) -> Pool:
+        """Of false boxes, if there are any: another world of this scenario, of a stream of its own, so that nothing of
+        it tells of this episode's.
+        """
+        if not self.conditions.false_positive_rate:
+            return NOTHING_TO_HAUNT
+        _, camera, lidar, _, odometry, another = self.streams(entropy, count=6)
+        world = self.scenario.build(np.random.default_rng(another))
+        return seen_on_a_drive(world, self.scenario.duration_s, self.rig, self.conditions, (camera, lidar, odometry))
 
     def _terms(self, frame: Keyframe, detectable: bool) -> dict[str, float]:
         self._in_view |= frame.in_view

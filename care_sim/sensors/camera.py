@@ -10,8 +10,10 @@ from care_sim.film import Sights
 from care_sim.frames import Floats
 from care_sim.lenses import window_around
 from care_sim.pinhole import PinholeCamera
-from care_sim.sensors.camera_faults import Delay, Ghosts, Misses, mounted
+from care_sim.sensors.camera_faults import Delay, Misses, mounted
+from care_sim.sensors.ghosts import NOTHING_TO_HAUNT, Ghosts, Pool
 from care_sim.sensors.paint import tally
+from care_sim.sensors.pixels import MIN_PIXELS, confidence_of
 from care_sim.types import ImageDetections
 from care_sim.world.bullet import Integers, Window
 
@@ -21,13 +23,6 @@ CAMERA_HEIGHT = 180
 CAMERA_WIDTH = 320
 FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
 """90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
-
-MIN_PIXELS = 12
-"""Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360, and
-an unoccluded adult at about 40 m."""
-FULL_CONFIDENCE = 3 * MIN_PIXELS
-"""Visible pixels at which n / (n + FULL_CONFIDENCE) is one half; the least box then has confidence
-0.25, the detector threshold of the paper."""
 
 
 def window_on(camera: PinholeCamera, boxes: Floats) -> Window:
@@ -65,7 +60,7 @@ def sights_of(pictures: Sequence[Picture], labels: Mapping[int, int]) -> Sights:
         columns = picture.bodies.tolist(), picture.boxes.tolist(), picture.pixels.tolist()
         for body, box, pixels in zip(*columns, strict=True):
             if body in labels and pixels >= MIN_PIXELS:
-                rows.append((labels[body], pixels / (pixels + FULL_CONFIDENCE), *box, camera, 0.0, 0.0))
+                rows.append((labels[body], confidence_of(pixels), *box, camera, 0.0, 0.0))
                 bodies.append(body)
     table = np.array(rows, float).reshape(-1, len(ImageDetections.COLUMNS))
     return Sights(ImageDetections.from_rows(table), np.array(bodies, np.int64))
@@ -74,8 +69,8 @@ def sights_of(pictures: Sequence[Picture], labels: Mapping[int, int]) -> Sights:
 class CameraDetector:
     """Detections as they arrive: sights that err and lag as `sensing` says.
 
-    `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows, `height_m` that of
-    the sensor frame above the road.
+    `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows. False boxes are made
+    from `pool`.
     """
 
     def __init__(
@@ -85,12 +80,12 @@ class CameraDetector:
         keyframe_s: float,
         seed: np.random.SeedSequence,
         cameras: Sequence[PinholeCamera],
-        height_m: float,
+        pool: Pool = NOTHING_TO_HAUNT,
     ):
         ghosts, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
         self._objects, self._sensing = np.asarray(objects, np.int64), sensing
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
-        self._ghosts = Ghosts(cameras, height_m, sensing.false_positive_rate, ghosts)
+        self._ghosts = Ghosts(pool, sensing.false_positive_rate, len(cameras), ghosts)
         self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
@@ -100,12 +95,18 @@ class CameraDetector:
 
         `ranges` (n,) are the distances of the objects in metres, in their order.
         """
-        missed, ghosts = self._misses.draw(ranges), self._ghosts.draw()
         rows = sights.detections.rows()
+        missed, ghosts = self._misses.draw(ranges), self._ghosts.draw(rows, time_s)
         if missed.any():
             rows = rows[~np.isin(sights.objects, self._objects[missed])]
         if len(ghosts):
-            rows = np.concatenate([rows, ghosts.rows()])
+            rows = _mingled(rows, ghosts)
         kept = rows[(rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))]
         surest_first = kept[np.lexsort((kept[:, 2], -kept[:, 1]))]
         return self._delay.newest(ImageDetections.from_rows(surest_first), heading)
+
+
+def _mingled(rows: Floats, others: Floats) -> Floats:
+    """Both tables in an order of their numbers, so that of boxes that sort alike none says where it came from."""
+    together = np.concatenate([rows, others])
+    return together[np.lexsort(together.T)]

@@ -1,20 +1,15 @@
-"""What goes wrong between a picture and the detections that arrive: misses, ghosts, delays, a crooked mount."""
+"""What goes wrong between a picture and the detections that arrive: misses, delays, a crooked mount."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.conditions import CONFIDENCE, CameraFaults
+from care_sim.conditions import CameraFaults
 from care_sim.frames import Floats
 from care_sim.pinhole import PinholeCamera
-from care_sim.types import CLASSES, ImageDetections
-from care_sim.world.bodies import CATALOGUE
-
-GHOST_RANGE_M = (5.0, 40.0)
-"""How far the near face of an object of a ghost's size would be: beyond the bonnet, as far as an adult has a box."""
+from care_sim.types import ImageDetections
 
 NOTHING_SEEN = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
 
@@ -48,37 +43,6 @@ class Misses:
         missed = self._lasting > 0
         self._lasting -= missed
         return missed
-
-
-class Ghosts:
-    """Boxes that show nothing: a Poisson number a picture, each as large as an object of a random class that
-    stands somewhere on the road in view; confidences are even from the detector's threshold to 1.
-    """
-
-    def __init__(self, cameras: Sequence[PinholeCamera], height_m: float, rate: float, rng: np.random.Generator):
-        self._cameras, self._height_m, self._rate, self._rng = cameras, height_m, rate, rng
-
-    def draw(self) -> ImageDetections:
-        """The ghosts of the pictures of this keyframe."""
-        if not self._rate:
-            return NOTHING_SEEN
-        numbers = [n for n in range(len(self._cameras)) for _ in range(self._rng.poisson(self._rate))]
-        rows = [self._row(number) for number in numbers]
-        return ImageDetections.from_rows(np.array(rows).reshape(-1, len(ImageDetections.COLUMNS)))
-
-    def _row(self, number: int) -> list[float]:
-        camera, rng = self._cameras[number], self._rng
-        label = int(rng.integers(len(CLASSES)))
-        bearing, distance, yaw, confidence = rng.random(4)
-        azimuth = camera.yaw + (bearing - 0.5) * 0.95 * camera.horizontal_fov
-        size = CATALOGUE[CLASSES[label]].size
-        reach = size[0] / 2 + GHOST_RANGE_M[0] + distance * (GHOST_RANGE_M[1] - GHOST_RANGE_M[0])
-        place = (reach * np.cos(azimuth), reach * np.sin(azimuth), size[2] / 2 - self._height_m)
-        (box,) = camera.project_boxes(np.array([[*place, *size, 2 * np.pi * yaw]]))
-        low, high = np.floor(box[:2]), np.ceil(box[2:])
-        limits = np.array([camera.width, camera.height])
-        corners = (*np.clip(low, 0, limits - 1), *np.clip(high, 1, limits))
-        return [label, CONFIDENCE + confidence * (1 - CONFIDENCE), *map(float, corners), number, 0, 0]
 
 
 class _Taken(NamedTuple):

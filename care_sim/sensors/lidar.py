@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from care_sim.conditions import LidarFaults
 from care_sim.errors import InvalidInput
-from care_sim.frames import Frame
+from care_sim.frames import Floats, Frame
 from care_sim.grid import AngularGrid, Cells
 from care_sim.sensors.engines import RayEngine
 from care_sim.types import Scan
@@ -49,13 +49,25 @@ class Lidar:
         """
         ranges, ids = self._engine.cast(sensor, cells)
         if self._faults.lidar_range_sigma > 0:
-            draws = self._noise.standard_normal(self.grid.size)[cells]
-            noisy = np.clip(ranges + self._faults.lidar_range_sigma * draws, NEAREST_M, self.grid.range_m - NEAREST_M)
-            ranges = np.where(np.isinf(ranges), ranges, noisy)
+            errors = self._faults.lidar_range_sigma * self._noise.standard_normal(self.grid.size)[cells]
+            (hit,) = np.isfinite(ranges).nonzero()
+            ranges = ranges.copy()
+            ranges[hit] = noisy(ranges[hit], errors[hit], self.grid.range_m)
         lost = self._dead[cells]
         if self._faults.lidar_dropout > 0:
             lost = lost | (self._dropout.random(self.grid.size)[cells] < self._faults.lidar_dropout)
         return Scan(cells, np.where(lost, np.inf, ranges)), np.where(lost, NOTHING, ids)
+
+
+def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
+    """(n,) `ranges` with `errors`, metres. What would come within NEAREST_M of 0 or of the reach, or beyond, is folded
+    back: cut, it would heap up at one number, which tells that it was cut.
+    """
+    erring = ranges + errors
+    span = reach - 2 * NEAREST_M
+    beyond = np.mod(erring - NEAREST_M, 2 * span)
+    folded: Floats = NEAREST_M + np.minimum(beyond, 2 * span - beyond)
+    return np.where(np.abs(erring - reach / 2) <= span / 2, erring, folded)
 
 
 def dead_cells(grid: AngularGrid, rows: Sequence[int]) -> NDArray[np.bool_]:

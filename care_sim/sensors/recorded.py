@@ -6,7 +6,7 @@ from care_sim.conditions import LidarFaults
 from care_sim.film import Cloud
 from care_sim.frames import Floats
 from care_sim.grid import AngularGrid, Cells
-from care_sim.sensors.lidar import NEAREST_M, dead_cells
+from care_sim.sensors.lidar import dead_cells, noisy
 
 
 class RecordedLidar:
@@ -46,5 +46,5 @@ class RecordedLidar:
     def _noisy(self, cloud: Cloud) -> Cloud:
         errors = self._faults.lidar_range_sigma * self._noise.standard_normal(self.grid.size)[cloud.cells]
         ranges = np.linalg.norm(cloud.points, axis=1)
-        noisy = np.clip(ranges + errors, NEAREST_M, self.grid.range_m - NEAREST_M)
-        return Cloud(cloud.cells, cloud.points * (noisy / ranges)[:, None], cloud.objects)
+        moved = noisy(ranges, errors, self.grid.range_m) / ranges
+        return Cloud(cloud.cells, cloud.points * moved[:, None], cloud.objects)

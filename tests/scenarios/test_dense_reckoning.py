@@ -49,7 +49,7 @@ def scene(world, sensor, person):
     nearest_first = boxes[np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]))]
     labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
-    camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA], 1.84)
+    camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA])
     seen = camera.detect(sights_of([picture], labels), 0.0, np.full(len(labels), 20.0), 0.0)
     (of_person,) = [n for n in range(len(seen)) if seen.classes[n] == person.label]
     cells = wedges(seen, RIG)

@@ -6,13 +6,12 @@ from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.sensors.camera import (
     FRONT_CAMERA,
-    FULL_CONFIDENCE,
-    MIN_PIXELS,
     CameraDetector,
     Picture,
     sights_of,
     window_on,
 )
+from care_sim.sensors.pixels import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.types import CLASSES
 from care_sim.world.bodies import CATALOGUE
 
@@ -24,7 +23,7 @@ class Detector(CameraDetector):
     """Everybody 20 m away, one picture a keyframe."""
 
     def __init__(self, labels, sensing, keyframe_s, seed):
-        super().__init__(list(labels), sensing, keyframe_s, seed, [FRONT_CAMERA], 1.84)
+        super().__init__(list(labels), sensing, keyframe_s, seed, [FRONT_CAMERA])
         self.labels = labels
         self.ranges, self.keyframe_s, self.frame = np.full(len(labels), 20.0), keyframe_s, -1
 

@@ -9,9 +9,9 @@ import pytest
 import care_sim
 from care_sim.conditions import CAMERA_FAULTS, CameraFaults, Conditions, Sensing
 from care_sim.errors import InvalidInput
-from care_sim.sensors.camera import FRONT_CAMERA, MIN_PIXELS
-from care_sim.sensors.camera_faults import Delay, Ghosts, Misses, mounted
-from care_sim.types import CLASSES, ImageDetections
+from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.camera_faults import Delay, Misses, mounted
+from care_sim.types import ImageDetections
 
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
 
@@ -54,28 +54,6 @@ def test_misses_grow_with_the_distance_up_to_all():
     assert missed(500, NEAR, **faults).mean() == pytest.approx(0.3, abs=0.02)
     assert missed(500, FAR, **faults).mean() == pytest.approx(0.7, abs=0.02)
     assert missed(20, np.full(5, 60.0), **faults).all()
-
-
-def ghosts(rate, pictures, seed=0):
-    haunted = Ghosts([FRONT_CAMERA], 1.84, rate, np.random.default_rng(seed))
-    return [haunted.draw() for _ in range(pictures)]
-
-
-def test_ghosts_come_at_their_rate_inside_the_picture():
-    drawn = ghosts(3.0, 400)
-    assert np.mean([len(d) for d in drawn]) == pytest.approx(3.0, abs=0.3)
-    assert np.var([len(d) for d in drawn]) == pytest.approx(3.0, abs=0.6)
-    rows = np.concatenate([d.rows() for d in drawn])
-    assert set(rows[:, 0]) == set(range(len(CLASSES)))
-    assert rows[:, 1].min() >= 0.25
-    assert rows[:, 1].max() <= 1.0
-    left, top, right, bottom = rows[:, 2:6].T
-    assert np.all((left >= 0) & (left < right) & (right <= 320) & (top >= 0) & (top < bottom) & (bottom <= 180))
-    assert np.mean((right - left) * (bottom - top) >= MIN_PIXELS) > 0.9
-
-
-def test_no_ghosts_by_default():
-    assert sum(len(drawn) for drawn in ghosts(0.0, 20)) == 0
 
 
 def tagged(number):

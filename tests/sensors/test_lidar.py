@@ -7,7 +7,7 @@ from care_sim.conditions import Sensing
 from care_sim.errors import InvalidInput
 from care_sim.frames import Frame
 from care_sim.sensors.engines import ENGINES, check_engine
-from care_sim.sensors.lidar import Lidar, dead_cells
+from care_sim.sensors.lidar import Lidar, dead_cells, noisy
 from care_sim.types import Scan
 from care_sim.world.bodies import CATALOGUE
 
@@ -133,6 +133,26 @@ def test_noise_does_not_move_what_drops_out(grid, street, lidar):
     plain, _ = lidar(grid, street, lidar_dropout=0.3).fire(everything(grid), SENSOR)
     noisy, _ = lidar(grid, street, lidar_dropout=0.3, lidar_range_sigma=0.1).fire(everything(grid), SENSOR)
     assert np.array_equal(np.isinf(plain.ranges), np.isinf(noisy.ranges))
+
+
+def test_noise_is_added_where_there_is_room_and_folded_back_at_the_ends():
+    ranges = np.array([20.0, 49.9, 0.2, 49.9, 0.2, 30.0])
+    errors = np.array([0.5, 0.05, -0.1, 0.3, -0.5, 49.98 + 49.98])
+    assert noisy(ranges, errors, 50.0) == pytest.approx([20.5, 49.95, 0.1, 49.78, 0.32, 30.0])
+    assert noisy(ranges, errors, 50.0)[:3].tolist() == (ranges + errors)[:3].tolist()
+
+
+@pytest.mark.parametrize("distance", [49.9, 0.4])
+def test_noisy_returns_near_the_ends_do_not_heap_up(grid, bullet, lidar, distance):
+    """A lorry's rear so far away: whoever saw one range again and again would know that it was cut."""
+    length = CATALOGUE["truck"].size[0]
+    bullet.add(CATALOGUE["truck"], (distance + length / 2, 0.0, 0.0))
+    clean, bodies = lidar(grid, bullet).fire(everything(grid), SENSOR)
+    hit = np.isfinite(clean.ranges) & (bodies == bodies.max())
+    erring = lidar(grid, bullet, lidar_range_sigma=0.5)
+    ranges = np.concatenate([erring.fire(everything(grid), SENSOR)[0].ranges[hit] for _ in range(5)])
+    assert len(np.unique(ranges)) == len(ranges) > 10
+    assert 0 < ranges.min() < ranges.max() < 50
 
 
 def test_a_peek_sees_no_more_than_live_rows_can_return(grid, street, lidar):

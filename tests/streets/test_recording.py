@@ -6,8 +6,8 @@ import pytest
 from care_sim.evaluation.sightings import Sightings
 from care_sim.film import NOBODY
 from care_sim.grid import AngularGrid
-from care_sim.sensors.camera import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.pixels import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.recording import SIGHT_M, record
 from care_sim.streets.street import Street, make_street

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from care_sim.film import Annotations, Sights
 from care_sim.frames import Floats, Frame
 from care_sim.pinhole import PinholeCamera
-from care_sim.sensors.camera import CAMERA_WIDTH, FULL_CONFIDENCE, MIN_PIXELS
+from care_sim.sensors.camera import CAMERA_WIDTH
+from care_sim.sensors.pixels import MIN_PIXELS, confidence_of
 from care_sim.types import ImageDetections
 
 CHANNELS = ("CAM_FRONT", "CAM_FRONT_LEFT", "CAM_FRONT_RIGHT", "CAM_BACK_LEFT", "CAM_BACK_RIGHT", "CAM_BACK")
@@ -66,7 +67,7 @@ def projected_sights(cameras: tuple[RecordedCamera, ...], annotations: Annotatio
         area = np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0, None), axis=1)
         pixels = area * shares * (CAMERA_WIDTH / PICTURE[0]) ** 2
         seen = pixels >= MIN_PIXELS
-        columns = annotations.classes, pixels / (pixels + FULL_CONFIDENCE), boxes
+        columns = annotations.classes, confidence_of(pixels), boxes
         rows.append(_rows([column[seen] for column in columns], number))
         objects.append(annotations.objects[seen])
     return Sights(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))

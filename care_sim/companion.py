@@ -1,0 +1,31 @@
+"""What a camera sees on another drive through the same kind of world: the pool of an episode's false boxes."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+
+from care_sim.conditions import Sensing
+from care_sim.loop import ClosedLoop
+from care_sim.sensors.ghosts import Pool
+from care_sim.types import Rig
+from care_sim.world.world import World
+
+
+def seen_on_a_drive(
+    world: World, duration_s: float, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence]
+) -> Pool:
+    """Drive through `world`, every cell fired, and close it: what the camera shows before misses and delay.
+
+    With the `seeds` of an episode its mount errs as the episode's does; false boxes of a straight camera would stand
+    out among those of a crooked one.
+    """
+    with closing(world):
+        loop = ClosedLoop(world, rig, replace(sensing, false_positive_rate=0.0), seeds)
+        cells, seen, times, over = np.arange(rig.grid.size), [], [], False
+        while not over:
+            seen.append(loop.sights.detections)
+            times.append(world.time)
+            over = loop.keyframe(cells).impact_speed_mps is not None or world.time >= duration_s - 1e-9
+    return Pool.of(seen, times, rig.cameras)
