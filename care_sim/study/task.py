@@ -13,7 +13,7 @@ import numpy as np
 
 import care_sim
 from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
-from care_sim.errors import check_whole
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.belongings import paths
@@ -29,6 +29,9 @@ Likeness = tuple[object, ...]
 
 LARGEST_SEED = 2**63 - 1
 """What a column of a results file holds."""
+
+MOST_TASKS = 100_000
+"""Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
 
 CONDITIONS = [*DEFAULTS]
 REFERENCE, FULL = "care", "full"
@@ -155,6 +158,15 @@ def flat(prefix: str, parameters: Parameters) -> Row:
 def check_seed(seed: object) -> None:
     """Raise InvalidInput for a seed that no column holds."""
     check_whole("seed", seed, 0, LARGEST_SEED)
+
+
+def check_size(tasks: int) -> None:
+    """Raise InvalidInput for more tasks than a study can hold; asked before they are made."""
+    if tasks > MOST_TASKS:
+        raise InvalidInput(
+            f"a study holds the rows of all its tasks in memory, so they are at most {MOST_TASKS:,}, got {tasks:,}: "
+            "play it in parts, each with an --out of its own"
+        )
 
 
 def batches(tasks: Sequence[Task]) -> list[list[Task]]:
