@@ -11,10 +11,10 @@ import gymnasium
 from care_sim.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario
+from care_sim.study.parameters import Parameters
 from care_sim.study.task import (
     CONDITIONS,
     Likeness,
-    Parameters,
     Row,
     Task,
     check_seed,

@@ -9,7 +9,7 @@ from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from care_sim.study.task import Parameters
+    from care_sim.study.parameters import Parameters
 
 
 @dataclass(frozen=True, kw_only=True)

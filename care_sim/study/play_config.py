@@ -13,13 +13,13 @@ from care_sim.envs.open_loop import UNFILMED, FilmEnv
 from care_sim.errors import InvalidInput
 from care_sim.film import Film
 from care_sim.perception.registry import PROXY
+from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest
 from care_sim.study.scenes import Scene, Source
 from care_sim.study.task import (
     CONDITIONS,
     FULL,
     Likeness,
-    Parameters,
     Row,
     Task,
     check_size,
