@@ -17,6 +17,7 @@ from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce,
 from care_sim.study.compare import Compare
 from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
+from care_sim.text import printable
 from care_sim.viewer.command import View
 
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -190,5 +191,5 @@ def _rounded(value: object) -> str:
 
 
 def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
-    print(f"care-sim: {' '.join(message.split())}", file=sys.stderr)
+    print(f"care-sim: {printable(' '.join(message.split()))}", file=sys.stderr)
     sys.exit(code)

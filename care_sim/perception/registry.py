@@ -13,6 +13,7 @@ from care_sim.perception.cluster import ClusterDetector
 from care_sim.perception.detectors import Detector, ReturnsProxy
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
 from care_sim.perception.torchscript import TorchScriptDetector
+from care_sim.text import printable
 
 ENTRY_POINTS = "care_sim.detectors"
 PROXY = "returns"
@@ -59,7 +60,7 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
 
 def listing() -> list[str]:
     """A line a detector: its name and what it does, or why it cannot be loaded."""
-    return [f"{name:12} {_summary(name)}" for name in detector_names()]
+    return [printable(f"{name:12} {_summary(name)}") for name in detector_names()]
 
 
 def _summary(name: str) -> str:

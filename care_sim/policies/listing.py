@@ -9,6 +9,7 @@ from care_sim.errors import InvalidInput
 from care_sim.policies import BUILT_IN, maker, policy_names, tags_of
 from care_sim.policies.installed import all_entries, entries, package_of
 from care_sim.policies.parameters import Maker, settable
+from care_sim.text import printable
 
 WIDTH = 80
 
@@ -61,5 +62,6 @@ def _hidden(entry: EntryPoint, winner: str) -> str:
 
 
 def _lines(title: str, *texts: str) -> str:
-    indented = (line for text in texts for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    "))
-    return "\n".join([title, *indented])
+    shown = (printable(" ".join(text.split())) for text in texts)
+    indented = (line for text in shown for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    "))
+    return "\n".join([printable(title), *indented])

@@ -134,10 +134,11 @@ class _SetStudy(_Study):
     def play(self, study: str, configurations: "Configurations", out: Path) -> int:
         """Play the configurations of the seeds, with the policies that join in."""
         from care_sim.scenarios import SCENARIOS
-        from care_sim.study.config import grid
+        from care_sim.study.config import grid, of_seeds
 
+        seeds = seeds_of(self.seeds)
         also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
-        return self.conduct(study, configurations(seeds_of(self.seeds), also), out, left_out)
+        return self.conduct(study, of_seeds(configurations(seeds[:1], also), seeds), out, left_out)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -117,13 +117,15 @@ def _recorded(configs: "Sequence[EpisodeConfig]", record: Path | None) -> "Itera
 def outcomes(played: "Sequence[tuple[EpisodeConfig, Row]]") -> "Table":
     """A line an episode."""
     from rich.table import Table
+    from rich.text import Text
 
     from care_sim.study.timeline import text
+    from care_sim.text import printable
 
     config = played[0][0]
     table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)
     for column in ("policy", "budget", *COLUMNS.values()):
         table.add_column(column, justify="left" if column == "policy" else "right", no_wrap=True)
     for config, row in played:
-        table.add_row(config.policy, f"{config.budget:.4g}", *(text(row[name]) for name in COLUMNS))
+        table.add_row(Text(printable(config.policy)), f"{config.budget:.4g}", *(text(row[name]) for name in COLUMNS))
     return table

@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
+from math import prod
 from typing import Any, Self
 
 import gymnasium
@@ -10,13 +11,14 @@ import gymnasium
 from care_sim.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario
+from care_sim.study.parameters import Parameters
 from care_sim.study.task import (
     CONDITIONS,
     Likeness,
-    Parameters,
     Row,
     Task,
     check_seed,
+    check_size,
     collected,
     departures,
     felt,
@@ -112,13 +114,19 @@ def grid(
 
     `common` are further fields of `EpisodeConfig`.
     """
-    axes = list(product(budgets, false_negative_rates, camera_latencies))
+    axes: list[Sequence[Any]] = [[*scenarios], [*policies], budgets, false_negative_rates, camera_latencies]
+    check_size(prod(map(len, axes)))
     configs = (
         _config(scenario, policy, budget, {"false_negative_rate": rate, "camera_latency": latency} | common)
-        for scenario, policy in product(scenarios, policies)
-        for budget, rate, latency in axes
+        for scenario, policy, budget, rate, latency in product(*axes)
     )
-    return [config.with_seed(seed) for config in dict.fromkeys(configs) for seed in dict.fromkeys(seeds)]
+    return of_seeds([*dict.fromkeys(configs)], seeds)
+
+
+def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[EpisodeConfig]:
+    """The configurations with each of the seeds. Raises InvalidInput for too many, before they are made."""
+    check_size(len(configs) * len(seeds))
+    return [config.with_seed(seed) for config in configs for seed in dict.fromkeys(seeds)]
 
 
 def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:

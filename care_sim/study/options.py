@@ -9,7 +9,7 @@ from care_sim.conditions import Conditions
 from care_sim.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from care_sim.study.task import Parameters
+    from care_sim.study.parameters import Parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +35,18 @@ USUAL = Options()
 """The defaults."""
 
 
-def seeds_of(numbers: Sequence[int]) -> list[int]:
-    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one."""
+def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
+    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one, and for more than a
+    study can hold.
+    """
+    from care_sim.study.task import check_size
+
     if len(numbers) != 1:
-        return list(numbers)
+        return numbers
     if numbers[0] < 1:
         raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {numbers[0]}")
-    return list(range(numbers[0]))
+    check_size(numbers[0])
+    return range(numbers[0])
 
 
 def parameters(texts: Sequence[str]) -> "Parameters":

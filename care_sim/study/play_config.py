@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
+from math import prod
 from typing import Any, Self
 
 import gymnasium
@@ -13,9 +14,22 @@ from care_sim.errors import InvalidInput
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.film import Film
 from care_sim.perception.registry import PROXY
+from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest
 from care_sim.study.scenes import Scene, Source
-from care_sim.study.task import CONDITIONS, Likeness, Parameters, Row, Task, collected, departures, felt, files_in, flat
+from care_sim.study.task import (
+    CONDITIONS,
+    FULL,
+    Likeness,
+    Row,
+    Task,
+    check_size,
+    collected,
+    departures,
+    felt,
+    files_in,
+    flat,
+)
 
 _FILMED = [name for name in CONDITIONS if name not in UNFILMED]
 
@@ -118,17 +132,16 @@ def play_grid(
 
     `common` are further fields of `PlayConfig`.
     """
-    axes = product(camera_latencies, policies, budgets)
+    axes: list[Sequence[Any]] = [camera_latencies, [*policies], budgets]
+    check_size(prod(map(len, axes)))
     made = [
         _config(source, scenes[0], policy, budget, {"camera_latency": latency} | common)
-        for latency, policy, budget in axes
+        for latency, policy, budget in product(*axes)
     ]
-    configs = dict.fromkeys(made)
+    floors = {config: floor_seeds if config.policy != FULL else (0,) for config in made}
+    check_size(len(scenes) * sum(map(len, floors.values())))
     return [
-        config.of_scene(scene, floor_seed)
-        for scene in scenes
-        for config in configs
-        for floor_seed in (floor_seeds if config.policy != "full" else (0,))
+        config.of_scene(scene, floor_seed) for scene in scenes for config, own in floors.items() for floor_seed in own
     ]
 
 

@@ -46,11 +46,13 @@ class Protocol(Running, PlayOptions):
         """Run it."""
         from care_sim.study.play_config import play_grid
         from care_sim.study.scenes import chosen
+        from care_sim.study.task import check_size
 
         for axis in ("policies", "budgets"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis} needs at least one value")
         check_whole("floor_seeds", self.floor_seeds, 1)
+        check_size(self.floor_seeds)
         source, common = self.scene_source(), self.common() | {"presence": self.presence}
         scenes = chosen(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)

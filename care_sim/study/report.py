@@ -19,11 +19,13 @@ from care_sim.study.kinds import kind_in
 from care_sim.study.latex import PREAMBLE, latex, paragraph
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
-from care_sim.study.rows import read_notes, read_rows, write_columns, write_rows
+from care_sim.study.rows import check_columns, read_notes, read_rows, write_columns, write_rows
 from care_sim.study.runner import Failure
 from care_sim.study.studies import STUDIES, SWEEP, Study, study_of
+from care_sim.study.table import unmarked
 from care_sim.study.takeover import check_journal, check_kind, check_results
 from care_sim.study.task import Row, Task
+from care_sim.text import printable
 
 JOURNAL = "journal.jsonl"
 
@@ -49,6 +51,7 @@ def conduct(
     if workers < 1:
         raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
     configs, kind = [config.changed() for config in configs], study.kind
+    check_columns(config.row() for config in configs)
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         _check(folder, configs, study, force, journal)
@@ -102,8 +105,8 @@ class Report:
     @classmethod
     def of(cls, rows: Sequence[Row], study: Study = SWEEP, left_out: Sequence[str] = ()) -> "Report":
         """The report of a study that lacks what is `left_out`."""
-        tables, closing = study.tables(rows), [*study.closing(rows), *map(_left_out, left_out)]
-        statements = "## Statements\n\n" + "".join(f"- {sentence}\n" for sentence in closing)
+        tables, closing = study.tables(rows), _closing(rows, study, left_out)
+        statements = "## Statements\n\n" + "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
         pages = [f"{study.caption}\n", *(table.markdown() for table in tables), statements]
         texts = [PREAMBLE, paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
         return cls({"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows))
@@ -129,12 +132,12 @@ def print_report(rows: Sequence[Row], console: Console, study: Study = SWEEP, le
         if table.terminal:
             console.print(table.rich())
             console.print()
-    for sentence in (study.caption, *study.closing(rows), *map(_left_out, left_out)):
+    for sentence in (study.caption, *_closing(rows, study, left_out)):
         console.print(sentence, markup=False)
 
 
-def _left_out(what: str) -> str:
-    return f"Left out: {what}."
+def _closing(rows: Sequence[Row], study: Study, left_out: Sequence[str]) -> list[str]:
+    return [*map(printable, [*study.closing(rows), *(f"Left out: {what}." for what in left_out)])]
 
 
 def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failure]) -> str:

@@ -1,7 +1,7 @@
 """Rows of a study in a Parquet file."""
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,21 @@ def write_columns(columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, 
     }
     with replacing(path) as unfinished:
         pq.write_table(pa.table(measured).replace_schema_metadata(notes), unfinished)
+
+
+def check_columns(rows: Iterable[Row]) -> None:
+    """Raise InvalidInput where one column cannot hold a parameter of all rows: a number here and a text there."""
+    values: dict[str, dict[tuple[type, Any], None]] = {}
+    for row in rows:
+        for name, value in row.items():
+            if "." in name:
+                values.setdefault(name, {})[type(value), value] = None
+    for name, held in values.items():
+        try:
+            pa.array([value for _, value in held])
+        except pa.ArrowException as error:
+            shown = " and ".join(repr(value) for _, value in [*held][:3])
+            raise InvalidInput(f"one column of results must hold all values of {name}, got {shown}") from error
 
 
 def with_tuples(row: Row) -> Row:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from care_sim.errors import InvalidInput
 from care_sim.study.options import USUAL
+from care_sim.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,7 +74,7 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
 def report_problems(problems: Sequence[str]) -> None:
     """Print them, a line each, where complaints go."""
     for problem in problems:
-        print(f"care-sim: {problem}", file=sys.stderr)
+        print(f"care-sim: {printable(problem)}", file=sys.stderr)
 
 
 def console() -> "Console":

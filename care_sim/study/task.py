@@ -9,18 +9,15 @@ from functools import cached_property
 from typing import Any, Self
 
 import gymnasium
-import numpy as np
 
 import care_sim
 from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
-from care_sim.errors import check_whole
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.belongings import paths
+from care_sim.study.parameters import Parameters, settled
 from care_sim.study.provenance import SESSION, code_digest, file_digest, policy_digest
-
-Parameters = tuple[tuple[str, Any], ...]
-"""Names and values, of a scenario's physics, a policy or a detector."""
 
 Row = dict[str, Any]
 
@@ -29,6 +26,9 @@ Likeness = tuple[object, ...]
 
 LARGEST_SEED = 2**63 - 1
 """What a column of a results file holds."""
+
+MOST_TASKS = 100_000
+"""Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
 
 CONDITIONS = [*DEFAULTS]
 REFERENCE, FULL = "care", "full"
@@ -108,9 +108,9 @@ class Task(ABC):
         return other
 
     def settle(self, *names: str) -> None:
-        """Make the parameters of these names what files can hold."""
+        """Make the parameters in these fields what files can hold. Raises InvalidInput for those that none does."""
         for name in names:
-            object.__setattr__(self, name, tuple((key, _plain(value)) for key, value in getattr(self, name)))
+            object.__setattr__(self, name, settled(getattr(self, name), name.removesuffix("_parameters")))
 
 
 def departures(task: Task, without: Sequence[str]) -> list[str]:
@@ -157,6 +157,15 @@ def check_seed(seed: object) -> None:
     check_whole("seed", seed, 0, LARGEST_SEED)
 
 
+def check_size(tasks: int) -> None:
+    """Raise InvalidInput for more tasks than a study can hold; asked before they are made."""
+    if tasks > MOST_TASKS:
+        raise InvalidInput(
+            f"a study holds the rows of all its tasks in memory, so they are at most {MOST_TASKS:,}, got {tasks:,}: "
+            "play it in parts, each with an --out of its own"
+        )
+
+
 def batches(tasks: Sequence[Task]) -> list[list[Task]]:
     """The tasks in the order in which they are played, those of a batch together."""
     together: dict[Hashable, list[Task]] = {}
@@ -175,8 +184,3 @@ def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[d
         kept[key] = rest
         values.setdefault(key, []).append(one[axis])
     return [{**rest, plural: values[key]} for key, rest in kept.items()]
-
-
-def _plain(value: Any) -> Any:
-    """A parameter's value as Python's own type, which files can hold."""
-    return value.item() if isinstance(value, np.generic) else tuple(value) if isinstance(value, list) else value

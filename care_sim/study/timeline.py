@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.task import Row
+from care_sim.text import printable
 from care_sim.types import Keyframe, Outcome
 
 COLUMNS = ("time\ns", "speed\nm/s", "sensor to\nactor m", "hull to\nhull m", "cells\nfired", "seen", "found", "brake")
@@ -23,7 +25,9 @@ LABELS = {
 
 def print_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe], console: Console) -> None:
     """Print an episode where something changes in it, then its outcome."""
-    table = Table(title=config.label, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table = Table(
+        title=Text(printable(config.label), "table.title"), title_justify="left", box=None, padding=(0, 1, 0, 0)
+    )
     for number, column in enumerate(COLUMNS):
         table.add_column(column, justify="right" if number < 5 else "left", no_wrap=True)
     for frame in eventful(keyframes):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.cli import main
 from care_sim.errors import InvalidInput
 from care_sim.policies import BUILT_IN, policy_names, tags_of
 from care_sim.study.config import grid
@@ -242,3 +243,39 @@ def test_of_two_packages_with_one_name_the_first_on_the_path_counts(install, env
     install("first", MODULE, horizon="Horizon")
     assert policy_names().count("horizon") == 1
     assert care_sim.make_policy("horizon", env).rows == 4
+
+
+CONTROLS = '''
+import care_sim
+
+class Odd:
+    def __repr__(self):
+        return "\\x1b]0;x\\x07"
+
+class Loud(care_sim.Policy):
+    """Clears \\x1b[2J the screen \\u202e."""
+
+    source = "a paper \\x1b[31m in red\\n and \\x9b more"
+
+    def __init__(self, rig, by=Odd()): ...
+    def demand(self, belief): ...
+
+class Near:
+    """Rings \\x07 the bell."""
+
+    def detect(self, points): ...
+'''
+
+
+def test_nothing_of_a_policy_or_detector_reaches_the_terminal_but_text(install, capsys):
+    install("loud", CONTROLS, **{"loud\x1b[1m": "Loud", "torn\x1b[1m": "Nowhere"})
+    install("near_loud", CONTROLS, group="care_sim.detectors", near="Near")
+    for command in ("policies", "detectors"):
+        with pytest.raises(SystemExit):
+            main([command])
+        out = capsys.readouterr().out
+        assert all(line.isprintable() for line in out.splitlines())
+        assert "\\x1b" in out or "\\x07" in out
+    with pytest.raises(SystemExit):
+        main(["run", "dartout", "--policy", "nobody\x1b[31m"])
+    assert capsys.readouterr().err.rstrip("\n").isprintable()

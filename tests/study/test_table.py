@@ -1,8 +1,10 @@
 """One table, three looks."""
 
+import html
 import io
 import re
 
+import markdown_it
 import pytest
 from made_rows import CROWD, STUDY
 from rich.console import Console
@@ -78,3 +80,24 @@ def test_latex_is_well_formed(table):
     assert len(lines) == 1 + sum(len(row) > 1 for row in table.rows)
     assert not re.search(r"(?<!\\)[%#_]", text)
     assert text.isascii()
+
+
+HOSTILE = "p|q `r` [a](b) <b>x</b> _y_ &lt; *z* ~s~ \\ \n# t \x1b[31m \u202e"
+
+
+def test_names_of_anybody_are_text_in_markdown_latex_and_on_a_terminal():
+    table = Table(HOSTILE, ("a", HOSTILE), (("1", HOSTILE), ("2", Bold(HOSTILE)), (HOSTILE,)), (HOSTILE,), (HOSTILE,))
+    markdown = table.markdown()
+    assert isinstance(table.rows[1][1], Bold)
+    rendered = markdown_it.MarkdownIt("commonmark").enable("table").render(markdown)
+    visible = HOSTILE.replace("\n", "\\n").replace("\x1b", "\\x1b").replace("\u202e", "\\u202e")
+    assert rendered.count(html.escape(visible)) == 7
+    assert rendered.count("<tr>") == 4
+    assert not re.search(r"<(a|code|h1|s|del)\b", rendered)
+    assert "\x1b" not in latex(table)
+    for special in ("\\textbackslash{}", "\\_y\\_", "\\&lt;", "\\# t"):
+        assert special in latex(table)
+    console = Console(width=300, file=io.StringIO())
+    console.print(table.rich())
+    assert console.file.getvalue().count(visible) == 6
+    assert "\x1b" not in console.file.getvalue()

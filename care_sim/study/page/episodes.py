@@ -9,8 +9,9 @@ from care_sim.study.config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.episode import answer
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.page.replay import Replay, replayed
+from care_sim.study.parameters import Parameters
 from care_sim.study.runner import DIED
-from care_sim.study.task import Parameters, Row
+from care_sim.study.task import Row
 from care_sim.types import Outcome
 
 TOLERANCE = 1e-6

@@ -1,0 +1,74 @@
+"""The parameters of a task: what values they may have, so that journals and columns hold them as they are."""
+
+import os
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from care_sim.errors import InvalidInput
+
+Parameters = tuple[tuple[str, Any], ...]
+"""Names and values, of a scenario's physics, a policy or a detector."""
+
+ALLOWED = "a flag, a number of at most 64 bits, a text, or a list of one kind of these"
+DEEPEST = 4
+"""Levels that lists may be nested."""
+_WHOLE = 2**63
+
+
+def settled(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
+    """The parameters with values of Python's own types, lists as tuples, paths as texts.
+
+    Raises InvalidInput for a value or a name that a journal and a column of a results file would not give back: sets,
+    maps, bytes, None, which a column reads as not given, NaN, halves of characters, lists of several kinds.
+    """
+    return tuple((_name(name, whose), _settled(f"{whose} parameter {name}", value)) for name, value in given)
+
+
+def _settled(what: str, value: Any) -> Any:
+    try:
+        plain = _plain(value)
+        _kind(plain)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise InvalidInput(f"{what} must be {ALLOWED}, got {value!r:.200}") from error
+    return plain
+
+
+def _name(name: Any, whose: str) -> str:
+    try:
+        return _text(name)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"the name of a {whose} parameter must be a text, got {name!r:.200}") from error
+
+
+def _plain(value: Any, levels: int = DEEPEST) -> Any:
+    """The value in Python's own types. Raises ValueError or TypeError for one that is not allowed."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple) and levels:
+        return tuple(_plain(each, levels - 1) for each in value)
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int) and -_WHOLE <= value < _WHOLE:
+        return int(value)
+    if isinstance(value, float) and value == value:
+        return float(value)
+    return _text(os.fspath(value))
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    value.encode()
+    return str.__str__(value)
+
+
+def _kind(value: Any) -> Any:
+    """What a column of such values is called. Raises ValueError for a list of several kinds."""
+    if not isinstance(value, tuple):
+        return float if type(value) is int else type(value)
+    kinds = {_kind(each) for each in value}
+    if len(kinds) > 1:
+        raise ValueError
+    return (*kinds,)

@@ -1,0 +1,71 @@
+"""How many tasks a study may have is checked before any is made."""
+
+import resource
+import subprocess
+import sys
+
+import pytest
+
+from care_sim.errors import InvalidInput
+from care_sim.study import ablations, config, crowding, faults, paper
+from care_sim.study.config import grid, of_seeds
+from care_sim.study.play_config import play_grid
+from care_sim.study.scenes import source_of
+
+COMMANDS = (
+    "reproduce --seeds 1000000000",
+    "sweep --seeds 1000000000",
+    "sweep --seeds 99999999999999999999",
+    "sweep --seeds 100000 --scenarios dartout dense --policies care",
+    "ablate --seeds 1000000000",
+    "ablate --seeds 5000",
+    "faults --seeds 5000",
+    "crowding --seeds 5000",
+    "protocol --floor-seeds 1000000000",
+    "protocol --floor-seeds 5000 --policies care --budgets 0.1",
+)
+ALL_IN_ONE = """
+import sys
+from care_sim.cli import main
+for command in sys.argv[2:]:
+    try:
+        main([*command.split(), "--out", sys.argv[1]])
+    except SystemExit as end:
+        print(end.code)
+"""
+
+
+def limited():
+    resource.setrlimit(resource.RLIMIT_DATA, (2_000_000_000, 2_000_000_000))
+
+
+def test_no_study_is_built_that_no_memory_holds(tmp_path):
+    command = [sys.executable, "-c", ALL_IN_ONE, str(tmp_path / "out"), *COMMANDS]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, preexec_fn=limited, check=True)
+    assert done.stdout.split() == ["2"] * len(COMMANDS)
+    lines = done.stderr.splitlines()
+    assert len(lines) == len(COMMANDS)
+    assert all(
+        "a study holds the rows of all its tasks in memory, so they are at most 100,000, got" in x for x in lines
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_axes_are_counted_before_they_are_multiplied(monkeypatch):
+    many = [n / 1e6 for n in range(1, 20_000)]
+    with pytest.raises(InvalidInput, match="at most 100,000"):
+        grid(["dartout"], ["care"] * 1000, many, range(1000), many, range(1000))
+    source = source_of("streets")
+    with pytest.raises(InvalidInput, match="at most 100,000"):
+        play_grid(source, source.scenes(), ["care"] * 1000, many, range(1000), range(1000))
+    monkeypatch.setattr("care_sim.study.task.MOST_TASKS", 12)
+    assert len(grid(["dartout"], ["care", "full"], [0.1, 0.2], range(4))) == 12
+    with pytest.raises(InvalidInput, match="at most 12, got 15"):
+        grid(["dartout"], ["care", "full"], [0.1, 0.2], range(5))
+
+
+@pytest.mark.parametrize("study", [paper, ablations, crowding, faults])
+def test_a_study_of_several_seeds_is_that_of_one_with_each(study, monkeypatch):
+    monkeypatch.setattr(config.EpisodeConfig, "__post_init__", lambda self: None)
+    whole = study.configurations((3, 1, 4), ["random"])
+    assert of_seeds(study.configurations((3,), ["random"]), (3, 1, 4)) == whole
