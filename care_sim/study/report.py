@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import remove_others, save
 from care_sim.study.journal import Journal
@@ -40,8 +40,7 @@ def conduct(
         raise InvalidInput("a study needs at least one value on every axis")
     kind = study.kind
     _check_kind(folder, kind)
-    if workers < 1:
-        raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
+    check_whole("workers", workers, 1)
     with _journal(folder) as journal:
         _say_what_is_found(configs, journal, folder, kind.unit)
         failures = run_with_progress(configs, journal, workers, make_executor, kind)

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from copy import copy
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,7 +15,7 @@ import numpy as np
 
 import care_sim
 from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
-from care_sim.errors import check_whole
+from care_sim.errors import LARGEST_SEED, InvalidInput, is_text, one_line, shown
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.provenance import SESSION, code_digest, file_digest, policy_digest
@@ -27,10 +28,9 @@ Row = dict[str, Any]
 Likeness = tuple[object, ...]
 """What tasks have in common."""
 
-LARGEST_SEED = 2**63 - 1
-"""What a column of a results file holds."""
-
 CONDITIONS = [*DEFAULTS]
+DEEPEST = 3
+"""Lists within lists that a parameter may be."""
 REFERENCE, FULL = "care", "full"
 """The policy that others are compared with, and the full scan."""
 
@@ -100,7 +100,10 @@ class Task(ABC):
     def settle(self, *names: str) -> None:
         """Make the parameters of these names what files can hold."""
         for name in names:
-            object.__setattr__(self, name, tuple((key, _plain(value)) for key, value in getattr(self, name)))
+            pairs = getattr(self, name)
+            if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
+                raise InvalidInput(f"{name} must be pairs of a name and a value, got {shown(pairs)}")
+            object.__setattr__(self, name, tuple((key, _plain(key, value)) for key, value in pairs))
 
 
 def departures(task: Task, without: Sequence[str]) -> list[str]:
@@ -143,11 +146,6 @@ def flat(prefix: str, parameters: Parameters) -> Row:
     return {f"{prefix}.{name}": value for name, value in parameters}
 
 
-def check_seed(seed: object) -> None:
-    """Raise InvalidInput for a seed that no column holds."""
-    check_whole("seed", seed, 0, LARGEST_SEED)
-
-
 def batches(tasks: Sequence[Task]) -> list[list[Task]]:
     """The tasks in the order in which they are played, those of a batch together."""
     together: dict[Hashable, list[Task]] = {}
@@ -168,6 +166,21 @@ def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[d
     return [{**rest, plural: values[key]} for key, rest in kept.items()]
 
 
-def _plain(value: Any) -> Any:
-    """A parameter's value as Python's own type, which files can hold."""
-    return value.item() if isinstance(value, np.generic) else tuple(value) if isinstance(value, list) else value
+def _is_pair(given: object) -> bool:
+    return isinstance(given, tuple | list) and len(given) == 2 and isinstance(given[0], str)
+
+
+def _plain(name: str, value: Any, depth: int = 0) -> Any:
+    """A parameter's value as Python's own type, which files can hold. Raises InvalidInput for one that they cannot."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, tuple | list) and depth < DEEPEST:
+        return tuple(_plain(name, one, depth + 1) for one in value)
+    held = value is None or isinstance(value, bool) or (isinstance(value, str) and is_text(value))
+    held = held or (type(value) is int and abs(value) <= LARGEST_SEED) or (type(value) is float and isfinite(value))
+    if not held:
+        raise InvalidInput(
+            f"parameter {one_line(name)} must be text, a flag, a finite number of 64 bits, or a list of these, "
+            f"got {shown(value)}"
+        )
+    return value
