@@ -4,23 +4,27 @@ import contextlib
 import importlib
 import inspect
 import io
+import os
+import shutil
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from typing import Any, NoReturn
 
 import tyro
 
-from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.bounds import allowed
+from care_sim.errors import InvalidInput, MissingExtra, one_line, shortened, shown
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
 from care_sim.study.compare import Compare
 from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
-from care_sim.text import printable
 from care_sim.viewer.command import View
 
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT, UNEXPECTED, INTERRUPTED, UNREAD = 2, 70, 130, 141
+"""Exit codes: that of a fault in the software is `EX_SOFTWARE` of BSD, the last two those of a shell for signals."""
+DEBUG = "--debug"
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ class Scenarios:
             print(f"{name:12} {_summary(scenario)}")
             print(
                 "".join(
-                    f"    {field.name}={_rounded(field.default)}{choices.get(field.name, '')}\n"
+                    f"    {field.name}={_rounded(field.default)}{choices.get(field.name) or _bounds(field)}\n"
                     for field in fields(scenario)
                 )
             )
@@ -84,6 +88,8 @@ class Train:
 
 
 ABOUT = "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
+LONGEST, NARROWEST = 2000, 20
+"""Characters of a complaint, and of a line of help at the least."""
 COMMANDS: dict[str, Callable[..., Any]] = {
     "reproduce": Reproduce,
     "run": Run,
@@ -119,19 +125,75 @@ KEPT |= dict.fromkeys(
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    0 done, 1 something failed or a policy was left out, 2 bad input, 130 interrupted.
+    0 done, 1 something failed or a policy was left out, 2 bad input, 70 a fault of the software itself, whose trace
+    `--debug` shows, 130 interrupted, 141 nobody reads the output any more.
     """
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    arguments = [argument for argument in given if argument != DEBUG]
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _settle_output()
     try:
-        sys.exit(_command(arguments))
+        sys.exit(_finished(arguments))
     except (InvalidInput, MissingExtra) as error:
         _complain(str(error))
+    except BrokenPipeError:
+        _leave_output()
+        sys.exit(UNREAD)
     except OSError as error:
+        _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
         words = 2 if arguments[:1] == ["train"] else 1
         _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", INTERRUPTED)
+    except Exception as error:
+        if DEBUG in given or os.environ.get("CARE_SIM_DEBUG"):
+            raise
+        told = f"unexpected {type(error).__name__}: {error}"
+        _complain(f"{told}; please report it, with the trace that {DEBUG} (or CARE_SIM_DEBUG=1) shows", UNEXPECTED)
+
+
+def _settle_output() -> None:
+    """Let output go nowhere where there is none. Write what an encoding lacks as an escape, and help for a terminal of
+    a few columns, in which tyro does not come to an end, as for one of NARROWEST.
+    """
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 (as long as the process)
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
+
+
+def _leave_output() -> None:
+    """Let what cannot be written any more go nowhere, or Python would complain of it at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _finished(arguments: list[str]) -> int:
+    """Run the command, and write all that it has printed."""
+    _check_texts(arguments)
+    try:
+        return _command(arguments)
+    finally:
+        sys.stdout.flush()
+
+
+def _check_texts(arguments: list[str]) -> None:
+    """Raise InvalidInput for an argument that says nothing, or that no shell can give."""
+    for argument in arguments:
+        if not argument or (argument.startswith("--") and argument.endswith("=") and argument.count("=") == 1):
+            raise InvalidInput(f"an argument is empty: {' '.join(arguments)}")
+        try:
+            whole = b"\0" not in os.fsencode(argument)
+        except UnicodeError:
+            whole = False
+        if not whole:
+            raise InvalidInput(f"no text: {shown(argument)}")
 
 
 def _command(arguments: list[str]) -> int:
@@ -177,6 +239,10 @@ def _one_line(box: str) -> str:
     return "; ".join(text.rstrip(".") for text in texts if text and not text.startswith("For full helptext"))
 
 
+def _bounds(field: Field[Any]) -> str:
+    return f" ({allowed(field)})" if allowed(field) else ""
+
+
 def _summary(thing: object) -> str:
     """The line that the module of a scenario begins with."""
     module = inspect.getmodule(thing)
@@ -191,5 +257,5 @@ def _rounded(value: object) -> str:
 
 
 def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
-    print(f"care-sim: {printable(' '.join(message.split()))}", file=sys.stderr)
+    print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
     sys.exit(code)

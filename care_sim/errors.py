@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.text import printable
+
 LARGEST = 2**31 - 1
 """What a whole number may be where nothing else is said."""
 LARGEST_SEED = 2**63 - 1
@@ -33,8 +35,7 @@ class MissingExtra(ImportError):
 
 def one_line(text: str) -> str:
     """The text on one line, what a terminal would not show written out."""
-    line = " ".join(text.split())
-    return line if line.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in line)
+    return printable(" ".join(text.split()))
 
 
 def shown(value: object) -> str:
@@ -43,7 +44,12 @@ def shown(value: object) -> str:
         text = one_line(repr(value))
     except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
         text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 20]}...{text[-17:]}"
+    return shortened(text, _SHOWN)
+
+
+def shortened(text: str, most: int) -> str:
+    """The text, its middle left out where it is longer than `most` characters."""
+    return text if len(text) <= most else f"{text[: most - 20]}...{text[-17:]}"
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
@@ -84,10 +90,10 @@ def _finite(value: Any) -> float:
 
 def check_whole(name: str, value: object, least: float, most: float = LARGEST) -> None:
     """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
-    is_whole = isinstance(value, Integral) and is_number(value)
-    if not (is_whole and least <= int(value) <= most):  # type: ignore[call-overload]
-        allowed = " and".join(f" {sign} {end}" for sign, end in ((">=", least), ("<=", most)) if abs(end) < math.inf)
-        raise InvalidInput(f"{name} must be a whole number{allowed}, got {shown(value)}")
+    whole = int(value) if isinstance(value, Integral) and is_number(value) else None  # type: ignore[call-overload]
+    if whole is None or not least <= whole <= most:
+        upper = f" and <= {most}" if most < LARGEST or (whole is not None and whole > most) else ""
+        raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
 
 
 def check_range(name: str, value: Any, least: float = -math.inf, most: float = math.inf) -> None:
@@ -96,6 +102,11 @@ def check_range(name: str, value: Any, least: float = -math.inf, most: float = m
     if not (fits and least <= _finite(value[0]) <= _finite(value[1]) <= most):
         within = f" within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
         raise InvalidInput(f"{name} must be two numbers, low and high,{within} got {shown(value)}")
+
+
+def is_text(value: str) -> bool:
+    """Whether files can hold the text: no half of a surrogate pair, as Python makes of bytes that are no UTF-8."""
+    return not any("\ud800" <= character <= "\udfff" for character in value)
 
 
 def check_flag(name: str, value: object) -> None:

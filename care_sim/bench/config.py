@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_sim.errors import InvalidInput, check_whole
+from care_sim.bounds import bounded, settle
+from care_sim.errors import LARGEST, InvalidInput
 from care_sim.study.config import EpisodeConfig
 
 
@@ -19,28 +20,23 @@ class BenchConfig:
     """Policy that chooses the cells."""
     seed: int = 0
     """Seed of the first episode, and of the scenes of scans and choices."""
-    seconds: float = 3.0
+    seconds: float = bounded(3.0, 0.001, 3600)
     """Duration of every single measurement of steps."""
-    repeats: int = 5
+    repeats: int = bounded(5, 1, 10_000)
     """Rounds; in each round everything is measured once."""
-    samples: int = 200
+    samples: int = bounded(200, 1, 1_000_000)
     """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
-    resets: int = 2000
+    resets: int = bounded(2000, 1, LARGEST)
     """Episodes begun in the worker whose memory is watched."""
-    seeds: int = 5
+    seeds: int = bounded(5, 0, 10_000)
     """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it out."""
     out: Path | None = None
     """File for the figures as JSON; the growth curves are drawn beside it, as PNG and SVG."""
 
     def __post_init__(self) -> None:
-        if not self.seconds > 0:
-            raise InvalidInput(f"seconds must be positive, got {self.seconds}")
+        settle(self)
         if self.out is not None and self.out.suffix in (".png", ".svg"):
             raise InvalidInput(f"out must be a file for JSON, got {self.out}; the figure is drawn beside it")
-        check_whole("repeats", self.repeats, 1)
-        check_whole("samples", self.samples, 1)
-        check_whole("resets", self.resets, 1)
-        check_whole("seeds", self.seeds, 0)
 
     @property
     def episode(self) -> EpisodeConfig:

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_sim.errors import check_whole
+from care_sim.bounds import bounded, settle
+from care_sim.errors import LARGEST
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -12,16 +13,14 @@ class ParityConfig:
     scenario, and in how the episodes of the paper's study go.
     """
 
-    scenes: int = 100_000
+    scenes: int = bounded(100_000, 0, LARGEST)
     """Random scenes."""
-    episodes: int = 5
+    episodes: int = bounded(5, 0, 10_000)
     """Seeds from 0 of every scenario, where every keyframe is scanned in full, and of the paper's study."""
-    seed: int = 0
+    seed: int = bounded(0, 0, LARGEST)
     """Seed of the random scenes."""
     out: Path | None = None
     """File for the figures as JSON."""
 
     def __post_init__(self) -> None:
-        check_whole("scenes", self.scenes, 0)
-        check_whole("episodes", self.episodes, 0)
-        check_whole("seed", self.seed, 0)
+        settle(self)

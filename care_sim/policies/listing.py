@@ -5,11 +5,10 @@ from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from textwrap import wrap
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, one_line
 from care_sim.policies import BUILT_IN, maker, policy_names, tags_of
 from care_sim.policies.installed import all_entries, entries, package_of
 from care_sim.policies.parameters import Maker, settable
-from care_sim.text import printable
 
 WIDTH = 80
 
@@ -62,6 +61,6 @@ def _hidden(entry: EntryPoint, winner: str) -> str:
 
 
 def _lines(title: str, *texts: str) -> str:
-    shown = (printable(" ".join(text.split())) for text in texts)
-    indented = (line for text in shown for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    "))
-    return "\n".join([printable(title), *indented])
+    said = map(one_line, texts)
+    indented = (line for text in said for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    "))
+    return "\n".join([one_line(title), *indented])

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from care_sim.errors import InvalidInput, check_whole
+from care_sim.bounds import bounded, settle
+from care_sim.errors import LARGEST, InvalidInput
 from care_sim.study.options import USUAL, Options, seeds_of
-from care_sim.study.running import Running, console, in_turn, playable
+from care_sim.study.running import MOST_WORKERS, Running, console, in_turn, playable
 
 if TYPE_CHECKING:
     from care_sim.policies.base import Policy
@@ -205,10 +206,13 @@ class Report:
     """The --out of an earlier study."""
     page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """HTML file for the page, which needs nothing else to be read; the folder is left as it is (extra 'page')."""
-    episodes: int = 400
+    episodes: int = bounded(400, 0, LARGEST)
     """The most episodes that are played again to be watched in the page, seed by seed; 0 for none."""
-    workers: int = os.cpu_count() or 1
+    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
     """Processes that play them."""
+
+    def __post_init__(self) -> None:
+        settle(self)
 
     def __call__(self) -> int:
         """Run it."""
@@ -225,8 +229,6 @@ class Report:
     def _write(self, path: Path) -> int:
         from care_sim.extras import check_page
 
-        check_whole("episodes", self.episodes, 0)
-        check_whole("workers", self.workers, 1)
         check_page()
         from care_sim.study.entries import counted
         from care_sim.study.page.build import write_page

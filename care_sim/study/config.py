@@ -10,6 +10,7 @@ import gymnasium
 
 from care_sim.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
+from care_sim.errors import check_known, check_seed
 from care_sim.scenarios import make_scenario
 from care_sim.study.parameters import Parameters
 from care_sim.study.task import (
@@ -17,7 +18,6 @@ from care_sim.study.task import (
     Likeness,
     Row,
     Task,
-    check_seed,
     check_size,
     collected,
     departures,
@@ -49,6 +49,7 @@ class EpisodeConfig(Conditions, Task):
         check_seed(self.seed)
         self.settle("scenario_parameters", "policy_parameters")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
+        check_known("environment of the scenario", self.scenario, ENVIRONMENTS)
         with self.make_env() as env:
             self.make_policy(env)
         super().__post_init__()

@@ -9,7 +9,7 @@ from functools import partial
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from care_sim.errors import InvalidInput, MissingExtra
+from care_sim.errors import InvalidInput, MissingExtra, shown
 
 if TYPE_CHECKING:
     from dask.distributed import Client
@@ -106,8 +106,8 @@ def _connect(address: str) -> "Client":
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"no dask scheduler answers at {address}; one looks like tcp://HOST:8786") from error
+    except Exception as error:  # of each protocol its own, those of libraries that are not there among them
+        raise InvalidInput(f"no dask scheduler answers at {shown(address)}; one looks like tcp://HOST:8786") from error
 
 
 def _is_death(error: BaseException) -> bool:

@@ -1,15 +1,19 @@
 """What several commands take: conditions that all episodes share, parameters as NAME=VALUE, seeds."""
 
 import ast
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from care_sim.conditions import Conditions
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, shown
 
 if TYPE_CHECKING:
     from care_sim.study.parameters import Parameters
+
+LONGEST = 8192
+"""Characters of a parameter: a path and its name fit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +48,7 @@ def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
     if len(numbers) != 1:
         return numbers
     if numbers[0] < 1:
-        raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {numbers[0]}")
+        raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {shown(numbers[0])}")
     check_size(numbers[0])
     return range(numbers[0])
 
@@ -58,8 +62,11 @@ def _pair(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise InvalidInput(f"parameters are given as NAME=VALUE, got {text!r}")
-    try:
-        literal = ast.literal_eval(value)
-    except (ValueError, SyntaxError):
-        literal = value
+    if len(text) > LONGEST:
+        raise InvalidInput(f"a parameter must be at most {LONGEST} characters long, got {shown(text)}")
+    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
+        try:
+            literal = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+            literal = value  # no literal, or one nested deeper than any parameter is
     return name, tuple(literal) if isinstance(literal, list) else literal

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, one_line, shown
 
 Parameters = tuple[tuple[str, Any], ...]
 """Names and values, of a scenario's physics, a policy or a detector."""
@@ -31,7 +31,7 @@ def _settled(what: str, value: Any) -> Any:
         plain = _plain(value)
         _kind(plain)
     except (ValueError, TypeError, OverflowError) as error:
-        raise InvalidInput(f"{what} must be {ALLOWED}, got {value!r:.200}") from error
+        raise InvalidInput(f"{one_line(what)} must be {ALLOWED}, got {shown(value)}") from error
     return plain
 
 
@@ -39,7 +39,7 @@ def _name(name: Any, whose: str) -> str:
     try:
         return _text(name)
     except (ValueError, TypeError) as error:
-        raise InvalidInput(f"the name of a {whose} parameter must be a text, got {name!r:.200}") from error
+        raise InvalidInput(f"the name of a {whose} parameter must be a text, got {shown(name)}") from error
 
 
 def _plain(value: Any, levels: int = DEEPEST) -> Any:

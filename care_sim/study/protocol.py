@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_sim.errors import InvalidInput, check_whole
+from care_sim.bounds import bounded
+from care_sim.errors import InvalidInput
 from care_sim.study.play_options import PlayOptions
 from care_sim.study.running import Running, in_turn, playable
 
@@ -32,7 +33,7 @@ class Protocol(Running, PlayOptions):
     compared with those of `care`, which is played for that in any case."""
     budgets: tuple[float, ...] = (0.1, 0.2, 0.35)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
-    floor_seeds: int = 3
+    floor_seeds: int = bounded(3, 1, 1000)
     """So many random floors, over which the tallies of a scene are averaged."""
     camera_latencies: tuple[int, ...] = ()
     """Several of --camera-latency, in turn; 1 is the paper's strict-causal variant."""
@@ -46,13 +47,10 @@ class Protocol(Running, PlayOptions):
         """Run it."""
         from care_sim.study.play_config import play_grid
         from care_sim.study.scenes import chosen
-        from care_sim.study.task import check_size
 
         for axis in ("policies", "budgets"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis} needs at least one value")
-        check_whole("floor_seeds", self.floor_seeds, 1)
-        check_size(self.floor_seeds)
         source, common = self.scene_source(), self.common() | {"presence": self.presence}
         scenes = chosen(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)

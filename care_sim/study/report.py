@@ -9,7 +9,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, check_whole
 from care_sim.files import replacing
 from care_sim.study.entries import counted
 from care_sim.study.executors import ExecutorFactory, processes
@@ -48,8 +48,7 @@ def conduct(
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
-    if workers < 1:
-        raise InvalidInput(f"workers must be a whole number >= 1, got {workers}")
+    check_whole("workers", workers, 1)
     configs, kind = [config.changed() for config in configs], study.kind
     check_columns(config.row() for config in configs)
     _check(folder, configs, study, force)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.errors import InvalidInput
+from care_sim.bounds import bounded, settle
+from care_sim.errors import InvalidInput, one_line
 from care_sim.study.options import USUAL
-from care_sim.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,18 +20,24 @@ DONE, FAILED = 0, 1
 PIPE_WIDTH = 180
 """Columns of a table that is not printed on a terminal."""
 
+MOST_WORKERS = 1024
+"""A process each takes 100 MB."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Running:
     """What commands have in common that play a study."""
 
-    workers: int = os.cpu_count() or 1
+    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
     """Processes that play at the same time on this machine; a cluster plays as many as it has threads."""
     cluster: str | None = None
     """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
     force: bool = False
     """Play into a folder that holds another study, or rows that are not asked for now: its tables, figures and Parquet
     files are replaced at the end; its journal stays."""
+
+    def __post_init__(self) -> None:
+        settle(self)
 
     def conduct(self, study: str, configs: "Sequence[Task]", out: Path, left_out: Sequence[str] = ()) -> int:
         """Play the tasks, print their tables, name those that failed and the policies that were left out."""
@@ -74,7 +80,7 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
 def report_problems(problems: Sequence[str]) -> None:
     """Print them, a line each, where complaints go."""
     for problem in problems:
-        print(f"care-sim: {printable(problem)}", file=sys.stderr)
+        print(f"care-sim: {one_line(problem)}", file=sys.stderr)
 
 
 def console() -> "Console":

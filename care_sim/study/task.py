@@ -12,7 +12,7 @@ import gymnasium
 
 import care_sim
 from care_sim.conditions import DEFAULTS, UNFELT_BY_FULL
-from care_sim.errors import InvalidInput, check_whole
+from care_sim.errors import InvalidInput, shown
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.belongings import paths
@@ -23,9 +23,6 @@ Row = dict[str, Any]
 
 Likeness = tuple[object, ...]
 """What tasks have in common."""
-
-LARGEST_SEED = 2**63 - 1
-"""What a column of a results file holds."""
 
 MOST_TASKS = 100_000
 """Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
@@ -110,7 +107,10 @@ class Task(ABC):
     def settle(self, *names: str) -> None:
         """Make the parameters in these fields what files can hold. Raises InvalidInput for those that none does."""
         for name in names:
-            object.__setattr__(self, name, settled(getattr(self, name), name.removesuffix("_parameters")))
+            pairs = getattr(self, name)
+            if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
+                raise InvalidInput(f"{name} must be pairs of a name and a value, got {shown(pairs)}")
+            object.__setattr__(self, name, settled(pairs, name.removesuffix("_parameters")))
 
 
 def departures(task: Task, without: Sequence[str]) -> list[str]:
@@ -152,17 +152,12 @@ def flat(prefix: str, parameters: Parameters) -> Row:
     return {f"{prefix}.{name}": value for name, value in parameters}
 
 
-def check_seed(seed: object) -> None:
-    """Raise InvalidInput for a seed that no column holds."""
-    check_whole("seed", seed, 0, LARGEST_SEED)
-
-
 def check_size(tasks: int) -> None:
     """Raise InvalidInput for more tasks than a study can hold; asked before they are made."""
     if tasks > MOST_TASKS:
         raise InvalidInput(
-            f"a study holds the rows of all its tasks in memory, so they are at most {MOST_TASKS:,}, got {tasks:,}: "
-            "play it in parts, each with an --out of its own"
+            f"a study holds the rows of all its tasks in memory, so they are at most {MOST_TASKS:,}, "
+            f"got {shown(tasks)}: play it in parts, each with an --out of its own"
         )
 
 
@@ -184,3 +179,7 @@ def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[d
         kept[key] = rest
         values.setdefault(key, []).append(one[axis])
     return [{**rest, plural: values[key]} for key, rest in kept.items()]
+
+
+def _is_pair(given: object) -> bool:
+    return isinstance(given, tuple | list) and len(given) == 2

@@ -6,10 +6,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from care_sim.errors import InvalidInput, check_number, check_whole
+from care_sim.bounds import bounded, settle
+from care_sim.errors import LARGEST, InvalidInput
+from care_sim.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.policies.wrapping import Wrapping
+from care_sim.reward import HEAVIEST
 from care_sim.study.options import parameters
-from care_sim.training.seeds import validation_seeds
+from care_sim.training.seeds import TRAINING, VALIDATION
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a run that is resumed may differ."""
@@ -30,33 +33,33 @@ class AgentConfig:
     """Further arguments of the environment as NAME=VALUE, for example vehicles=5 false_negative_rate=0.2."""
     action: Literal["SectorReserve", "SectorScores"] = "SectorReserve"
     """What the action scores: sectors for the reserve alone, or for everything."""
-    azimuths: int = 32
+    azimuths: int = bounded(32, 1, MOST_COLUMNS)
     """Sectors round the car."""
-    elevations: int = 4
+    elevations: int = bounded(4, 1, MOST_ROWS)
     """Sectors from top to bottom."""
-    columns: int = 64
+    columns: int = bounded(64, 1, MOST_COLUMNS)
     """Blocks of the observation round the car."""
-    rows: int = 8
+    rows: int = bounded(8, 1, MOST_ROWS)
     """Blocks of the observation from top to bottom."""
-    gain: float = 10.0
+    gain: float = bounded(10.0, 0, HEAVIEST)
     """Weight of the reward's term `gain`, in the closed loop; the others keep theirs."""
-    steps: int = 200_000
+    steps: int = bounded(200_000, 1, LARGEST)
     """Environment steps in all."""
-    seed: int = 0
+    seed: int = bounded(0, 0, LARGEST)
     """Of the weights, the exploration and the episodes trained on."""
-    environments: int = 8
+    environments: int = bounded(8, 1, 1024)
     """Environments side by side."""
     processes: bool = False
     """Give every environment a process of its own."""
-    threads: int = 1
+    threads: int = bounded(1, 1, 1024)
     """Threads of PyTorch."""
-    learning_rate: float = 1e-3
+    learning_rate: float = bounded(1e-3, 1e-8, 1)
     """Step size of Adam."""
-    discount: float = 0.9
+    discount: float = bounded(0.9, 0, 1)
     """What a reward is worth a keyframe later."""
-    evaluate_every: int = 20_000
+    evaluate_every: int = bounded(20_000, 1, LARGEST)
     """Environment steps between evaluations; each also writes a checkpoint."""
-    episodes: int = 20
+    episodes: int = bounded(20, 1, TRAINING - VALIDATION)
     """Held-out episodes an evaluation."""
     out: Path = Path("runs/train")
     """Folder of configuration, weights, checkpoint and learning curve."""
@@ -66,16 +69,7 @@ class AgentConfig:
     """Write a log for TensorBoard beside the weights; needs the package tensorboard."""
 
     def __post_init__(self) -> None:
-        for name in ("steps", "environments", "threads", "evaluate_every", "episodes"):
-            check_whole(name, getattr(self, name), 1)
-        for name in {"rollout", "batch", "epochs", "hidden", "memory"} & set(vars(self)):
-            check_whole(name, getattr(self, name), 2 if name == "batch" else 1)
-        check_number("noise", getattr(self, "noise", 1.0), 1e-3, 10)
-        check_whole("seed", self.seed, 0)
-        validation_seeds(self.episodes)
-        check_number("learning_rate", self.learning_rate, 1e-8, 1)
-        check_number("discount", self.discount, 0, 1)
-        check_number("gain", self.gain, 0)
+        settle(self)
         if not 0 < len(self.budget) <= self.environments:
             raise InvalidInput(f"budget needs one value to {self.environments}, the environments; got {self.budget}")
         self.wrapping, self.arguments  # noqa: B018 (refuse what does not fit)
@@ -121,13 +115,13 @@ class AgentConfig:
 class OnPolicy(AgentConfig):
     """What learners share that learn from the episodes that they just played."""
 
-    rollout: int = 128
+    rollout: int = bounded(128, 1, 100_000)
     """Steps an environment between two updates."""
-    batch: int = 256
+    batch: int = bounded(256, 2, 1_000_000)
     """Steps a gradient."""
-    epochs: int = 4
+    epochs: int = bounded(4, 1, 1000)
     """Times that every step is learned from."""
-    noise: float = 0.3
+    noise: float = bounded(0.3, 1e-3, 10)
     """Standard deviation of the scores at the start."""
 
 
@@ -137,7 +131,7 @@ class Ppo(OnPolicy):
 
     algorithm = "ppo"
 
-    hidden: int = 16
+    hidden: int = bounded(16, 1, 4096)
     """Width of the network that slides over the sectors."""
 
 
@@ -154,7 +148,7 @@ class Sac(AgentConfig):
 
     algorithm = "sac"
 
-    memory: int = 20_000
+    memory: int = bounded(20_000, 1, 1_000_000)
     """Steps that are remembered and learned from; 25 kB each."""
-    batch: int = 256
+    batch: int = bounded(256, 2, 1_000_000)
     """Steps a gradient."""

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import check_whole
+from care_sim.bounds import bounded, settle
+from care_sim.errors import LARGEST
 from care_sim.extras import import_torch
 from care_sim.grid import AngularGrid
 from care_sim.policies.weights import Arrays, Card, save
@@ -39,15 +40,16 @@ class TrainScorer:
 
     out: Path
     """File to write."""
-    seed: int = 0
+    seed: int = bounded(0, 0, LARGEST)
     """Of the first weights and the order of the examples."""
-    steps: int = 4000
+    steps: int = bounded(4000, 1, LARGEST)
     """Batches that are learned from."""
+
+    def __post_init__(self) -> None:
+        settle(self)
 
     def __call__(self) -> int:
         """Run it."""
-        check_whole("seed", self.seed, 0)
-        check_whole("steps", self.steps, 1)
         import_torch()
         self.out.parent.mkdir(parents=True, exist_ok=True)
         started = time.perf_counter()

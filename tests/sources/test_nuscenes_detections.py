@@ -76,7 +76,7 @@ OWN = {"sample_data_token": "t", "bbox_corners": [0, 0, 5, 5], "category_name": 
         (COCO | {"bbox": [0, 0, 1]}, r"no box of four numbers: \[0, 0, 1\]"),
         (COCO | {"bbox": [0, 0, -5, 5]}, "a box without width or height"),
         (COCO | {"bbox": "0055"}, "no box of four numbers: '0055'"),
-        (COCO | {"category_id": 0}, "category_id must be a whole number >= 1, got 0"),
+        (COCO | {"category_id": 0}, "category_id must be a whole number >= 1 and <= 90, got 0"),
         (COCO | {"category_id": 91}, "category_id must be a whole number >= 1 and <= 90, got 91"),
         (OWN | {"bbox_corners": [0, 0, 5, float("nan")]}, "no box of four numbers"),
         (OWN | {"category_name": "vehicle.carr"}, "unknown category 'vehicle.carr'; known: animal, "),

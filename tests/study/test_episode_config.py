@@ -37,7 +37,7 @@ def test_every_scenario_has_its_environment():
         ({"engine": "warp"}, ["'warp'", "bullet"]),
         ({"scenario_parameters": (("wheels", 3),)}, ["'wheels'", "vehicles"]),
         ({"scenario_parameters": (("budget", 1.0),)}, ["'budget'", "vehicles"]),
-        ({"scenario_parameters": (("vehicles", 99),)}, ["vehicles", "0..12"]),
+        ({"scenario_parameters": (("vehicles", 99),)}, ["vehicles", ">= 0 and <= 12"]),
         ({"policy": "care-sbf", "policy_parameters": (("k", 3),)}, ["'k'", "k_safe"]),
         ({"policy": "full", "budget": 0.1}, ["full", "budget=1.0"]),
     ],

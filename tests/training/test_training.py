@@ -164,7 +164,7 @@ def test_the_other_learners_by_name(capsys, tmp_path, name):
         (["--epochs", "0"], "epochs must be a whole number >= 1"),
         (["--hidden", "0"], "hidden must be a whole number >= 1"),
         (["--noise", "0"], "noise must"),
-        (["--episodes", "8001"], "episodes must be at most 8000"),
+        (["--episodes", "8001"], "episodes must be a whole number >= 1 and <= 8000"),
         (["--env-parameters", "budget=0.1"], "budget is no env_parameter but set by --budget"),
         (["--env-parameters", "vehicles"], "parameters are given as NAME=VALUE"),
         (["--env-parameters", "wheels=3"], "wheels"),
