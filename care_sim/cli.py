@@ -4,7 +4,6 @@ import contextlib
 import importlib
 import inspect
 import io
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -12,6 +11,7 @@ from typing import Any, NoReturn
 
 import tyro
 
+from care_sim import interrupts
 from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
 from care_sim.study.compare import Compare
@@ -19,7 +19,7 @@ from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
 from care_sim.viewer.command import View
 
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT = 2
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
     0 done, 1 something failed or a policy was left out, 2 bad input, 130 interrupted.
     """
+    alone = arguments is None
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupts.raise_them()
     try:
         sys.exit(_command(arguments))
     except (InvalidInput, MissingExtra) as error:
@@ -129,8 +130,13 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
+        if alone:
+            interrupts.end_in_silence()
         words = 2 if arguments[:1] == ["train"] else 1
-        _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", INTERRUPTED)
+        _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", interrupts.INTERRUPTED)
+    finally:
+        if alone:
+            interrupts.end_in_silence()
 
 
 def _command(arguments: list[str]) -> int:
@@ -190,5 +196,6 @@ def _rounded(value: object) -> str:
 
 
 def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
-    print(f"care-sim: {' '.join(message.split())}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # the terminal may be what is gone
+        print(f"care-sim: {' '.join(message.split())}", file=sys.stderr)
     sys.exit(code)
