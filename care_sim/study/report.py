@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from care_sim.errors import InvalidInput
+from care_sim.files import write_text
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import remove_others, save
 from care_sim.study.journal import Journal
@@ -48,7 +49,7 @@ def conduct(
         rows = [journal[digest] for digest in (config.digest() for config in configs) if digest in journal]
     if rows:
         left_out = summary(failures, kind.unit)
-        (folder / "config.json").write_text(_description(configs, study, failures))
+        write_text(folder / "config.json", _description(configs, study, failures))
         for name, columns in kind.aside(rows).items():
             write_columns(columns, folder / name)
         rows = kind.finish(rows)
@@ -79,9 +80,9 @@ def write_report(rows: Sequence[Row], folder: Path, study: Study = SWEEP, left_o
     tables, closing = study.tables(rows), [*study.closing(rows), *map(_left_out, left_out)]
     statements = "## Statements\n\n" + "".join(f"- {sentence}\n" for sentence in closing)
     pages = [f"{study.caption}\n", *(table.markdown() for table in tables), statements]
-    (folder / "tables.md").write_text("\n".join(pages))
+    write_text(folder / "tables.md", "\n".join(pages))
     texts = [paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
-    (folder / "tables.tex").write_text("\n".join([PREAMBLE, *texts]))
+    write_text(folder / "tables.tex", "\n".join([PREAMBLE, *texts]))
     figures = study.figures(rows)
     remove_others(folder, (name for known in STUDIES.values() for name in known.figure_names), figures)
     for name, figure in figures.items():

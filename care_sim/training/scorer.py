@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from care_sim.errors import check_whole
 from care_sim.extras import import_torch
+from care_sim.files import ZIP, check_output
 from care_sim.grid import AngularGrid
 from care_sim.policies.weights import Arrays, Card, save
 from care_sim.streets.street import CALIBRATION_SEEDS
@@ -49,7 +50,7 @@ class TrainScorer:
         check_whole("seed", self.seed, 0)
         check_whole("steps", self.steps, 1)
         import_torch()
-        self.out.parent.mkdir(parents=True, exist_ok=True)
+        check_output(self.out, ZIP)
         started = time.perf_counter()
         learned, held_out = (_gathered(name, seeds) for name, seeds in _STREETS.items())
         arrays, losses = train(learned, held_out, self.seed, self.steps)

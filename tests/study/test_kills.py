@@ -35,7 +35,8 @@ def test_whatever_ends_a_study_leaves_no_process_and_the_same_command_goes_on(tm
     kept = []
     for end in (signal.SIGKILL, signal.SIGHUP, signal.SIGQUIT):
         with Marked(study(tmp_path)) as started:
-            assert until(lambda enough=len(kept) + 3: len(rows(tmp_path)) >= enough, 60)
+            enough = len(kept) + 3
+            assert until(lambda enough=enough: len(rows(tmp_path)) >= enough, 60)
             assert len(started.alive()) >= 4
             os.kill(started.process.pid, end)
             assert started.all_end_within(5), end
