@@ -4,6 +4,10 @@ Importing the package registers the environments of the closed loop, `CARE-Darto
 `CARE-CutIn-v0`, and of the open loop, `CARE-Street-v0` and `CARE-Replay-v0`.
 """
 
+# First of all: an interrupt may come while the rest is imported.
+import care_sim.interrupts  # noqa: F401
+
+# isort: split
 from importlib.metadata import version
 
 from care_sim.allocation import allocate

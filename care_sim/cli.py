@@ -6,7 +6,6 @@ import inspect
 import io
 import os
 import shutil
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import Field, dataclass, fields
@@ -14,6 +13,7 @@ from typing import Any, NoReturn
 
 import tyro
 
+from care_sim import interrupts
 from care_sim.bounds import allowed
 from care_sim.errors import InvalidInput, MissingExtra, one_line, shortened, shown
 from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
@@ -22,8 +22,8 @@ from care_sim.study.export import Export
 from care_sim.study.protocol import Protocol
 from care_sim.viewer.command import View
 
-BAD_INPUT, UNEXPECTED, INTERRUPTED, UNREAD = 2, 70, 130, 141
-"""Exit codes: that of a fault in the software is `EX_SOFTWARE` of BSD, the last two those of a shell for signals."""
+BAD_INPUT, UNEXPECTED, UNREAD = 2, 70, 141
+"""Exit codes: that of a fault in the software is `EX_SOFTWARE` of BSD, the last that of a shell for the signal."""
 DEBUG = "--debug"
 
 
@@ -128,9 +128,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     0 done, 1 something failed or a policy was left out, 2 bad input, 70 a fault of the software itself, whose trace
     `--debug` shows, 130 interrupted, 141 nobody reads the output any more.
     """
+    alone = arguments is None
     given = list(sys.argv[1:] if arguments is None else arguments)
     arguments = [argument for argument in given if argument != DEBUG]
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupts.raise_them()
     _settle_output()
     try:
         sys.exit(_finished(arguments))
@@ -143,13 +144,18 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
+        if alone:
+            interrupts.end_in_silence()
         words = 2 if arguments[:1] == ["train"] else 1
-        _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", INTERRUPTED)
+        _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", interrupts.INTERRUPTED)
     except Exception as error:
         if DEBUG in given or os.environ.get("CARE_SIM_DEBUG"):
             raise
         told = f"unexpected {type(error).__name__}: {error}"
         _complain(f"{told}; please report it, with the trace that {DEBUG} (or CARE_SIM_DEBUG=1) shows", UNEXPECTED)
+    finally:
+        if alone:
+            interrupts.end_in_silence()
 
 
 def _settle_output() -> None:
@@ -257,5 +263,6 @@ def _rounded(value: object) -> str:
 
 
 def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
-    print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # the terminal may be what is gone
+        print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
     sys.exit(code)

@@ -1,11 +1,17 @@
 """Files that are there whole or not at all."""
 
 import contextlib
+import os
+import socket
+import stat
+import subprocess
+import sys
+import threading
 
 import pytest
 
 from care_sim.errors import InvalidInput
-from care_sim.files import replacing
+from care_sim.files import JSON, PNG, check_output, replacing, write_text
 
 
 def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path):
@@ -35,3 +41,86 @@ def test_a_file_has_one_writer_at_a_time(tmp_path, monkeypatch):
 def test_a_folder_is_refused(tmp_path):
     with pytest.raises(InvalidInput, match="is a folder"), replacing(tmp_path):
         pass
+
+
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link.csv").symlink_to("far/table.csv")
+    for text in ("made", "replaced"):
+        write_text(tmp_path / "link.csv", text)
+        assert (tmp_path / "link.csv").is_symlink()
+        assert (tmp_path / "far" / "table.csv").read_text() == text
+    assert [path.name for path in (tmp_path / "far").iterdir()] == ["table.csv"]
+    (tmp_path / "round").symlink_to("round")
+    with pytest.raises(InvalidInput, match="leads back to itself"):
+        check_output(tmp_path / "round")
+
+
+def test_the_rights_of_a_file_stay(tmp_path):
+    file = tmp_path / "secret.json"
+    file.touch(0o600)
+    write_text(file, "{}")
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+def test_a_terminal_and_a_pipe_are_written_into(tmp_path):
+    ours, theirs = os.openpty()
+    write_text(tmp_path / "direct", "never there before")
+    (tmp_path / "link").symlink_to(os.ttyname(theirs))
+    write_text(tmp_path / "link", "to a device")
+    assert os.read(ours, 100) == b"to a device"
+    assert stat.S_ISCHR(os.stat(os.ttyname(theirs)).st_mode)
+    os.close(ours)
+    os.close(theirs)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    heard = []
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()), daemon=True)
+    reader.start()
+    with replacing(pipe, JSON) as unfinished:
+        unfinished.write_text("into a pipe")
+    reader.join(10)
+    assert heard == ["into a pipe"]
+    assert pipe.is_fifo()
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_the_output_of_the_process_is_written_into_wherever_it_goes(tmp_path):
+    program = (
+        "import sys; from pathlib import Path; from care_sim.files import write_text; "
+        "print('before'); write_text(Path('/dev/stdout'), 'between\\n'); print('after')"
+    )
+    with (tmp_path / "out").open("a") as out:
+        subprocess.run([sys.executable, "-c", program], stdout=out, check=True)
+    assert (tmp_path / "out").read_text() == "before\nbetween\nafter\n"
+
+
+def test_a_socket_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind("socket")
+        with pytest.raises(InvalidInput, match="socket is a block device or a socket"):
+            check_output(tmp_path / "socket")
+    assert stat.S_ISSOCK((tmp_path / "socket").stat().st_mode)
+
+
+@pytest.mark.parametrize(
+    ("old", "allowed"), [(b"", True), (b"\x89PNG..", True), (b"PAR1....", False), (b"hello", False)]
+)
+def test_a_file_of_another_kind_is_refused_before_anything_is_computed(old, allowed, tmp_path):
+    file = tmp_path / "mine.png"
+    file.write_bytes(old)
+    if allowed:
+        check_output(file, PNG)
+    else:
+        with pytest.raises(InvalidInput, match=r"mine\.png holds something else .*: remove it first"):
+            replacing(file, PNG).__enter__()
+    assert file.read_bytes() == old
+
+
+def test_a_name_too_long_is_refused_at_once_and_the_longest_is_written(tmp_path):
+    with pytest.raises(OSError, match="too long"):
+        check_output(tmp_path / ("n" * 256))
+    longest = tmp_path / ("ä" * 125 + ".json")
+    write_text(longest, "{}")
+    assert [path.name for path in tmp_path.iterdir()] == [longest.name]

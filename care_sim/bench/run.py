@@ -11,13 +11,15 @@ from care_sim.bench.config import BenchConfig
 from care_sim.bench.figure import growth_figure
 from care_sim.bench.measure import measure
 from care_sim.bench.tables import tables
-from care_sim.files import replacing
-from care_sim.study.figures import save
+from care_sim.files import JSON, replacing
+from care_sim.study.figures import check_figure, save
 
 
 def run(config: BenchConfig) -> int:
     """Measure, print the tables, write JSON and figure; 0 whether or not the targets are met."""
-    with nullcontext() if config.out is None else replacing(config.out) as out:
+    if config.out is not None:
+        check_figure(config.out)
+    with nullcontext() if config.out is None else replacing(config.out, JSON) as out:
         report = measure(config, partial(print, "measuring", file=sys.stderr))
         console = Console(highlight=False)
         for table in tables(report):

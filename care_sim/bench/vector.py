@@ -10,6 +10,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 from care_sim.bench.config import BenchConfig
 from care_sim.bench.driven import driven
+from care_sim.children import following, starting
 
 PROCESSES = (1, 2)
 
@@ -29,7 +30,9 @@ def vectorised(config: BenchConfig) -> dict[str, list[float]]:
 
 @contextmanager
 def _workers(config: BenchConfig, number: int) -> Iterator[AsyncVectorEnv]:
-    envs = AsyncVectorEnv([partial(driven, config.episode)] * number, context="spawn")
+    make = partial(following, partial(driven, config.episode))
+    with starting():
+        envs = AsyncVectorEnv([make] * number, context="spawn")
     try:
         yield envs
     finally:

@@ -1,5 +1,6 @@
 """Scans as files that other tools read: point clouds, with poses and boxes beside them."""
 
+import errno
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -14,6 +15,7 @@ import numpy as np
 from care_sim.envs.watching import Watching, numbered
 from care_sim.errors import InvalidInput, check_path
 from care_sim.extras import import_open3d
+from care_sim.files import replacing, write_text
 from care_sim.frames import Floats
 from care_sim.loop import ClosedLoop
 from care_sim.moments import Moment
@@ -27,6 +29,8 @@ UNITS = (
     "then yaw, pitch and roll, turned about z, then y, then x. Cells: row * columns + column; row 0 is the highest, "
     "column 0 straight behind, then to the right, ahead, left. Ego and bodies are truth, in the world frame."
 )
+POINT_BYTES = 4 * 3 + 4 + 1
+"""Of a point in a cloud: three coordinates, cell and share."""
 
 
 class ExportScans(Watching):
@@ -69,7 +73,7 @@ class ExportScans(Watching):
         stem = f"{moment.frame.index:03d}"
         cells, points = moment.returned(self._closed_loop.rig.grid)
         self._write_cloud(self._folder / f"{stem}.pcd", points, cells, moment.shares.ravel()[cells])
-        (self._folder / f"{stem}.json").write_text(json.dumps(described(moment)) + "\n")
+        write_text(self._folder / f"{stem}.json", json.dumps(described(moment)) + "\n")
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Write the result."""
@@ -83,15 +87,18 @@ class ExportScans(Watching):
             "shares": SHARES,
             "outcome": outcome,
         }
-        (self._folder / "episode.json").write_text(json.dumps(content, indent=1) + "\n")
+        write_text(self._folder / "episode.json", json.dumps(content, indent=1) + "\n")
 
     def _write_cloud(self, file: Path, points: Floats, cells: Any, shares: Any) -> None:
         tensor = self._open3d.core.Tensor
         cloud = self._open3d.t.geometry.PointCloud(tensor(points.astype(np.float32)))
         cloud.point["cell"] = tensor(cells.astype(np.int32)[:, None])
         cloud.point["share"] = tensor(shares.astype(np.uint8)[:, None])
-        if not self._open3d.t.io.write_point_cloud(str(file), cloud):
-            raise OSError(f"{file} cannot be written")
+        with replacing(file) as unfinished:
+            written = self._open3d.t.io.write_point_cloud(str(unfinished), cloud)
+            # Open3D does not tell of a disk that is full.
+            if not written or unfinished.stat().st_size < len(points) * POINT_BYTES:
+                raise OSError(errno.EIO, "the point cloud could not be written", str(file))
 
 
 def described(moment: Moment) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from rich.console import Console
 
-from care_sim.files import replacing
+from care_sim.files import JSON, replacing
 from care_sim.parity.config import ParityConfig
 from care_sim.parity.keyframes import keyframes
 from care_sim.parity.outcomes import outcomes
@@ -26,7 +26,7 @@ Compared = TypeVar("Compared")
 
 def run(config: ParityConfig) -> int:
     """Compare, print the tables, write JSON; 1 if the engines do not agree, see `agree`."""
-    with nullcontext() if config.out is None else replacing(config.out) as out:
+    with nullcontext() if config.out is None else replacing(config.out, JSON) as out:
         report = measure(config)
         console = Console(highlight=False)
         for table in tables(report):

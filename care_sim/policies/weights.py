@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.errors import InvalidInput, is_number
+from care_sim.files import ZIP, replacing
 from care_sim.grid import AngularGrid
 from care_sim.json_text import parsed
 from care_sim.types import Rig
@@ -107,10 +108,10 @@ class Weights:
 
 
 def save(path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: Card) -> None:
-    """Write weights; the same arrays and card give the same bytes."""
+    """Write weights, whole or not at all; the same arrays and card give the same bytes."""
     entries: dict[str, Any] = {_CARD: np.frombuffer(card.to_json().encode(), np.uint8)}
     entries |= {name: np.asarray(array, np.float32) for name, array in arrays.items()}
-    with open(path, "wb") as file:
+    with replacing(Path(path), ZIP) as unfinished, unfinished.open("wb") as file:
         np.savez(file, **entries)
 
 

@@ -1,31 +1,32 @@
 """Moving pictures as files: MP4 through FFmpeg, animated GIF, WebP and PNG through Pillow."""
 
+import errno
+import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
+from shutil import disk_usage
 
 import numpy as np
 from PIL import Image
 
-from care_sim.errors import InvalidInput, check_known
+from care_sim.errors import check_known
 from care_sim.extras import import_imageio_ffmpeg
-from care_sim.files import replacing
+from care_sim.files import GIF, MP4, PNG, WEBP, check_output, replacing
 
 GIF_COLOURS = 96
 """Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file goes."""
 
 
 def check_clip(path: Path) -> None:
-    """Raise InvalidInput for a folder and for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its
-    library; make the folder that it will be in.
+    """Raise InvalidInput for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its library, and what
+    `care_sim.files.check_output` raises.
     """
     check_known("ending of a clip", path.suffix, ENDINGS)
-    if path.is_dir():
-        raise InvalidInput(f"{path} is a folder, a file is wanted")
     if path.suffix == ".mp4":
         import_imageio_ffmpeg()
-    path.parent.mkdir(parents=True, exist_ok=True)
+    check_output(path, KINDS[path.suffix])
 
 
 def write_clip(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
@@ -33,7 +34,7 @@ def write_clip(path: Path, pictures: Iterable[Image.Image], picture_s: float, ho
 
     The ending of `path`, which `check_clip` has let pass, decides the form. The file is there whole or not at all.
     """
-    with replacing(path) as unfinished:
+    with replacing(path, KINDS[path.suffix]) as unfinished:
         ENDINGS[path.suffix](unfinished, pictures, picture_s, hold_s)
 
 
@@ -41,13 +42,24 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], picture_s: float, ho
     shown = iter(pictures)
     first = next(shown)
     ffmpeg = import_imageio_ffmpeg()
-    frames = ffmpeg.write_frames(str(path), first.size, fps=1 / picture_s, macro_block_size=2, quality=7)
-    with closing(frames) as film:
-        film.send(None)
-        for picture in chain([first], shown):
-            film.send(picture.tobytes())
-        for _ in range(round(hold_s / picture_s) - 1):
-            film.send(picture.tobytes())
+    looks = {"fps": 1 / picture_s, "macro_block_size": 2, "quality": 7, "ffmpeg_log_level": "quiet"}
+    sent = 0
+    try:
+        with closing(ffmpeg.write_frames(str(path), first.size, **looks)) as film:
+            film.send(None)
+            for picture in chain([first], shown):
+                film.send(picture.tobytes())
+                sent += 1
+            for _ in range(round(hold_s / picture_s) - 1):
+                film.send(picture.tobytes())
+                sent += 1
+        written, _ = ffmpeg.count_frames_and_secs(str(path))
+    except (OSError, RuntimeError):
+        written = 0
+    # FFmpeg does not tell us that it failed: a film that lacks a picture tells.
+    if written != sent:
+        reason = "FFmpeg could not write it" if disk_usage(path.parent).free else os.strerror(errno.ENOSPC)
+        raise OSError(errno.EIO, reason, str(path))
 
 
 def _write_animation(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
@@ -67,6 +79,7 @@ def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
 
 
+KINDS = {".mp4": MP4, ".gif": GIF, ".webp": WEBP, ".png": PNG}
 ENDINGS: dict[str, Callable[[Path, Iterable[Image.Image], float, float], None]] = {
     ".mp4": _write_mp4,
     ".gif": _write_gif,

@@ -1,14 +1,15 @@
 """Who plays the episodes: processes of this machine, or the workers of a dask cluster."""
 
 import logging
-import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
+from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from care_sim.children import end_with_parent, starting
 from care_sim.errors import InvalidInput, MissingExtra, shown
 
 if TYPE_CHECKING:
@@ -26,11 +27,12 @@ class ClusterLost(OSError):
 
 
 def processes(workers: int) -> Executor:
-    """Worker processes on this machine, forked from a clean server that has imported the simulator."""
+    """Worker processes on this machine, forked from a clean server that has imported the simulator. They and the server
+    end with this process.
+    """
     context = get_context("forkserver")
     context.set_forkserver_preload(["care_sim.study.episode", "care_sim.envs.closed_loop", "care_sim.study.plays"])
-    # An interrupt is the main process's to handle.
-    return ProcessPoolExecutor(workers, context, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    return Processes(workers, context)
 
 
 def cluster(address: str) -> ExecutorFactory:
@@ -45,6 +47,19 @@ def cluster(address: str) -> ExecutorFactory:
 def places(executor: Executor, workers: int) -> int:
     """How many batches are played at the same time: `workers`, or as many as a cluster has threads now."""
     return executor.threads() if isinstance(executor, ClusterExecutor) else workers
+
+
+class Processes(ProcessPoolExecutor):
+    """A pool whose processes, which a call may start, leave interrupts to this one and end with it."""
+
+    def __init__(self, workers: int, context: BaseContext):
+        with starting():
+            super().__init__(workers, context, end_with_parent)
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Hand a call over."""
+        with starting():
+            return super().submit(fn, *args, **kwargs)
 
 
 class ClusterExecutor(Executor):

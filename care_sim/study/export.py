@@ -34,10 +34,10 @@ class Export(PlayOptions):
         from rich.console import Console
         from rich.progress import track
 
-        from care_sim.files import replacing
+        from care_sim.files import JSON, replacing
 
         configs = self._configs()
-        with replacing(self.out) as file:
+        with replacing(self.out, JSON) as file:
             shown = track(configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty())
             results = {token: boxes for config in shown for token, boxes in found(config).items()}
             file.write_text(json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8")

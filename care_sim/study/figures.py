@@ -8,6 +8,8 @@ from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from care_sim.files import PNG, SVG, check_output, replacing
+
 _FORMATS = (".png", ".svg")
 
 
@@ -17,9 +19,16 @@ def save(figure: Figure, stem: Path) -> None:
     for text in figure.findobj(Text):
         if id(text) not in of_ticks:
             text.set_parse_math(False)
-    figure.savefig(stem.with_suffix(".png"), dpi=200)
-    with rc_context({"svg.hashsalt": stem.name}):
-        figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None})
+    with replacing(stem.with_suffix(".png")) as unfinished:
+        figure.savefig(unfinished, dpi=200)
+    with rc_context({"svg.hashsalt": stem.name}), replacing(stem.with_suffix(".svg")) as unfinished:
+        figure.savefig(unfinished, metadata={"Date": None})
+
+
+def check_figure(stem: Path) -> None:
+    """Raise what `care_sim.files.check_output` does where `save` could not write a figure."""
+    check_output(stem.with_suffix(".png"), PNG)
+    check_output(stem.with_suffix(".svg"), SVG)
 
 
 def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:

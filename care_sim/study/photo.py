@@ -6,6 +6,7 @@ from pathlib import Path
 from PIL import Image
 
 from care_sim.envs.picture import draw_keyframe
+from care_sim.files import PNG, check_output, replacing
 from care_sim.loop import ClosedLoop
 from care_sim.types import Keyframe
 
@@ -13,19 +14,20 @@ from care_sim.types import Keyframe
 class Photographer:
     """Watches an episode and writes one picture to `path`; without a path it does nothing.
 
-    Raises OSError when the file cannot be written.
+    Raises InvalidInput and OSError at once where no picture can be written: `care_sim.files.check_output`.
     """
 
     def __init__(self, path: Path | None):
         self._path = path
         self._done = path is None
         if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            check_output(path, PNG)
 
     def __call__(self, loop: ClosedLoop, frame: Keyframe) -> None:
         """Take the picture if this is the keyframe."""
         if self._path is not None and not self._done and frame.braking:
-            Image.fromarray(draw_keyframe(loop, frame)).save(self._path, "PNG")
+            with replacing(self._path, PNG) as unfinished:
+                Image.fromarray(draw_keyframe(loop, frame)).save(unfinished, "PNG")
             self._done = True
 
     def report(self) -> None:

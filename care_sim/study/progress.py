@@ -4,7 +4,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import timedelta
 
 from rich.console import Console
@@ -75,7 +75,8 @@ class Reporter(Audience):
 
     def interrupted(self) -> None:
         """Say why it takes a moment."""
-        print("interrupted: what is played now is finished first", file=sys.stderr, flush=True)
+        with suppress(OSError):  # the terminal may be what is gone
+            print("interrupted: what is played now is finished first", file=sys.stderr, flush=True)
 
     def summary(self, unit: str) -> str:
         """How long it took, and how long it should have."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from care_sim.errors import InvalidInput, check_whole
-from care_sim.files import replacing
+from care_sim.files import write_text
 from care_sim.study.entries import counted
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.figures import remove_others, save
@@ -69,8 +69,7 @@ def _write(
     kind = study.kind
     left_out, finished, aside = summary(failures, kind.unit), kind.finish(rows), kind.aside(rows)
     report = Report.of(finished, study, left_out)
-    with replacing(folder / "config.json") as unfinished:
-        unfinished.write_text(_description(configs, study, failures))
+    write_text(folder / "config.json", _description(configs, study, failures))
     for name, columns in aside.items():
         write_columns(columns, folder / name)
     write_rows(finished, folder / kind.file, study.name, left_out)
@@ -113,8 +112,7 @@ class Report:
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""
         for name, text in self.texts.items():
-            with replacing(folder / name) as unfinished:
-                unfinished.write_text(text)
+            write_text(folder / name, text)
         for name, figure in self.figures.items():
             save(figure, folder / name)
         remove_others(folder, (name for known in STUDIES.values() for name in known.figure_names), self.figures)

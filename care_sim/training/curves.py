@@ -62,10 +62,10 @@ class Curves:
         if not self.folders:
             raise InvalidInput("curves needs the folder of a training run, the --out of `care-sim train`")
         groups = together(map(read, self.folders))
-        from care_sim.study.figures import save
+        from care_sim.study.figures import check_figure, save
         from care_sim.training.curves_figure import curves_figure
 
-        self.out.parent.mkdir(parents=True, exist_ok=True)
+        check_figure(self.out)
         save(curves_figure(groups), self.out)
         print(self.out.with_suffix(".png"))
         return 0

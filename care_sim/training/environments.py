@@ -1,6 +1,5 @@
 """The environments of a training run, wrapped."""
 
-import signal
 from collections.abc import Callable
 from functools import partial
 from itertools import cycle, islice
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 
 import care_sim
+from care_sim.children import following, starting
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.grid_observation import GridObservation
 from care_sim.envs.sector_actions import SectorReserve, SectorScores
@@ -52,11 +52,6 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
     budgets = islice(cycle(config.budget), config.environments)
     makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [partial(training, config, budget) for budget in budgets]
     if config.processes:
-        return VecMonitor(SubprocVecEnv([partial(_undisturbed, maker) for maker in makers], start_method="spawn"))
+        with starting():
+            return VecMonitor(SubprocVecEnv([partial(following, maker) for maker in makers], start_method="spawn"))
     return VecMonitor(DummyVecEnv(makers))
-
-
-def _undisturbed(make: Callable[[], gymnasium.Env[Any, Any]]) -> gymnasium.Env[Any, Any]:
-    """Make an environment in a process that leaves an interruption to the one that learns, which then ends it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return make()

@@ -14,13 +14,13 @@ learns from is not kept (half a gigabyte): a resumed run gathers its own.
 
 import csv
 import json
-import os
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from care_sim.errors import LARGEST, InvalidInput, is_number
+from care_sim.files import replacing, write_text
 from care_sim.json_text import parsed
 from care_sim.policies.weights import Card, save
 from care_sim.training.config import AgentConfig
@@ -58,14 +58,14 @@ class Folder:
         """Write the configuration down, and the learner as it is: from here on the run can be resumed."""
         self.path.mkdir(parents=True, exist_ok=True)
         self.save(model)
-        _put(self.path / CONFIG, lambda beside: beside.write_text(self.config.to_json()))
+        write_text(self.path / CONFIG, self.config.to_json())
 
     def rules(self, score: Callable[[], dict[str, Score]]) -> dict[str, Score]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
         path = self.path / RULES
         if not path.exists():
             text = json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
-            _put(path, lambda beside: beside.write_text(text))
+            write_text(path, text)
         return {name: Score(**plain) for name, plain in read_rules(path).items()}
 
     @property
@@ -82,22 +82,19 @@ class Folder:
         if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
         self._curve.append((model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m))
-        _put(self.path / CURVE, self._write_curve)
+        with replacing(self.path / CURVE) as unfinished, unfinished.open("w", newline="") as file:
+            csv.writer(file).writerows([COLUMNS, *self._curve])
 
     def save(self, model: "BaseAlgorithm") -> None:
         """Write a checkpoint."""
-        _put(self.checkpoint, model.save)
-
-    def _write_curve(self, path: Path) -> None:
-        with path.open("w", newline="") as file:
-            csv.writer(file).writerows([COLUMNS, *self._curve])
+        with replacing(self.checkpoint) as unfinished:
+            model.save(unfinished)
 
     def _export(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> None:
         from care_sim.training.networks import SectorPolicy
 
         if isinstance(model.policy, SectorPolicy):
-            arrays, card = model.policy.arrays(), self._card(model, score, seconds, rig)
-            _put(self.weights, lambda beside: save(beside, arrays, card))
+            save(self.weights, model.policy.arrays(), self._card(model, score, seconds, rig))
 
     def _card(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> Card:
         config, held_out = self.config, validation_seeds(score.episodes)
@@ -190,10 +187,3 @@ def _is_text(value: object) -> bool:
 
 def _is_finite(value: object) -> bool:
     return is_number(value) and abs(value) <= MOST  # type: ignore[arg-type]
-
-
-def _put(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file beside, then put it in its place."""
-    beside = path.with_name(f"new-{path.name}")
-    write(beside)
-    os.replace(beside, path)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from care_sim.bounds import bounded, settle
 from care_sim.errors import LARGEST
 from care_sim.extras import import_torch
+from care_sim.files import ZIP, check_output
 from care_sim.grid import AngularGrid
 from care_sim.policies.weights import Arrays, Card, save
 from care_sim.streets.street import CALIBRATION_SEEDS
@@ -51,7 +52,7 @@ class TrainScorer:
     def __call__(self) -> int:
         """Run it."""
         import_torch()
-        self.out.parent.mkdir(parents=True, exist_ok=True)
+        check_output(self.out, ZIP)
         started = time.perf_counter()
         learned, held_out = (_gathered(name, seeds) for name, seeds in _STREETS.items())
         arrays, losses = train(learned, held_out, self.seed, self.steps)

@@ -18,8 +18,20 @@ from care_sim.extras import import_rerun
 MAGIC = b"RRF"
 """What a recording begins with."""
 HERE = "127.0.0.1"
-VIEWER = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
-"""Rerun's own launcher; as a module it would not tell whether the viewer failed."""
+VIEWER = """
+import os, signal, sys, threading
+
+def follow():
+    os.read(0, 1)
+    os.killpg(0, signal.SIGKILL)
+
+threading.Thread(target=follow, daemon=True).start()
+from rerun_cli.__main__ import main
+sys.exit(main())
+"""
+"""Rerun's own launcher, which as a module would not tell whether the viewer failed. Its input ends with this process,
+however that ends: then it and its children end too.
+"""
 FAILED = 1
 
 
@@ -60,7 +72,8 @@ class View:
 def _rerun(*options: str) -> int:
     """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes outlives this one."""
     quiet = {"RUST_LOG": "warn"} | os.environ
-    process = subprocess.Popen([sys.executable, "-c", VIEWER, *options], start_new_session=True, env=quiet)
+    command = [sys.executable, "-c", VIEWER, *options]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=quiet)
     try:
         return process.wait()
     except KeyboardInterrupt:

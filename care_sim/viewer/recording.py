@@ -8,7 +8,7 @@ from typing import Any
 import rerun as rr
 
 from care_sim.errors import InvalidInput, unknown
-from care_sim.files import replacing
+from care_sim.files import RERUN, replacing
 from care_sim.loop import ClosedLoop
 from care_sim.moments import Moment
 from care_sim.types import Rig
@@ -23,9 +23,9 @@ from care_sim.viewer.space import Space
 
 class Recording(AbstractContextManager["Recording"]):
     """Writes `path`, which is there once this is closed; `lanes` are the names of the episodes that will be in it.
+    Until then it is held in memory: 1 to 9 MB an episode.
 
-    Raises InvalidInput for a folder, for a file that is being written already and for a lane with the name of the page
-    `about`, OSError where nothing can be written.
+    Raises InvalidInput for a lane with the name of the page `about`, and as `care_sim.files.replacing` does.
     """
 
     def __init__(self, path: Path, lanes: Sequence[str]):
@@ -33,9 +33,12 @@ class Recording(AbstractContextManager["Recording"]):
             raise InvalidInput(f"{ABOUT!r} is a page of every recording: name the episode otherwise")
         self._lanes = tuple(lanes)
         self._file = ExitStack()
-        unfinished = self._file.enter_context(replacing(path))
+        self._unfinished = self._file.enter_context(replacing(path, RERUN))
         self._stream = rr.RecordingStream("care-sim")
-        self._stream.save(unfinished, default_blueprint=blueprint(self._lanes))
+        # Rerun's own writer is a thread that a full disk ends, and whatever waits for it then waits for ever.
+        self._memory = self._stream.memory_recording()
+        self._stream.send_blueprint(blueprint(self._lanes), make_active=False)
+        self._file.callback(self._write)
         self._stream.send_recording_name(path.stem)
         self._stream.log(ABOUT, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True)
 
@@ -50,10 +53,12 @@ class Recording(AbstractContextManager["Recording"]):
         self.close()
 
     def close(self) -> None:
-        """Finish the file."""
-        with self._file:
-            self._stream.flush()
-            self._stream.disconnect()
+        """Finish the file. Raises OSError where it cannot be written."""
+        self._file.close()
+
+    def _write(self) -> None:
+        self._unfinished.write_bytes(self._memory.drain_as_bytes())
+        self._stream.disconnect()
 
 
 class Episode:

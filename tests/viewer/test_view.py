@@ -3,13 +3,13 @@
 import re
 import signal
 import socket
-import subprocess
 import sys
 import time
 from urllib.error import URLError
 from urllib.request import urlopen
 
 import pytest
+from descendants import Marked
 
 from care_sim.cli import main
 from care_sim.study.config import EpisodeConfig
@@ -81,26 +81,20 @@ def test_without_a_display_the_browser_is_recommended(recording, capfd, monkeypa
     assert err.splitlines()[-1].endswith("with --web a browser shows the recording")
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_the_web_viewer_is_served_and_ends_with_its_children(recording, end):
     command = [sys.executable, "-c", "from care_sim.cli import main; main()", "view", str(recording), "--web"]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=interruptible)
-    try:
+    with Marked(command, stderr=None) as started:
+        server = started.process
         url = re.search(r"http://(127\.0\.0\.1):(\d+)/\S*", server.stdout.readline())
         page = fetched(url.group())
         assert b"re_viewer" in page
         assert len(fetched(f"http://{url[1]}:{url[2]}/re_viewer_bg.wasm")) > 1e6
-    finally:
         server.send_signal(end)
-        assert server.wait(timeout=20) == 0
-        server.stdout.close()
+        assert server.wait(timeout=20) == (-end if end == signal.SIGKILL else 0)
+        assert started.all_end_within(5)
     with socket.socket() as client:
         assert client.connect_ex((url[1], int(url[2]))) != 0
-
-
-def interruptible():
-    """A shell's background jobs, of which the tests may be one, ignore interrupts."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def fetched(url):

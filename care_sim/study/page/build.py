@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 import care_sim
 from care_sim.extras import vega_bundle
-from care_sim.files import replacing
+from care_sim.files import HTML, replacing
 from care_sim.study.entries import counted
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.kinds import EPISODES
@@ -127,7 +127,7 @@ def write_page(folder: Path, path: Path, most: int, workers: int, make_executor:
     Raises InvalidInput where there are no results, and MissingExtra without the libraries.
     """
     rows, study, left_out = reported(folder)
-    with replacing(path) as unfinished:
+    with replacing(path, HTML) as unfinished:
         findings, about = Findings.of(study, rows), origin(folder, rows, study.kind, left_out)
         watched = chosen(rows, most) if study.kind is EPISODES else []
         if watched:

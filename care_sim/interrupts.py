@@ -1,0 +1,104 @@
+"""What ends a command from outside: an interrupt or a quit typed, a terminal that closes, a request to end.
+
+It imports nothing that takes time: the command `care-sim` is interrupted in one line from the first of its imports on.
+"""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+INTERRUPTED = 130
+"""Exit code of what was interrupted."""
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name))
+"""All end a command in the same way."""
+SOON_S = 0.02
+"""After which an interrupt that came at a bad moment comes again."""
+
+
+def end_at_once() -> None:
+    """From now on an interrupt ends the process: one line, and nothing is waited for."""
+    _listen(_end)
+
+
+def raise_them() -> None:
+    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls into an import,
+    which may turn it into another error, comes after it; one that falls into code whose errors nobody can catch
+    (finalisers, callbacks) comes again.
+    """
+    _listen(_raise)
+    signal.signal(signal.SIGALRM, _raise)
+    sys.unraisablehook = _come_again
+
+
+def end_in_silence() -> None:
+    """From now on an interrupt is the system's to handle: all is said, and the interpreter is ending."""
+    _listen(signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Interrupts wait for the end of the block, for what must not be left half done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    before = {number: handler for number in (*SIGNALS, signal.SIGALRM) if callable(handler := signal.getsignal(number))}
+    for number in before:
+        signal.signal(number, lambda number, _: waiting.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in waiting[:1]:
+            signal.raise_signal(number)
+
+
+def _listen(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
+    """What a shell or nohup has told this process to ignore stays ignored."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def _end(*_: object) -> None:
+    os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, b"care-sim: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def _raise(_number: int, frame: FrameType | None) -> None:
+    if _imports(frame):
+        signal.setitimer(signal.ITIMER_REAL, SOON_S)
+    else:
+        raise KeyboardInterrupt
+
+
+def _imports(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _come_again(lost: "sys.UnraisableHookArgs") -> None:
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        signal.setitimer(signal.ITIMER_REAL, SOON_S)
+    else:
+        sys.__unraisablehook__(lost)
+
+
+def _is_command() -> bool:
+    """Whether this process is the command `care-sim`, and none that it started with its arguments."""
+    name = os.path.basename((getattr(sys, "argv", None) or [""])[0])
+    return name == "care-sim" and "--multiprocessing-fork" not in sys.orig_argv
+
+
+if _is_command():
+    end_at_once()
