@@ -132,10 +132,10 @@ def replay(case):
 def _played(case, env):
     seed = some(case, 0, 1, 2, None)
     observation, _ = env.reset(seed=seed, options=case.rng.choice((None, {}, {"a": 1}, "x", 5)))
-    _check_observation(env, observation)
+    check_observation(env, observation)
     for _ in range(case.rng.randrange(4)):
         observation, reward, terminated, truncated, info = env.step(_action(case))
-        _check_observation(env, observation)
+        check_observation(env, observation)
         if not (np.isfinite(reward) and reward <= 0) and "reward_weights" not in " ".join(case.steps):
             raise Fault("a reward that is not finite and at most 0", repr(reward))
         _check_cells(info["fired"], env.unwrapped.rig.budget, env.unwrapped.rig.grid.size)
@@ -156,7 +156,7 @@ def _action(case):
     return action
 
 
-def _check_observation(env, observation):
+def check_observation(env, observation):
     space = env.observation_space
     for name, value in getattr(space, "spaces", {}).items():
         if not value.contains(observation[name]):
@@ -323,7 +323,7 @@ def wrapper(case):
     if "path" in arguments:
         return  # it would write wherever the value says
     observation, _ = made.reset(seed=1)
-    _check_observation(made, observation)
+    check_observation(made, observation)
     made.step(some(case, made.action_space.sample()) if case.rng.random() < 0.7 else made.action_space.sample())
 
 

@@ -204,3 +204,9 @@ _ODD = {
     "pipe": os.mkfifo,
     "locked": _locked,
 }
+
+
+def _make_undisturbed(path):
+    from torture import study
+
+    care_sim(*study.command(path, workers=1))
