@@ -388,7 +388,7 @@ def tables(case):
 
 
 ACTIONS = {
-    environment: 12, street: 2, replay: 2, policy: 6, belief: 6, allocation: 8, rig: 4, grid: 4, scenario: 4, conditions: 4,
-    wrapper: 3, vector: 1, configuration: 4, detector: 2, weights: 1, tables: 2,
+    environment: 12, street: 2, replay: 2, policy: 6, belief: 6, allocation: 8, rig: 4, grid: 4, scenario: 4,
+    conditions: 4, wrapper: 3, vector: 1, configuration: 4, detector: 2, weights: 1, tables: 2,
 }  # fmt: skip
 """What is called, and how often."""

@@ -9,12 +9,15 @@ from typing import NamedTuple
 DONE, REFUSED, INTERRUPTED = "done", "refused", "interrupted"
 """How a case may end well."""
 
+FOUND = "found"
+"""In the place of a seed: cases that went wrong once and are kept."""
+
 
 class Name(NamedTuple):
     """What a case is called; everything in it follows from that."""
 
     campaign: str
-    seed: int
+    seed: int | str
     number: int
 
     def __str__(self):
@@ -23,7 +26,7 @@ class Name(NamedTuple):
     @classmethod
     def of(cls, text):
         campaign, seed, number = text.split(":")
-        return cls(campaign, int(seed), int(number))
+        return cls(campaign, seed if seed == FOUND else int(seed), int(number))
 
 
 class Fault(Exception):

@@ -6,21 +6,38 @@ import signal
 import sys
 
 from torture import props, worker
-from torture.case import Fault
+from torture.case import FOUND, Case, Fault
 from torture.grammar import Grammar, is_safe
 from torture.judge import ending, exception
 
 LIMIT_S = 10.0
-HONEST_S = 2.0
+HONEST_S = 0.7
 """After this a command that may honestly take long is interrupted; it has to end as one that was."""
 ENCODINGS = ("utf-8",) * 12 + ("ascii", "latin-1")
 """Of stdout and stderr, as the environments of users have them."""
 
 
+TINY = ("--scenario-parameters", "duration_s=0.2")
+FOUND_CASES = (
+    (("crowding", "--seeds", "2147483647", "--workers", "1"), True, "utf-8"),
+    (("sweep", "--seeds", "9999999999999999999999", *TINY), True, "utf-8"),
+    (("view", "x\x00y"), False, "utf-8"),
+    (("{0}", "[[1]]"), False, "latin-1"),
+    (("run", "dense", "--budget", "x"), False, "ascii"),
+    (("a=b=c", "\x07", "|"), False, "utf-8"),
+    (("view", "pipe"), False, "utf-8"),
+    (("compare", "dense", "--ego-speed-sigma", "1e300", *TINY), False, "utf-8"),
+    (("sweep", "--seeds", "1", "--workers", "1", *TINY), False, "latin-1"),
+    (("run", "dense", "--policy-parameters", "a={[1]}"), False, "utf-8"),
+    (("run", "dense", "--policy-parameters", f"a={'-' * 5000}1"), False, "utf-8"),
+)
+"""Lines that once ended otherwise: arguments, whether they may honestly take long, the encoding of the terminal."""
+
+
 def line(name):
     """The command line of a case, whether it may take long, and the encoding."""
-    from torture.case import Case
-
+    if name.seed == FOUND:
+        return FOUND_CASES[name.number]
     rng = Case(name, None).rng
     while True:
         grammar = Grammar(rng)
@@ -31,11 +48,11 @@ def line(name):
 
 def prepare(name):
     """Import what the case's command imports, before its time counts: an import that is interrupted leaves a mess."""
+    import care_sim.streets.recording
     import care_sim.study.episode
+    import care_sim.study.page.build
     import care_sim.study.plays
     import care_sim.study.report
-    import care_sim.study.page.build
-    import care_sim.streets.recording  # noqa: F401
 
     drawn, *_ = line(name)
     first, text = " ".join(drawn[:1]), " ".join(drawn)

@@ -6,7 +6,6 @@ he may not, under a limit on the size of a file, which the operating system repo
 
 import os
 import shutil
-import signal
 import subprocess
 from contextlib import contextmanager
 
@@ -153,8 +152,8 @@ WRITER_LINES = {
 }
 WRITER_LINES_BY_LINE = {tuple(line): product for line, product in WRITER_LINES.values()}
 WRITERS = {
-    "study": 4, "picture": 1, "gif": 1, "png": 1, "film": 2, "recording": 2, "compared": 2, "scans": 2, "page": 2, "report": 1,
-    "curves": 1,
+    "study": 4, "picture": 1, "gif": 1, "png": 1, "film": 2, "recording": 2, "compared": 2, "scans": 2, "page": 2,
+    "report": 1, "curves": 1,
 }  # fmt: skip
 REMADE = {"tables.md", "tables.tex", "ballast"}
 """Files that a report makes again."""

@@ -45,7 +45,8 @@ class Failure:
 
     def __str__(self):
         steps = "\n".join(f"  {step[:3000]}" for step in self.steps)
-        return f"{self.name}: {self.kind} at {self.place or '?'}\n{steps}\n{self.detail}\nalone: make torture CASE={self.name}"
+        title = f"{self.name}: {self.kind} at {self.place or '?'}"
+        return f"{title}\n{steps}\n{self.detail}\nalone: make torture CASE={self.name}"
 
 
 @dataclass
@@ -86,7 +87,7 @@ class Field:
     def play(self, names, until=float("inf")):
         """Play the cases of one campaign, until the clock (`time.monotonic`) says so; what came of them."""
         tally, names, started = Tally(), iter(names), time.monotonic()
-        waiting = {worker: None for worker in self._workers}
+        waiting = dict.fromkeys(self._workers)
         while waiting:
             for worker in list(waiting):
                 if not worker.busy:

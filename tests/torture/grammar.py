@@ -8,14 +8,14 @@ from types import UnionType
 from torture import hostile
 
 PIECES = (
-    "dartout", "dense", "cutin", "care", "history", "full", "all-camera", "ppo", "learned-scorer", "random", "all", "fast",
-    "bullet", "returns", "cluster", "torchscript", "streets", "evaluation", "calibration", "val", "street-0000",
+    "dartout", "dense", "cutin", "care", "history", "full", "all-camera", "ppo", "learned-scorer", "random", "all",
+    "fast", "bullet", "returns", "cluster", "torchscript", "streets", "evaluation", "calibration", "val", "street-0000",
     "CARE-Dense-v0", "CARE-Street-v0", "SectorScores", "0.03", "0.1", "1", "2", "3", "0", "0.5", "31",
 )  # fmt: skip
 """Values that fit somewhere."""
 PATHS = (
-    "out", "out/deep/er", "results", "results/episodes.parquet", "results/config.json", "results/journal.jsonl", "empty",
-    "text", "text/under", "none", "link", "loop", "broken-link", "null", "zero", "full", "pipe", "locked", "x.png",
+    "out", "out/deep/er", "results", "results/episodes.parquet", "results/config.json", "results/journal.jsonl",
+    "empty", "text", "text/under", "none", "link", "loop", "broken-link", "null", "zero", "full", "pipe", "locked", "x.png",
     "x.gif", "x.webp", "x.mp4", "x.rrd", "x.html", "x.npz", "x.json", "x.", ".x", "x.PNG", "a b.png", "ü.png",
     "\udcff.png", "n" * 300, "/proc/self/nothing/out", "", ".", "..", "x\x00y", "-x", "\x1b[31m.png",
 )  # fmt: skip

@@ -8,14 +8,15 @@ import numpy as np
 
 HUGE = 10**22
 NUMBERS = (
-    "0", "-0", "1", "-1", "2", "0.5", "1.0", "1e-9", "-0.5", "1e9", "1e300", "-1e300", "1e308", "5e-324", "1e999", "nan",
-    "inf", "-inf", "NaN", "2147483647", "2147483648", "9223372036854775807", "9223372036854775808",
+    "0", "-0", "1", "-1", "2", "0.5", "1.0", "1e-9", "-0.5", "1e9", "1e300", "-1e300", "1e308", "5e-324", "1e999",
+    "nan", "inf", "-inf", "NaN", "2147483647", "2147483648", "9223372036854775807", "9223372036854775808",
     "18446744073709551616", "9999999999999999999999", str(10**400), "1_000", "0x10", "1e5", "٣", "1,5", "True",
 )  # fmt: skip
 TEXTS = (
-    "", " ", "\n", "a\nb", "\t", "-", "--", "-1", "None", "True", "x", "ü", "日本", "\udcff", "a\udc80b", "\x1b[31mred\x1b[0m",
-    "\x07", "\x00", "a\x00b", "x" * 5000, "%s", "{}", "{0}", "$x_1$", "$\\frac$", "<script>alert(1)</script>", "'", '"',
-    "a b", "a/b", "../up", ".", "..", "=", "a=", "=1", "a=b=c", "[]", "()", "{}", "care", "care.", ".care", "\u202e", "|",
+    "", " ", "\n", "a\nb", "\t", "-", "--", "-1", "None", "True", "x", "ü", "日本", "\udcff", "a\udc80b",
+    "\x1b[31mred\x1b[0m", "\x07", "\x00", "a\x00b", "x" * 5000, "%s", "{}", "{0}", "$x_1$", "$\\frac$", "<script>alert(1)</script>", "'", '"',
+    "a b", "a/b", "../up", ".", "..", "=", "a=", "=1", "a=b=c", "[]", "()", "{}", "care", "care.", ".care", "\u202e",
+    "|",
 )  # fmt: skip
 LITERALS = (
     "[1]", "[[1]]", "{[1]}", "{1: 2}", "{1}", "(1,)", "(1, 2)", "(2, 1)", "(nan, nan)", "(1e300, 1e300)", "(0, 0)",
@@ -43,9 +44,9 @@ _MAKERS = (
     lambda: np.uint64(2**63), lambda: np.bool_(True), lambda: np.array(0.1), lambda: np.array([0.1]), lambda: np.nan,
     lambda: np.datetime64("now"), lambda: "", lambda: "x", lambda: "care", lambda: "0.1", lambda: "\x00",
     lambda: "\ud800", lambda: "\x1b[31m", lambda: "$x$", lambda: "x" * 5000, lambda: b"x", lambda: bytearray(b"x"),
-    lambda: memoryview(b"abc"), lambda: [], lambda: [1], lambda: [1.0, 2.0], lambda: (), lambda: (1, 2), lambda: (2, 1),
+    lambda: memoryview(b"abc"), list, lambda: [1], lambda: [1.0, 2.0], lambda: (), lambda: (1, 2), lambda: (2, 1),
     lambda: (1e300, 1e300), lambda: (math.nan, math.nan), lambda: [[1], [1, 2]], lambda: [None], lambda: ["a"],
-    lambda: {}, lambda: {"a": 1}, lambda: {1: 2}, lambda: set(), lambda: {1, 2}, lambda: range(3), lambda: range(10**12),
+    dict, lambda: {"a": 1}, lambda: {1: 2}, lambda: set(), lambda: {1, 2}, lambda: range(3), lambda: range(10**12),
     lambda: iter([1]), lambda: (n for n in (1, 2)), lambda: object(), lambda: Odd(), lambda: Odd, lambda: len,
     lambda: (lambda: 0), lambda: slice(1), lambda: Ellipsis, lambda: NotImplemented, lambda: np.zeros((32, 512)),
     lambda: np.zeros((0, 7)), lambda: np.zeros((3, 2)), lambda: np.full((2, 7), np.nan), lambda: np.full((2, 13), 1e30),

@@ -31,7 +31,11 @@ def play(case):
     case.tell(f"{change.__name__}; the same command again")
     ended = run(study.command("out", workers=1))
     if ended == DONE:
-        study.check_whole(out, once=False)
+        try:
+            study.check_whole(out, once=False)
+        except Fault as fault:
+            fault.place = change.__name__
+            raise
     elif ended == REFUSED and change in (
         cut,
         lines_doubled,

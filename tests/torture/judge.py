@@ -6,9 +6,9 @@ of its kind but for what was left out before; with 1 there is at least one. No l
 or a Python traceback.
 
 A call returns, or raises InvalidInput or MissingExtra with one line, or Gymnasium's own error for a step without a
-reset. TypeError is Python's own where the call itself does not fit the signature (a keyword that there is not, a missing
-or surplus argument), and only there: a wrong value is InvalidInput. What Gymnasium itself refuses, before anything of ours
-is called, it says in its own words.
+reset. TypeError is Python's own where the call itself does not fit the signature (a keyword that there is not, a
+missing or surplus argument), and only there: a wrong value is InvalidInput. What Gymnasium itself refuses, before
+anything of ours is called, it says in its own words.
 """
 
 import re

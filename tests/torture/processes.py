@@ -9,6 +9,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 import uuid
@@ -73,8 +74,7 @@ class Command:
     """
 
     def __init__(self, arguments, folder, file_bytes=None, **environment):
-        self.arguments, self.mark, self._folder = [str(argument) for argument in arguments], new_mark(), folder
-        self._out, self._err = (folder.parent / f"{name}-{self.mark}" for name in ("out", "err"))
+        self.arguments, self.mark = [str(argument) for argument in arguments], new_mark()
 
         def limited():
             signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -83,12 +83,14 @@ class Command:
 
         usual = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         usual[MARK] = f"{os.environ.get(MARK, '')}/{self.mark}"
-        with self._out.open("wb") as out, self._err.open("wb") as err:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", entry_point(), *self.arguments], cwd=folder, stdin=subprocess.DEVNULL,
-                stdout=out, stderr=err, env=os.environ | usual | environment, start_new_session=True,
-                preexec_fn=limited,
-            )  # fmt: skip
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", entry_point(), *self.arguments], cwd=folder, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ | usual | environment,
+            start_new_session=True, preexec_fn=limited,
+        )  # fmt: skip
+        self._said = [bytearray(), bytearray()]
+        for stream, said in zip((self.process.stdout, self.process.stderr), self._said, strict=True):
+            threading.Thread(target=_listen, args=(stream, said), daemon=True).start()
         self.started = time.monotonic()
 
     def __enter__(self):
@@ -97,8 +99,6 @@ class Command:
     def __exit__(self, *_):
         end(self.mark)
         self.process.wait()
-        for file in (self._out, self._err):
-            file.unlink(missing_ok=True)
 
     def until(self, condition, seconds=60.0):
         """Wait until something holds or it ends."""
@@ -119,8 +119,9 @@ class Command:
         return self.process.returncode
 
     def said(self):
-        """Stdout and stderr so far."""
-        return [file.read_text("utf-8", "replace") for file in (self._out, self._err)]
+        """Stdout and stderr so far; what it said last may take a moment."""
+        time.sleep(POLL_S)
+        return [bytes(said).decode("utf-8", "replace") for said in self._said]
 
     def others(self):
         """The processes that it has started, and those have."""
@@ -138,6 +139,12 @@ class Command:
     def stacks(self):
         """What its processes wait for, as far as the kernel tells."""
         return "\n".join(f"{pid} {_told(pid)}" for pid in marked(self.mark))
+
+
+def _listen(stream, said):
+    with stream:
+        while block := os.read(stream.fileno(), 2**16):
+            said += block
 
 
 def _resident(pid):

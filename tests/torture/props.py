@@ -132,8 +132,8 @@ def _make_drive(path):
 
 
 def _make_base(path):
-    from nuscenes_drive import samples
     from nuscenes_database import write
+    from nuscenes_drive import samples
 
     write(path, {"scene-0103": samples(0.0)[:3]})
 
@@ -164,7 +164,7 @@ def _make_trained(path):
     from care_sim.training.config import Ppo
 
     (path / "config.json").write_text(Ppo().to_json())
-    (path / "rules.json").write_text(json.dumps({name: scores for name in ("random", "history", "care", "full")}))
+    (path / "rules.json").write_text(json.dumps(dict.fromkeys(("random", "history", "care", "full"), scores)))
     (path / "curve.csv").write_text("steps,seconds,return,distance_m\n0,0.1,-5.0,8.0\n64,1.5,-4.0,9.5\n")
 
 

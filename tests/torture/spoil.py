@@ -9,8 +9,8 @@ import numpy as np
 
 DEEP = 100_000
 PLAIN = (
-    None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), "", "x", "care", "\ud800", "\x00",
-    "\x1b[31m", "x" * 100_000, [], {}, [[]], [1, 2], {"a": 1}, "<script>", "$x_1$", "2**9", [None], [[1, [2]]], 5e-324,
+    None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), "", "x", "care", "\ud800",
+    "\x00", "\x1b[31m", "x" * 100_000, [], {}, [[]], [1, 2], {"a": 1}, "<script>", "$x_1$", "2**9", [None], [[1, [2]]], 5e-324,
 )  # fmt: skip
 """What may stand in JSON where something else belongs."""
 

@@ -1,4 +1,4 @@
-"""A small real study, the rows that it has undisturbed, and the question whether a folder holds those rows, each once."""
+"""A small real study, its rows when nobody disturbs it, and the question whether a folder holds those, each once."""
 
 import json
 from functools import lru_cache
@@ -57,14 +57,13 @@ def check_whole(folder, once=True):
     if set(wanted) - set(key):
         raise Fault("a row lost", str(sorted(set(wanted) - set(key))))
     for ours, theirs in zip(rows, expected(), strict=True):
-        if repr(ours) != repr(theirs):
-            wrong = {
-                name: (ours.get(name), theirs.get(name))
-                for name in ours | theirs
-                if repr(ours.get(name)) != repr(theirs.get(name))
-            }
+        names = sorted(ours | theirs)
+        wrong = {
+            name: (ours.get(name), theirs.get(name)) for name in names if repr(ours.get(name)) != repr(theirs.get(name))
+        }
+        if wrong:
             raise Fault(
-                "a row wrong", f"{ours['policy']} {ours['seed']}: (is, should be) {wrong}", ", ".join(sorted(wrong))
+                "a row wrong", f"{theirs['policy']} {theirs['seed']}: (is, should be) {wrong}", ", ".join(wrong)
             )
     if once:
         _check_played_once(folder)

@@ -30,7 +30,7 @@ class Streams:
     """Files in the place of stdout and stderr, for C code too; what a case wrote to them can be read."""
 
     def __init__(self):
-        self._files = [tempfile.TemporaryFile() for _ in range(2)]
+        self._files = [tempfile.TemporaryFile() for _ in range(2)]  # noqa: SIM115
         for number, file in zip((1, 2), self._files, strict=True):
             os.dup2(file.fileno(), number)
         self.encode("utf-8")
@@ -40,8 +40,10 @@ class Streams:
         for file in self._files:
             file.truncate(0)
             os.lseek(file.fileno(), 0, os.SEEK_SET)
-        sys.stdout = io.TextIOWrapper(open(1, "wb", closefd=False), encoding, "strict", write_through=True)
-        sys.stderr = io.TextIOWrapper(open(2, "wb", closefd=False), encoding, "backslashreplace", write_through=True)
+        sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), encoding, "strict", write_through=True)
+        sys.stderr = io.TextIOWrapper(
+            io.FileIO(2, "w", closefd=False), encoding, "backslashreplace", write_through=True
+        )
 
     def read(self):
         """Stdout and stderr of the case."""
