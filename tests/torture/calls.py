@@ -202,27 +202,50 @@ def _observation(case):
     """One of the environments', with something wrong in it; or something else."""
     rng = case.rng
     observation = {name: value.copy() for name, value in good_observation().items()}
-    kind, name = rng.randrange(12), rng.choice(sorted(observation))
-    case.tell(f"observation {kind} {name}")
-    value = observation[name]
-    if kind == 0:
-        del observation[name]
-    elif kind == 1:
-        observation[name] = some(case)
-    elif kind == 2:
-        observation[name] = value.astype(rng.choice((np.float64, np.int64, complex, object, str)))
-    elif kind in (3, 4, 5):
-        flat = value.reshape(-1)
-        flat[rng.randrange(min(flat.size, 90))] = rng.choice((np.nan, np.inf, -np.inf, 1e30, -1e30, 1e9, -7, 99))
-    elif kind == 6:
-        observation[name] = value[: len(value) // 2]
-    elif kind == 7:
-        observation[name] = value[..., None]
-    elif kind == 8:
-        observation[name] = value.tolist()
-    elif kind == 9:
+    name = rng.choice(sorted(observation))
+    change = rng.choice((*_CHANGES, None))
+    case.tell(f"observation, {name}: {change.__name__ if change else 'as it is'}")
+    if change is some:
         return some(case)
-    return observation
+    if change:
+        observation[name] = change(case, observation[name])
+    return {key: value for key, value in observation.items() if value is not _GONE}
+
+
+_GONE = object()
+
+
+def _gone(_case, _value):
+    return _GONE
+
+
+def _anything(case, _value):
+    return some(case)
+
+
+def _of_another_type(case, value):
+    return value.astype(case.rng.choice((np.float64, np.int64, complex, object, str)))
+
+
+def _odd_number(case, value):
+    flat = value.reshape(-1)
+    flat[case.rng.randrange(min(flat.size, 90))] = case.rng.choice((np.nan, np.inf, -np.inf, 1e30, -1e30, 1e9, -7, 99))
+    return value
+
+
+def _half(_case, value):
+    return value[: len(value) // 2]
+
+
+def _deeper(_case, value):
+    return value[..., None]
+
+
+def _as_list(_case, value):
+    return value.tolist()
+
+
+_CHANGES = (_gone, _anything, _of_another_type, _odd_number, _odd_number, _odd_number, _half, _deeper, _as_list, some)
 
 
 def belief(case):

@@ -146,18 +146,17 @@ def weights(case):
 def results(case):
     """Results of a closed-loop study."""
     folder = props.copy("results", case.folder / "results")
-    path, *own = case.rng.choice((("episodes.parquet", _parquet), ("episodes.parquet", _parquet),
-                                  ("config.json", spoil.json_node), ("journal.jsonl", spoil.json_lines_node)))  # fmt: skip
-    _spoilt(case, folder / path, *own)
+    path = case.rng.choice(("episodes.parquet", "episodes.parquet", "config.json", "journal.jsonl"))
+    own = {"config.json": spoil.json_node, "journal.jsonl": spoil.json_lines_node}.get(path, _parquet)
+    _spoilt(case, folder / path, own)
     return run(case.rng.choice((("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))))
 
 
 def plays(case):
     """Results of the protocol."""
     folder = props.copy("protocol", case.folder / "results")
-    path, *own = case.rng.choice((("plays.parquet", _parquet), ("plays.parquet", _parquet), ("events.parquet", _parquet),
-                                  ("config.json", spoil.json_node)))  # fmt: skip
-    _spoilt(case, folder / path, *own)
+    path = case.rng.choice(("plays.parquet", "plays.parquet", "events.parquet", "config.json"))
+    _spoilt(case, folder / path, spoil.json_node if path == "config.json" else _parquet)
     return run(case.rng.choice((("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))))
 
 
@@ -181,6 +180,7 @@ def recordings(case):
 
 
 KINDS = {
-    argoverse2: 6, nuscenes: 6, camera_detections: 3, splits: 1, weights: 4, results: 4, plays: 2, training: 2, recordings: 1,
+    argoverse2: 6, nuscenes: 6, camera_detections: 3, splits: 1, weights: 4, results: 4, plays: 2, training: 2,
+    recordings: 1,
 }  # fmt: skip
 """What is read, and how often."""

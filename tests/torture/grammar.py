@@ -15,8 +15,8 @@ PIECES = (
 """Values that fit somewhere."""
 PATHS = (
     "out", "out/deep/er", "results", "results/episodes.parquet", "results/config.json", "results/journal.jsonl",
-    "empty", "text", "text/under", "none", "link", "loop", "broken-link", "null", "zero", "full", "pipe", "locked", "x.png",
-    "x.gif", "x.webp", "x.mp4", "x.rrd", "x.html", "x.npz", "x.json", "x.", ".x", "x.PNG", "a b.png", "ü.png",
+    "empty", "text", "text/under", "none", "link", "loop", "broken-link", "null", "zero", "full", "pipe", "locked",
+    "x.png", "x.gif", "x.webp", "x.mp4", "x.rrd", "x.html", "x.npz", "x.json", "x.", ".x", "x.PNG", "a b.png", "ü.png",
     "\udcff.png", "n" * 300, "/proc/self/nothing/out", "", ".", "..", "x\x00y", "-x", "\x1b[31m.png",
 )  # fmt: skip
 CLUSTERS = (
@@ -32,6 +32,10 @@ CLUSTERS = (
     "a b",
     "\n",
 )
+SOURCES = (
+    "streets", "argoverse2:drive", "nuscenes:base", "argoverse2:none", "nuscenes:empty", "argoverse2:", ":", "nuscenes",
+    "argoverse2:text", "nuscenes:\x00",
+)  # fmt: skip
 WORK = {
     "seeds", "scenes", "episodes", "steps", "repeats", "samples", "resets", "seconds", "floor_seeds", "evaluate_every",
     "environments", "rollout", "epochs", "batch", "memory",
@@ -122,25 +126,20 @@ class Grammar:
         return [self._value(name, inner) for _ in range(count)]
 
     def _value(self, name, hint):
-        rng, roll = self._rng, self._rng.random()
+        rng = self._rng
         if name == "cluster":
             return rng.choice(CLUSTERS)
         if name.endswith("_parameters"):
             return self._parameter(name)
-        if roll < 0.08:
-            return self._text()
+        roll = rng.random()
         if roll < 0.16:
-            return self._number(name)
+            return self._text() if roll < 0.08 else self._number(name)
         if _is(hint, Path):
             return rng.choice(PATHS)
         if _is(hint, int) or _is(hint, float):
-            if roll < 0.5:
-                return self._number(name)
-            return rng.choice(("0", "1", "2", "3", "0.5", "0.1", "1.0", "16", TINY.get(name, "1")))
-        if name == "source":
-            return rng.choice(("streets", "argoverse2:drive", "nuscenes:base", "argoverse2:none", "nuscenes:empty",
-                               "argoverse2:", ":", "nuscenes", "argoverse2:text", "nuscenes:\x00"))  # fmt: skip
-        return rng.choice((*self._names(name), *PIECES))
+            fitting = ("0", "1", "2", "3", "0.5", "0.1", "1.0", "16", TINY.get(name, "1"))
+            return self._number(name) if roll < 0.5 else rng.choice(fitting)
+        return rng.choice(SOURCES if name == "source" else (*self._names(name), *PIECES))
 
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""

@@ -14,7 +14,8 @@ NUMBERS = (
 )  # fmt: skip
 TEXTS = (
     "", " ", "\n", "a\nb", "\t", "-", "--", "-1", "None", "True", "x", "ü", "日本", "\udcff", "a\udc80b",
-    "\x1b[31mred\x1b[0m", "\x07", "\x00", "a\x00b", "x" * 5000, "%s", "{}", "{0}", "$x_1$", "$\\frac$", "<script>alert(1)</script>", "'", '"',
+    "\x1b[31mred\x1b[0m", "\x07",
+    "\x00", "a\x00b", "x" * 5000, "%s", "{}", "{0}", "$x_1$", "$\\frac$", "<script>alert(1)</script>", "'", '"',
     "a b", "a/b", "../up", ".", "..", "=", "a=", "=1", "a=b=c", "[]", "()", "{}", "care", "care.", ".care", "\u202e",
     "|",
 )  # fmt: skip

@@ -111,9 +111,14 @@ def zeros_after_a_crash(rng, data):
     return data[:at] + bytes(rng.choice((len(data) - at, 512)))
 
 
+ODD_LINES = (
+    b"null", b"[]", b"{}", b'{"digest": 5}', b'{"digest": []}', b'{"digest": "x"}', b"NaN", b"[" * 100_000, b"\xff\xfe",
+    b'{"digest": {"a": 1}}', b"1e999", b"9" * 5000,
+)  # fmt: skip
+
+
 def foreign_lines(rng, data):
-    odd = rng.choice((b"null\n", b"[]\n", b"{}\n", b'{"digest": 5}\n', b'{"digest": []}\n', b'{"digest": "x"}\n', b"NaN\n",
-                      b"[" * 100_000 + b"\n", b"\xff\xfe\n", b'{"digest": {"a": 1}}\n', b"1e999\n", b"9" * 5000 + b"\n"))  # fmt: skip
+    odd = rng.choice(ODD_LINES) + b"\n"
     lines = data.splitlines(keepends=True)
     lines.insert(rng.randrange(len(lines) + 1), odd)
     return b"".join(lines)

@@ -10,7 +10,8 @@ import numpy as np
 DEEP = 100_000
 PLAIN = (
     None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), "", "x", "care", "\ud800",
-    "\x00", "\x1b[31m", "x" * 100_000, [], {}, [[]], [1, 2], {"a": 1}, "<script>", "$x_1$", "2**9", [None], [[1, [2]]], 5e-324,
+    "\x00", "\x1b[31m", "x" * 100_000, [], {}, [[]], [1, 2], {"a": 1}, "<script>", "$x_1$", "2**9", [None], [[1, [2]]],
+    5e-324,
 )  # fmt: skip
 """What may stand in JSON where something else belongs."""
 
@@ -216,34 +217,39 @@ def weights(rng, path):
     """Change what is in an archive of weights."""
     with np.load(path) as file:
         entries = {name: file[name] for name in file.files}
+    change = rng.choice((_card, _card, _array, _array, _array, _surplus, _bomb, _giant_header))
+    return f"{change.__name__}: {change(rng, path, entries)}"
+
+
+def _card(rng, path, entries):
+    card = json.loads(bytes(entries["card"]).decode())
+    told = _change_node(rng, card)
+    _save(path, entries | {"card": np.frombuffer(json.dumps(card).encode(), np.uint8)})
+    return told
+
+
+def _array(rng, path, entries):
     name = rng.choice(list(entries))
-    change = rng.randrange(9)
-    if change == 0:
-        del entries[name]
-    elif change == 1:
-        entries[name] = entries[name].astype(rng.choice((np.float64, np.int8, complex, object, "U4")))
-    elif change == 2:
-        entries[name] = entries[name][..., None] if rng.random() < 0.5 else entries[name].ravel()[:3]
-    elif change == 3 and entries[name].dtype.kind == "f":
-        entries[name] = np.full_like(entries[name], rng.choice((np.nan, np.inf, 3e38, -3e38)))
-    elif change == 4:
-        entries["more"] = np.zeros(4, np.float32)
-    elif change == 5:
-        card = json.loads(bytes(entries["card"]).decode())
-        told = _change_node(rng, card)
-        entries["card"] = np.frombuffer(json.dumps(card).encode(), np.uint8)
-        np.savez(path, **entries)
-        return f"card: {told}"
-    elif change == 6:
-        return _bomb(rng, path)
-    elif change == 7:
-        return _giant_header(rng, path, entries)
+    array = entries.pop(name)
+    odd = [array.astype(rng.choice((np.float64, np.int8, complex, object, "U4"))), array[..., None], array.ravel()[:3]]
+    if array.dtype.kind == "f":
+        odd += [np.full_like(array, value) for value in (np.nan, np.inf, 3e38, -3e38)]
+    if rng.random() < 0.8:
+        entries[name] = rng.choice(odd)
+    _save(path, entries)
+    return name
+
+
+def _surplus(_rng, path, entries):
+    _save(path, entries | {"more": np.zeros(4, np.float32)})
+
+
+def _save(path, entries):
     with open(path, "wb") as file:
         np.savez(file, **entries)
-    return f"{name}: {change}"
 
 
-def _bomb(rng, path):
+def _bomb(rng, path, _entries):
     """Some gigabytes of zeros in a few megabytes, or said to be."""
     with (
         zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file,
@@ -252,7 +258,6 @@ def _bomb(rng, path):
         block = bytes(2**20)
         for _ in range(rng.choice((65, 300))):
             entry.write(block)
-    return "a bomb"
 
 
 def _giant_header(rng, path, entries):
@@ -265,7 +270,6 @@ def _giant_header(rng, path, entries):
         np.savez(out, **entries)
     with zipfile.ZipFile(path, "a") as file:
         file.writestr("giant.npy", header.getvalue() + b"\0" * 16)
-    return "a giant array"
 
 
 def csv(rng, path):
