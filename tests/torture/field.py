@@ -1,7 +1,7 @@
 """Where campaigns are held: a few workers, a clock, and a list of what went wrong.
 
-A case hangs that takes longer than the campaign's `LIMIT_S` of processor time, or three times that on the clock, which
-forgives a busy machine. Its stack tells where; the worker is ended and another takes its place.
+A case hangs that takes longer than the campaign's `LIMIT_S` of processor time, or `processes.patience` times that on
+the clock, which forgives a busy machine. Its stack tells where; the worker is ended and another takes its place.
 """
 
 import importlib
@@ -24,7 +24,6 @@ from torture.case import Name
 from torture.judge import place_of_stack
 
 TESTS = Path(__file__).resolve().parents[1]
-PATIENCE = 3
 MOST_CASES = 4000
 """Of one worker: what it gathers is let go then."""
 
@@ -152,7 +151,7 @@ class _Worker:
             return False
         limit = importlib.import_module(f"torture.{self._name.campaign}").LIMIT_S
         clock, busy = self._began
-        return time.monotonic() - clock > PATIENCE * limit or self._busy_s() - busy > limit
+        return time.monotonic() - clock > processes.patience() * limit or self._busy_s() - busy > limit
 
     def answers(self):
         """What it has to say of its case: nothing yet, or one answer."""
@@ -172,6 +171,8 @@ class _Worker:
             self._began = time.monotonic(), self._busy_s()
             return []
         self._name = self._began = None
+        if message.pop("spent"):
+            self._played = MOST_CASES
         return [message]
 
     def _given_up(self):

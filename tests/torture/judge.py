@@ -39,6 +39,9 @@ OWN_SIGNATURE = re.compile(
 )
 """Python's words for a call that does not fit the signature."""
 
+OWN_EXCEPTION = re.compile(r": ([A-Z]\w+(?:Error|Exception)): .*\((\w+\.py), line \d+\)|refuses .*: ([A-Z]\w+Error):")
+"""How a command tells of an exception in a policy that is not its own; where there are only its own, it is a fault."""
+
 
 def exception(error):
     """The fault that an exception is which nobody caught."""
@@ -101,15 +104,15 @@ def _check_line(line, told):
         raise Fault("a line with the rules of a box", told)
     if re.match(r"(?:[A-Z]\w+Error|Exception)\b", text):
         raise Fault("a line that is a bare exception", told, text.split(":")[0])
-    if hidden := re.search(r": ([A-Z]\w+(?:Error|Exception)): (?:.*\((\w+\.py), line \d+\))?", text):
-        raise Fault("an exception told as if it were a reason", told, " in ".join(filter(None, hidden.groups())))
+    if hidden := OWN_EXCEPTION.search(text):
+        raise Fault("an exception told as if it were a reason", told, " ".join(filter(None, hidden.groups())))
 
 
 def _check_control_codes(text, told, stream):
     found = re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]", text)
     if found:
         line = next(line for line in re.split(r"\n", text) if found.group() in line)
-        raise Fault(f"control codes on {stream}", f"{line[:300]!r}\n{told}", _kind_of(line))
+        raise Fault(f"control codes on {stream}", f"{line[:300]!r}\n{told}", told.partition(" ")[0])
 
 
 def _raise_traceback(text, told):

@@ -22,8 +22,7 @@ from torture.judge import ROOT
 MARK = "CARE_SIM_TORTURE"
 MEMORY = 2**30
 HANGS_S = 10.0
-"""On a quiet machine; a busy one is given `CLOCK` times as long."""
-CLOCK = 3
+"""On a quiet machine; others are given `patience` times as long."""
 LEAVES_S = 6.0
 """What a process that ends may leave behind has to be gone by then."""
 POLL_S = 0.02
@@ -58,6 +57,11 @@ def end(mark):
 
 def _state(entry):
     return (entry / "stat").read_text().rpartition(")")[2].split()[0]
+
+
+def patience():
+    """How many times longer a thing may take by the clock: where many wait for a core, all are slow."""
+    return 2 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def entry_point():
@@ -108,7 +112,7 @@ class Command:
 
     def wait(self, seconds=HANGS_S):
         """Its exit code; a fault where it takes longer than `seconds`, or more memory than is allowed."""
-        deadline = time.monotonic() + seconds * CLOCK
+        deadline = time.monotonic() + seconds * patience()
         while self.process.poll() is None:
             if time.monotonic() > deadline:
                 raise Fault("hang", f"{self.arguments}\n{self.said()}\n{self.stacks()}", "a process of its own")

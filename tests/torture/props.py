@@ -10,7 +10,7 @@ import tempfile
 import time
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from functools import lru_cache
+from functools import lru_cache, partial
 from io import StringIO
 from pathlib import Path
 
@@ -21,8 +21,8 @@ PLAYS_S = 1.0
 class Inline(Executor):
     """Plays in this process, so that limits hold and thousands of cases are quick."""
 
-    def __init__(self, *_, **__):
-        self._until = time.monotonic() + PLAYS_S
+    def __init__(self, seconds, *_, **__):
+        self._until = time.monotonic() + seconds
 
     def submit(self, fn, /, *args, **kwargs):
         if time.monotonic() > self._until:
@@ -37,13 +37,14 @@ class Inline(Executor):
 
 
 @contextmanager
-def inline():
-    """Studies play in this process."""
+def inline(seconds=PLAYS_S):
+    """Studies play in this process, for so long."""
     from care_sim.study import executors
     from care_sim.study.page import build
 
     usual, defaults = executors.processes, build.write_page.__defaults__
-    executors.processes, build.write_page.__defaults__ = Inline, (Inline,)
+    executors.processes = partial(Inline, seconds)
+    build.write_page.__defaults__ = (executors.processes,)
     try:
         yield
     finally:
@@ -55,7 +56,7 @@ def care_sim(*arguments):
     from care_sim.cli import main
 
     said = StringIO()
-    with inline(), redirect_stdout(said), redirect_stderr(said):
+    with inline(float("inf")), redirect_stdout(said), redirect_stderr(said):
         try:
             main([str(argument) for argument in arguments])
         except SystemExit as end:

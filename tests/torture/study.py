@@ -25,11 +25,7 @@ def command(out, workers=2):
 @lru_cache(maxsize=1)
 def undisturbed():
     """The folder of the study that nobody disturbed."""
-    props.PLAYS_S, before = 600.0, props.PLAYS_S
-    try:
-        return props.template("undisturbed")
-    finally:
-        props.PLAYS_S = before
+    return props.template("undisturbed")
 
 
 @lru_cache(maxsize=1)

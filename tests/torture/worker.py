@@ -114,6 +114,11 @@ def _data_bytes():
         return next(int(line.split()[1]) * 1024 for line in status if line.startswith("VmData"))
 
 
+def _has_children():
+    """Whether a case left processes to this one, as a pool does: the next case gets a worker of its own."""
+    return bool(Path(f"/proc/self/task/{os.getpid()}/children").read_text().strip())
+
+
 def main():
     """Serve names until stdin ends. Arguments: the folder for the cases, and two files: for the
     stacks of a hang, and for the steps of the case."""
@@ -139,7 +144,8 @@ def main():
         answers.write(json.dumps({"begins": str(name)}) + "\n")
         steps.seek(0)
         steps.truncate()
-        answers.write(json.dumps({"name": str(name)} | play(name, folder, steps.write)) + "\n")
+        answer = {"name": str(name)} | play(name, folder, steps.write)
+        answers.write(json.dumps(answer | {"spent": _has_children()}) + "\n")
 
 
 if __name__ == "__main__":
