@@ -1,6 +1,5 @@
 """Campaign: random command lines, played in this process."""
 
-import os
 import re
 import signal
 import sys
@@ -36,9 +35,11 @@ FOUND_CASES = (
 
 def line(name):
     """The command line of a case, whether it may take long, and the encoding."""
-    if name.seed == FOUND:
-        return FOUND_CASES[name.number]
-    rng = Case(name, None).rng
+    return FOUND_CASES[name.number] if name.seed == FOUND else drawn_line(Case(name, None).rng)
+
+
+def drawn_line(rng):
+    """The same of dice."""
     while True:
         grammar = Grammar(rng)
         drawn = grammar.line()
@@ -85,12 +86,14 @@ def play(case):
     case.tell(
         f"care-sim {' '.join(_quoted(word) for word in arguments)}" + ("" if encoding == "utf-8" else f" ({encoding})")
     )
-    props.lay_out({re.split(r"[/=:]", word)[-1] for word in arguments} | _first_parts(arguments), case.folder)
+    lay_out(arguments, case.folder)
     return run(arguments, encoding, HONEST_S if long else None)
 
 
-def _first_parts(arguments):
-    return {part.split("/")[0] for word in arguments for part in re.split(r"[=:]", word)}
+def lay_out(arguments, folder):
+    """Put the files that a line speaks of where it looks for them."""
+    parts = {part for word in arguments for part in re.split(r"[=:]", word)}
+    props.lay_out({part.split("/")[0] for part in parts}, folder)
 
 
 def run(arguments, encoding="utf-8", interrupted_after=None):
@@ -122,8 +125,3 @@ def run(arguments, encoding="utf-8", interrupted_after=None):
 
 def _quoted(word):
     return word if re.fullmatch(r"[\w./=:+-]+", word, re.ASCII) and len(word) < 200 else ascii(word)[:300]
-
-
-def real(arguments, folder):
-    """The same line for a real process, whose arguments end at a NUL and are bytes."""
-    return [os.fsdecode(os.fsencode(word.replace("\0", ""))) for word in arguments if len(word) < 100_000]

@@ -12,6 +12,7 @@ anything of ours is called, it says in its own words.
 """
 
 import re
+import signal
 import traceback
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from torture.case import DONE, INTERRUPTED, REFUSED, Fault
 
 ROOT = Path(__file__).resolve().parents[2]
 ENDINGS = {0: DONE, 1: REFUSED, 2: REFUSED, 130: INTERRUPTED}
+BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP)
+"""Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said why."""
 NOTICES = (
     r"episodes \d+ of \d+.*",
     r"plays \d+ of \d+.*",
@@ -69,8 +72,6 @@ def ending(code, out, err, arguments=()):
     told = f"{_shown(arguments)}\nexit code {code}\nstdout ...{out[-1500:]!r}\nstderr {err[-4000:]}"
     if "Traceback (most recent call last)" in err + out:
         _raise_traceback(err + out, told)
-    if code not in ENDINGS:
-        raise Fault(f"exit code {code}", told)
     lines = [line.rpartition("\r")[2] for line in err.splitlines()]
     lines = [line for line in lines if line.strip()]
     own = [line for line in lines if line.startswith("care-sim: ")]
@@ -81,6 +82,10 @@ def ending(code, out, err, arguments=()):
         _check_line(line, told)
     _check_control_codes(err, told, "stderr")
     _check_control_codes(out, told, "stdout")
+    if code in BY_SIGNAL and own:
+        code = 130
+    if code not in ENDINGS:
+        raise Fault(f"exit code {code}", told)
     _check_count(code, lines, own, told)
     return ENDINGS[code]
 

@@ -74,13 +74,16 @@ def entry_point():
 class Command:
     """`care-sim` with arguments, in a session of its own; a context manager that leaves nothing behind.
 
-    `file_bytes`: the largest file that it may write, which stands in for a full disk.
+    `file_bytes`: the largest file that it may write, which stands in for a full disk. `stdout`: a device in its place,
+    "closed", or a "closed pipe".
     """
 
-    def __init__(self, arguments, folder, file_bytes=None, **environment):
+    def __init__(self, arguments, folder, file_bytes=None, stdout=None, **environment):
         self.arguments, self.mark = [str(argument) for argument in arguments], new_mark()
 
         def limited():
+            if stdout == "closed":
+                os.close(1)
             signal.signal(signal.SIGINT, signal.default_int_handler)
             if file_bytes is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
@@ -89,12 +92,13 @@ class Command:
         usual[MARK] = f"{os.environ.get(MARK, '')}/{self.mark}"
         self.process = subprocess.Popen(
             [sys.executable, "-c", entry_point(), *self.arguments], cwd=folder, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ | usual | environment,
+            stdout=_output(stdout), stderr=subprocess.PIPE, env=os.environ | usual | environment,
             start_new_session=True, preexec_fn=limited,
         )  # fmt: skip
         self._said = [bytearray(), bytearray()]
         for stream, said in zip((self.process.stdout, self.process.stderr), self._said, strict=True):
-            threading.Thread(target=_listen, args=(stream, said), daemon=True).start()
+            if stream:
+                threading.Thread(target=_listen, args=(stream, said), daemon=True).start()
         self.started = time.monotonic()
 
     def __enter__(self):
@@ -143,6 +147,17 @@ class Command:
     def stacks(self):
         """What its processes wait for, as far as the kernel tells."""
         return "\n".join(f"{pid} {_told(pid)}" for pid in marked(self.mark))
+
+
+def _output(name):
+    """Where stdout goes."""
+    if name is None or name == "closed":
+        return subprocess.PIPE
+    if name != "closed pipe":
+        return os.open(name, os.O_WRONLY)
+    reading, writing = os.pipe()
+    os.close(reading)
+    return writing
 
 
 def _listen(stream, said):
