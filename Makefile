@@ -3,6 +3,8 @@
 # make test       set up with the development tools, run every test
 # make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
+# make torture    random input for ten minutes: commands, calls, files, kills, full disks; SECONDS=600 SEED=0
+#                 CAMPAIGNS="commands files" CASES=1000 unless all; CASE=NAME plays one case alone
 # make official RESULTS=FILE DATA=FOLDER   score a file of `care-sim export` with the nuScenes devkit, which has an
 #                 environment of its own; SPLIT=val, VERSION=v1.0-trainval and OUT=FOLDER unless given otherwise
 # make test-official   test that with the devkit
@@ -14,6 +16,8 @@ INSTALL := $(BIN)/$(PIP) constraints.txt
 OFFICIAL := .venv-official
 SPLIT := val
 VERSION := v1.0-trainval
+SECONDS := 600
+SEED := 0
 OUT = $(basename $(RESULTS))-official
 
 ifneq ($(filter official,$(MAKECMDGOALS)),)
@@ -28,7 +32,7 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: setup reproduce test check docs lint official test-official clean
+.PHONY: setup reproduce test check docs lint torture official test-official clean
 
 setup: $(VENV)/.installed
 
@@ -62,6 +66,10 @@ lint: $(VENV)/.developing
 check: $(VENV)/.developing
 	$(BIN)/ruff format .
 	$(MAKE) lint test
+
+torture: $(VENV)/.developing
+	PYTHONPATH=tests:tests/sources $(BIN)/python -m torture $(if $(CASE),--case $(CASE),--seed $(SEED) \
+	  $(if $(CASES),--cases $(CASES),--seconds $(SECONDS)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)))
 
 $(OFFICIAL)/.installed: constraints-official.txt
 	$(PYTHON) -m venv --clear $(OFFICIAL)

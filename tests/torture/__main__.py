@@ -1,0 +1,68 @@
+"""The long form: every campaign in turn, for so many seconds or so many cases, or one case alone.
+
+python -m torture --seconds 600 --seed 1                 all campaigns, each for its share
+python -m torture --campaigns commands calls --cases 100000
+python -m torture --case commands:1:37
+"""
+
+import argparse
+import json
+import sys
+import time
+from itertools import islice
+from pathlib import Path
+
+from torture.campaigns import CAMPAIGNS
+from torture.case import Name
+from torture.field import Field, names
+
+
+def main():
+    options = _options()
+    if options.case:
+        with Field(1) as field:
+            tally = field.play([Name.of(options.case)])
+        print(*tally.failures, tally, sep="\n")
+        return int(bool(tally.failures))
+    failed = False
+    options.failures.parent.mkdir(parents=True, exist_ok=True)
+    with options.failures.open("w") as file, Field(options.workers, lambda failure: _write(file, failure)) as field:
+        shares = sum(CAMPAIGNS[name] for name in options.campaigns)
+        for name in options.campaigns:
+            seconds = options.seconds * CAMPAIGNS[name] / shares if options.seconds else float("inf")
+            drawn = names(name, options.seed, options.first)
+            drawn = islice(drawn, options.cases) if options.cases else drawn
+            tally = field.play(drawn, time.monotonic() + seconds)
+            failed |= bool(tally.failures)
+            print(f"{name}: {tally}", flush=True)
+            firsts = {failure.key: failure for failure in reversed(tally.failures)}
+            for failure in firsts.values():
+                print(f"  {failure.name}: {failure.kind} at {failure.place or '?'}", flush=True)
+    if failed:
+        print(f"Every failure is in {options.failures}; make torture CASE=NAME plays one alone.")
+    return int(failed)
+
+
+def _options():
+    parser = argparse.ArgumentParser(prog="make torture", description=__doc__.partition("\n")[0])
+    parser.add_argument("--campaigns", nargs="+", choices=CAMPAIGNS, default=[*CAMPAIGNS])
+    parser.add_argument("--seconds", type=float, default=0, help="for all of them together")
+    parser.add_argument("--cases", type=int, default=0, help="of each, at most")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--case", help="CAMPAIGN:SEED:NUMBER, alone")
+    parser.add_argument("--failures", type=Path, default=Path("build/torture/failures.jsonl"))
+    options = parser.parse_args()
+    if not (options.seconds or options.cases or options.case):
+        parser.error("say how long (--seconds), how many (--cases) or which (--case)")
+    return options
+
+
+def _write(file, failure):
+    file.write(json.dumps(failure.__dict__) + "\n")
+    file.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,217 @@
+"""Command lines from the program's own commands: their options, by name and type, and values that fit or do not."""
+
+import typing
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from types import UnionType
+
+from torture import hostile
+
+PIECES = (
+    "dartout", "dense", "cutin", "care", "history", "full", "all-camera", "ppo", "learned-scorer", "random", "all",
+    "fast", "bullet", "returns", "cluster", "torchscript", "streets", "evaluation", "calibration", "val", "street-0000",
+    "CARE-Dense-v0", "CARE-Street-v0", "SectorScores", "0.03", "0.1", "1", "2", "3", "0", "0.5", "31",
+)  # fmt: skip
+"""Values that fit somewhere."""
+PATHS = (
+    "out", "out/deep/er", "results", "results/episodes.parquet", "results/config.json", "results/journal.jsonl",
+    "empty", "text", "text/under", "none", "link", "loop", "broken-link", "null", "zero", "full", "pipe", "locked",
+    "x.png", "x.gif", "x.webp", "x.mp4", "x.rrd", "x.html", "x.npz", "x.json", "x.", ".x", "x.PNG", "a b.png", "ü.png",
+    "\udcff.png", "n" * 300, "/proc/self/nothing/out", "", ".", "..", "x\x00y", "-x", "\x1b[31m.png",
+)  # fmt: skip
+CLUSTERS = (
+    "nonsense",
+    "",
+    "ucx://x",
+    "tls://x",
+    "tcp://",
+    "x://y",
+    "inproc://x",
+    ":",
+    "tcp://127.0.0.1:99999",
+    "a b",
+    "\n",
+)
+SOURCES = (
+    "streets", "argoverse2:drive", "nuscenes:base", "argoverse2:none", "nuscenes:empty", "argoverse2:", ":", "nuscenes",
+    "argoverse2:text", "nuscenes:\x00",
+)  # fmt: skip
+WORK = {
+    "seeds", "scenes", "episodes", "steps", "repeats", "samples", "resets", "seconds", "floor_seeds", "evaluate_every",
+    "environments", "rollout", "epochs", "batch", "memory",
+}  # fmt: skip
+"""Options that say how much is to be done; a large value is an honest wish, which takes its time."""
+TINY = {
+    "workers": "1", "seeds": "1", "scenes": "1", "episodes": "0", "floor_seeds": "1", "steps": "64", "repeats": "1",
+    "samples": "1", "resets": "1", "seconds": "0.01", "environments": "1", "rollout": "8", "evaluate_every": "64",
+}  # fmt: skip
+LONG = (
+    "reproduce",
+    "ablate",
+    "faults",
+    "crowding",
+    "protocol",
+    "bench",
+    "parity",
+    "train",
+    "sweep",
+    "report",
+    "export",
+)
+"""Commands that may take their time."""
+
+
+def commands():
+    """Every command line that can begin, with the dataclass of its options."""
+    from care_sim.bench.config import BenchConfig
+    from care_sim.cli import COMMANDS
+    from care_sim.parity.config import ParityConfig
+    from care_sim.training import COMMANDS as LEARNERS
+
+    measures = {"bench": BenchConfig, "parity": ParityConfig}
+    found = {(name,): measures.get(name, kind) for name, kind in COMMANDS.items() if name != "train"}
+    return found | {("train", name): kind for name, kind in LEARNERS.items()}
+
+
+def options(kind):
+    """The options of a command: name, type and whether it is given without a name."""
+    hints = typing.get_type_hints(kind, include_extras=True)
+    for field in fields(kind):
+        hint, marks = hints[field.name], ()
+        if typing.get_origin(hint) is typing.Annotated:
+            hint, *marks = typing.get_args(hint)
+        if is_dataclass(hint):
+            yield from options(hint)
+        else:
+            yield field.name, hint, any("Positional" in repr(mark) for mark in marks), field.default is MISSING
+
+
+class Grammar:
+    """Draws command lines; `long` says that the last one may honestly take long."""
+
+    def __init__(self, rng):
+        self._rng = rng
+        self.long = False
+
+    def line(self):
+        """Arguments of `care-sim`."""
+        rng = self._rng
+        if rng.random() < 0.03:
+            return [self._text() for _ in range(rng.randrange(4))]
+        words, kind = rng.choice(list(commands().items()))
+        self.long = words[0] in LONG
+        known = list(options(kind))
+        given = [one for one in known if one[2] or one[3] or rng.random() < min(1.0, 2.5 / len(known))]
+        tiny = [(name, TINY[name]) for name, *_ in known if name in TINY and name not in {one[0] for one in given}]
+        if any(name == "scenario_parameters" for name, *_ in known):
+            tiny.append(("scenario_parameters", "duration_s=0.2"))
+        arguments = [piece for one in given for piece in self._option(*one)]
+        rest = [piece for name, value in tiny if rng.random() < 0.97 for piece in (_flag(name), value)]
+        line = [*words, *arguments, *rest]
+        return self._spoilt(line) if rng.random() < 0.05 else line
+
+    def _option(self, name, hint, positional, _needed):
+        rng, values = self._rng, self._values(name, hint)
+        if hint is bool:
+            return [_flag(name) if rng.random() < 0.5 else f"--no-{name.replace('_', '-')}"]
+        if positional:
+            return values
+        return [_flag(name), *values] if rng.random() < 0.95 else [f"{_flag(name)}={value}" for value in values[:1]]
+
+    def _values(self, name, hint):
+        """One value, several or none, as the option's type has it; now and then not."""
+        several = typing.get_origin(hint) is tuple
+        inner = typing.get_args(hint)[0] if several else hint
+        count = self._rng.choice((0, 1, 1, 1, 2, 3)) if several else (1 if self._rng.random() < 0.97 else 2)
+        return [self._value(name, inner) for _ in range(count)]
+
+    def _value(self, name, hint):
+        rng = self._rng
+        if name == "cluster":
+            return rng.choice(CLUSTERS)
+        if name.endswith("_parameters"):
+            return self._parameter(name)
+        roll = rng.random()
+        if roll < 0.16:
+            return self._text() if roll < 0.08 else self._number(name)
+        if _is(hint, Path):
+            return rng.choice(PATHS)
+        if _is(hint, int) or _is(hint, float):
+            fitting = ("0", "1", "2", "3", "0.5", "0.1", "1.0", "16", TINY.get(name, "1"))
+            return self._number(name) if roll < 0.5 else rng.choice(fitting)
+        return rng.choice(SOURCES if name == "source" else (*self._names(name), *PIECES))
+
+    def _names(self, name):
+        """What fits an option of this name; thrice, so that it is drawn more often."""
+        from care_sim.policies import policy_names
+        from care_sim.scenarios import SCENARIOS
+
+        names = {"scenario": [*SCENARIOS], "scenarios": [*SCENARIOS, "all"], "policy": policy_names()}
+        names |= {"policies": [*policy_names(), "all"], "also": policy_names(), "engine": ["fast", "bullet"]}
+        return names.get(name, []) * 6
+
+    def _parameter(self, option):
+        """NAME=VALUE, or something like it."""
+        rng = self._rng
+        if rng.random() < 0.1:
+            return self._text()
+        name = rng.choice(_parameter_names(option))
+        value = rng.choice((*hostile.LITERALS, *hostile.NUMBERS, *hostile.NUMBERS, *hostile.TEXTS, *PIECES, *PATHS))
+        if name in ("duration_s", "vehicles"):
+            self.long = True
+        return f"{name}={value}"
+
+    def _number(self, name):
+        self.long |= name in WORK
+        return self._rng.choice(hostile.NUMBERS)
+
+    def _text(self):
+        return self._rng.choice((*hostile.TEXTS, *hostile.LITERALS))
+
+    def _spoilt(self, line):
+        """Words doubled, dropped, swapped or cut."""
+        rng, line = self._rng, list(line)
+        at = rng.randrange(len(line))
+        change = rng.randrange(4)
+        if change == 0:
+            line.insert(at, line[at])
+        elif change == 1:
+            del line[at]
+        elif change == 2:
+            other = rng.randrange(len(line))
+            line[at], line[other] = line[other], line[at]
+        else:
+            line[at] = line[at][: rng.randrange(len(line[at]) + 1)]
+        self.long = True
+        return line
+
+
+def is_safe(line):
+    """Whether what it writes stays where the case is: no absolute path but those of `PATHS`."""
+    pieces = (part for argument in line for part in argument.split("=", 1))
+    return all(
+        not part.lstrip().startswith(("/", "~")) or part in PATHS for whole in pieces for part in whole.split(":", 1)
+    )
+
+
+def _flag(name):
+    return f"--{name.replace('_', '-')}"
+
+
+def _is(hint, kind):
+    return hint is kind or (isinstance(hint, UnionType) and kind in typing.get_args(hint))
+
+
+def _parameter_names(option):
+    """Parameters that there are, of scenarios, policies and detectors."""
+    from care_sim.policies import BUILT_IN
+    from care_sim.policies.listing import parameters_of
+    from care_sim.scenarios import SCENARIOS
+
+    if option in ("scenario_parameters", "env_parameters"):
+        names = [field.name for scenario in SCENARIOS.values() for field in fields(scenario)]
+        return [*names, "budget", "keyframe_s", "render_mode", "detector", "source", "reward_weights", "floor", "self"]
+    if option == "detector_parameters":
+        return ["file", "min_returns", "grid", "x", "self"]
+    names = [text.partition("=")[0] for make in BUILT_IN.values() for text in parameters_of(make)]
+    return [*names, *(f"care-sbf.{name}" for name in names), "path", "ppo.path", "learned-scorer.path", "none.x", "rig"]

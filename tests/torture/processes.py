@@ -1,0 +1,186 @@
+"""Real processes of `care-sim`: started as the installed command is, watched, and looked for when they should be gone.
+
+Every process that a case starts carries a mark in its environment, which those that it starts inherit, fork servers and
+workers among them; marks of the one who started it stand before it.
+"""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+import uuid
+from contextlib import suppress
+from pathlib import Path
+
+from torture.case import Fault
+from torture.judge import ROOT
+
+MARK = "CARE_SIM_TORTURE"
+MEMORY = 2**30
+HANGS_S = 10.0
+"""On a quiet machine; others are given `patience` times as long."""
+LEAVES_S = 6.0
+"""What a process that ends may leave behind has to be gone by then."""
+POLL_S = 0.02
+
+
+def new_mark():
+    return uuid.uuid4().hex
+
+
+def marked(mark):
+    """The processes that carry a mark, by id."""
+    wanted, found = mark.encode(), []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError):
+                if wanted in (entry / "environ").read_bytes() and _state(entry) != "Z":
+                    found.append(int(entry.name))
+    return found
+
+
+def end(mark):
+    """End all of a mark."""
+    for _ in range(50):
+        left = marked(mark)
+        for pid in left:
+            with suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        if not left:
+            return
+        time.sleep(0.02)
+
+
+def _state(entry):
+    return (entry / "stat").read_text().rpartition(")")[2].split()[0]
+
+
+def patience():
+    """How many times longer a thing may take by the clock: where many wait for a core, all are slow."""
+    return 2 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
+def entry_point():
+    """Python code that does what the command `care-sim` does."""
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    module, function = scripts["care-sim"].split(":")
+    return f"import sys; from {module} import {function}; sys.exit({function}())"
+
+
+class Command:
+    """`care-sim` with arguments, in a session of its own; a context manager that leaves nothing behind.
+
+    `file_bytes`: the largest file that it may write, which stands in for a full disk. `stdout`: a device in its place,
+    "closed", or a "closed pipe".
+    """
+
+    def __init__(self, arguments, folder, file_bytes=None, stdout=None, **environment):
+        self.arguments, self.mark = [str(argument) for argument in arguments], new_mark()
+
+        def limited():
+            if stdout == "closed":
+                os.close(1)
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            if file_bytes is not None:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
+
+        usual = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+        usual[MARK] = f"{os.environ.get(MARK, '')}/{self.mark}"
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", entry_point(), *self.arguments], cwd=folder, stdin=subprocess.DEVNULL,
+            stdout=_output(stdout), stderr=subprocess.PIPE, env=os.environ | usual | environment,
+            start_new_session=True, preexec_fn=limited,
+        )  # fmt: skip
+        self._said = [bytearray(), bytearray()]
+        for stream, said in zip((self.process.stdout, self.process.stderr), self._said, strict=True):
+            if stream:
+                threading.Thread(target=_listen, args=(stream, said), daemon=True).start()
+        self.started = time.monotonic()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        end(self.mark)
+        self.process.wait()
+
+    def until(self, condition, seconds=60.0):
+        """Wait until something holds or it ends."""
+        deadline = time.monotonic() + seconds
+        while not condition() and self.process.poll() is None and time.monotonic() < deadline:
+            time.sleep(POLL_S)
+
+    def wait(self, seconds=HANGS_S):
+        """Its exit code; a fault where it takes longer than `seconds`, or more memory than is allowed."""
+        deadline = time.monotonic() + seconds * patience()
+        while self.process.poll() is None:
+            if time.monotonic() > deadline:
+                raise Fault("hang", f"{self.arguments}\n{self.said()}\n{self.stacks()}", "a process of its own")
+            for pid in marked(self.mark):
+                if (held := _resident(pid)) > MEMORY:
+                    raise Fault("memory above 1 GB", f"{held} bytes: {self.arguments}", "a process of its own")
+            time.sleep(5 * POLL_S)
+        return self.process.returncode
+
+    def said(self):
+        """Stdout and stderr so far; what it said last may take a moment."""
+        time.sleep(POLL_S)
+        return [bytes(said).decode("utf-8", "replace") for said in self._said]
+
+    def others(self):
+        """The processes that it has started, and those have."""
+        return [pid for pid in marked(self.mark) if pid != self.process.pid]
+
+    def check_gone(self):
+        """A fault where it left a process behind."""
+        deadline = time.monotonic() + LEAVES_S
+        while left := marked(self.mark):
+            if time.monotonic() > deadline:
+                told = "\n".join(f"{pid} {_told(pid)}" for pid in left)
+                raise Fault("processes left behind", f"{self.arguments}\n{told}", _kinds(left))
+            time.sleep(0.1)
+
+    def stacks(self):
+        """What its processes wait for, as far as the kernel tells."""
+        return "\n".join(f"{pid} {_told(pid)}" for pid in marked(self.mark))
+
+
+def _output(name):
+    """Where stdout goes."""
+    if name is None or name == "closed":
+        return subprocess.PIPE
+    if name != "closed pipe":
+        return os.open(name, os.O_WRONLY)
+    reading, writing = os.pipe()
+    os.close(reading)
+    return writing
+
+
+def _listen(stream, said):
+    with stream:
+        while block := os.read(stream.fileno(), 2**16):
+            said += block
+
+
+def _resident(pid):
+    with suppress(OSError, ValueError):
+        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return 0
+
+
+def _told(pid):
+    with suppress(OSError):
+        line = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode("utf-8", "replace")
+        return f"{line[:200]} ({Path(f'/proc/{pid}/wchan').read_text()})"
+    return ""
+
+
+def _kinds(pids):
+    """What kinds of processes they are, for a fault's place."""
+    lines = [_told(pid) for pid in pids]
+    kinds = ("forkserver", "resource_tracker", "spawn_main", "rerun", "ffmpeg")
+    return ", ".join(kind for kind in kinds if any(kind in line for line in lines)) or "the command itself"

@@ -1,0 +1,303 @@
+"""Ways in which a file may be damaged, changed, or not be what it says."""
+
+import io
+import json
+import os
+import zipfile
+
+import numpy as np
+
+DEEP = 100_000
+PLAIN = (
+    None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), "", "x", "care", "\ud800",
+    "\x00", "\x1b[31m", "x" * 100_000, [], {}, [[]], [1, 2], {"a": 1}, "<script>", "$x_1$", "2**9", [None], [[1, [2]]],
+    5e-324,
+)  # fmt: skip
+"""What may stand in JSON where something else belongs."""
+
+
+def raw(rng, path, others=()):
+    """Damage bytes; `others` are files whose content may take the place of this one's. Says what was done."""
+    data = bytearray(path.read_bytes())
+    change = rng.choice(_RAW)
+    path.write_bytes(change(rng, data, others))
+    return change.__name__
+
+
+def _flip_bits(rng, data, _):
+    for _ in range(rng.choice((1, 1, 3, 30))):
+        if data:
+            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    return data
+
+
+def _cut(rng, data, _):
+    return data[: rng.randrange(len(data) + 1)]
+
+
+def _cut_the_front(rng, data, _):
+    return data[rng.randrange(len(data) + 1) :]
+
+
+def _blank(rng, data, _):
+    start = rng.randrange(len(data) + 1)
+    end = min(len(data), start + rng.choice((8, 512, 4096)))
+    data[start:end] = rng.choice((b"\0", b"\xff", b" ", b"9")) * (end - start)
+    return data
+
+
+def _insert(rng, data, _):
+    at = rng.randrange(len(data) + 1)
+    data[at:at] = rng.choice(
+        (b"\0", b"\xff\xfe", b"[" * 1000, b"9" * 400, b"\n", b'"', b"\r\n", b"NaN", rng.randbytes(64))
+    )
+    return data
+
+
+def _repeat(rng, data, _):
+    start = rng.randrange(len(data) + 1)
+    end = min(len(data), start + rng.choice((8, 512, 4096)))
+    data[end:end] = data[start:end] * rng.choice((1, 1, 50))
+    return data
+
+
+def _of_another(rng, data, others):
+    return rng.choice(others).read_bytes() if others else data
+
+
+def _nothing(_rng, _data, _others):
+    return b""
+
+
+def _deep(rng, _data, _others):
+    return rng.choice((b"[" * DEEP, b'{"a":' * DEEP, b"[" * DEEP + b"]" * DEEP))
+
+
+def _noise(rng, data, _others):
+    return rng.randbytes(min(len(data), 5000))
+
+
+_RAW = (_flip_bits,) * 6 + (_cut,) * 3 + (_cut_the_front, _blank, _blank, _insert, _insert, _repeat, _repeat)
+_RAW += (_of_another, _nothing, _deep, _noise)
+
+
+def instead(rng, path):
+    """Put something that is no file in its place."""
+    path.unlink()
+    change = rng.choice(("folder", "gone", "loop", "zeros", "locked"))
+    if change == "folder":
+        path.mkdir()
+    elif change == "loop":
+        path.symlink_to(path.name)
+    elif change == "zeros":
+        path.symlink_to("/dev/zero")
+    elif change == "locked":
+        path.write_bytes(b"x")
+        path.chmod(0)
+    return change
+
+
+def json_node(rng, path):
+    """Change one node of a JSON file, somewhere in it."""
+    tree = json.loads(path.read_text())
+    told = _change_node(rng, tree)
+    path.write_text(json.dumps(tree))
+    return told
+
+
+def _change_node(rng, tree):
+    holder, key = None, None
+    node = tree
+    while isinstance(node, dict | list) and node and (holder is None or rng.random() < 0.85):
+        holder = node
+        key = rng.choice(list(node)) if isinstance(node, dict) else rng.randrange(len(node))
+        node = node[key]
+    if holder is None:
+        return "nothing to change"
+    change = rng.randrange(6)
+    if change == 0:
+        del holder[key]
+        return f"{key!r} gone"
+    if change == 1:
+        if isinstance(holder, dict):
+            holder["surplus"] = rng.choice(PLAIN)
+        else:
+            holder.append(holder[key])
+        return f"one too many beside {key!r}"
+    holder[key] = rng.choice(PLAIN)
+    return f"{key!r} is {ascii(holder[key])[:80]}"
+
+
+def json_lines_node(rng, path):
+    """The same in a line of a file of JSON lines."""
+    lines = path.read_text().splitlines()
+    at = rng.randrange(len(lines))
+    tree = json.loads(lines[at])
+    told = _change_node(rng, tree)
+    lines[at] = json.dumps(tree)
+    path.write_text("\n".join(lines) + "\n")
+    return f"line {at}: {told}"
+
+
+def table(rng, read, write):
+    """Change a column of an Arrow table or its rows; `read` gives it, `write` takes it."""
+    import pyarrow as pa
+
+    whole = read()
+    change = rng.choice(("drop", "rename", "values", "values", "values", "no rows", "rows", "double", "type", "notes"))
+    name = rng.choice(whole.column_names)
+    at = whole.column_names.index(name)
+    count = len(whole)
+    if change == "drop":
+        whole = whole.drop_columns([name])
+    elif change == "rename":
+        whole = whole.rename_columns(
+            [*whole.column_names[:at], rng.choice(("x", "", "\x1b[31m", "seed")), *whole.column_names[at + 1 :]]
+        )
+    elif change == "no rows":
+        whole = whole.slice(0, 0)
+    elif change == "rows":
+        whole = whole.take(pa.array([rng.randrange(count) for _ in range(rng.randrange(1, 5))]))
+    elif change == "double":
+        whole = pa.concat_tables([whole, whole])
+    elif change == "notes":
+        notes = {
+            key: rng.choice((b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]"))
+            for key in whole.schema.metadata or {b"a": b""}
+        }
+        whole = whole.replace_schema_metadata(notes)
+        return f"notes {notes}"
+    else:
+        values = whole.column(at).to_pylist()
+        with_others = _other_column(rng, values, every=change == "type")
+        whole = whole.set_column(at, name, with_others)
+        change = f"{change} {with_others.type} {ascii(with_others[0].as_py())[:60]}"
+    write(whole)
+    return f"column {name!r}: {change}"
+
+
+def _other_column(rng, values, every):
+    """A column with one value that does not belong, or of another kind from top to bottom."""
+    import pyarrow as pa
+
+    odd = rng.choice(
+        (
+            None,
+            float("nan"),
+            float("inf"),
+            -1,
+            0,
+            1e308,
+            2**62,
+            -(2**62),
+            "x",
+            "",
+            "\x1b[31m",
+            "$x_1$",
+            b"\xff",
+            [1],
+            [],
+            {"a": 1},
+            True,
+            5e-324,
+        )
+    )
+    if not every:
+        changed = [*values]
+        if changed:
+            changed[rng.randrange(len(changed))] = odd
+        try:
+            return pa.array(changed)
+        except (pa.ArrowException, OverflowError, TypeError, ValueError):
+            pass
+    return pa.array([odd] * len(values))
+
+
+def weights(rng, path):
+    """Change what is in an archive of weights."""
+    with np.load(path) as file:
+        entries = {name: file[name] for name in file.files}
+    change = rng.choice((_card, _card, _array, _array, _array, _surplus, _bomb, _giant_header))
+    return f"{change.__name__}: {change(rng, path, entries)}"
+
+
+def _card(rng, path, entries):
+    card = json.loads(bytes(entries["card"]).decode())
+    told = _change_node(rng, card)
+    _save(path, entries | {"card": np.frombuffer(json.dumps(card).encode(), np.uint8)})
+    return told
+
+
+def _array(rng, path, entries):
+    name = rng.choice(list(entries))
+    array = entries.pop(name)
+    odd = [array.astype(rng.choice((np.float64, np.int8, complex, object, "U4"))), array[..., None], array.ravel()[:3]]
+    if array.dtype.kind == "f":
+        odd += [np.full_like(array, value) for value in (np.nan, np.inf, 3e38, -3e38)]
+    if rng.random() < 0.8:
+        entries[name] = rng.choice(odd)
+    _save(path, entries)
+    return name
+
+
+def _surplus(_rng, path, entries):
+    _save(path, entries | {"more": np.zeros(4, np.float32)})
+
+
+def _save(path, entries):
+    with open(path, "wb") as file:
+        np.savez(file, **entries)
+
+
+def _bomb(rng, path, _entries):
+    """Some gigabytes of zeros in a few megabytes, or said to be."""
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file,
+        file.open("card.npy", "w", force_zip64=True) as entry,
+    ):
+        block = bytes(2**20)
+        for _ in range(rng.choice((65, 300))):
+            entry.write(block)
+
+
+def _giant_header(rng, path, entries):
+    """An array that says it has billions of numbers."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f4", "fortran_order": False, "shape": (rng.choice((2**31, 2**40, 2**62)),)}
+    )
+    with open(path, "wb") as out:
+        np.savez(out, **entries)
+    with zipfile.ZipFile(path, "a") as file:
+        file.writestr("giant.npy", header.getvalue() + b"\0" * 16)
+
+
+def csv(rng, path):
+    """Change a cell, a line or the heading of a CSV file."""
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    row = rng.randrange(len(rows))
+    change = rng.randrange(4)
+    if change == 0:
+        del rows[row]
+    elif change == 1:
+        rows.append(rows[row])
+    else:
+        rows[row][rng.randrange(len(rows[row]))] = rng.choice(
+            ("", "x", "nan", "inf", "-1", "1e999", "9" * 400, '"', "0")
+        )
+    path.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    return f"row {row}: {change}"
+
+
+def points(rng, path):
+    """Change numbers of a binary sweep."""
+    values = np.frombuffer(path.read_bytes(), np.float32).copy()
+    values[rng.randrange(len(values))] = rng.choice((np.nan, np.inf, -np.inf, 1e30, -1e30, 0))
+    path.write_bytes(values.tobytes() * rng.choice((1, 1, 2)) + b"\0" * rng.choice((0, 0, 1, 4)))
+    return "numbers"
+
+
+def sparse(path, size):
+    """A file of so many bytes that takes no space."""
+    with path.open("wb") as file:
+        os.truncate(file.fileno(), size)
