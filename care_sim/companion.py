@@ -18,6 +18,9 @@ def seen_on_a_drive(
 ) -> Pool:
     """Drive through `world`, every cell fired, and close it: what the camera shows before misses and delay.
 
+    It brakes as a full scan makes it brake, whatever the policy: all meet the same false boxes, and those of a car that
+    hardly brakes differ a little from its true ones.
+
     With the `seeds` of an episode its mount errs as the episode's does; false boxes of a straight camera would stand
     out among those of a crooked one.
     """

@@ -129,7 +129,8 @@ NOTHING_TO_HAUNT = Pool(NO_ROWS, np.empty(0), np.empty((0, 2)))
 class Ghosts:
     """False boxes by the law of the true ones: a Poisson number a keyframe, `rate` a picture on the mean over `cameras`
     pictures, each a box drawn evenly from a pool and varied a little. So their classes, places, sizes, confidences and
-    cameras are those of true boxes. They flicker: every keyframe has its own, and none lasts.
+    cameras are those of true boxes. They flicker: every keyframe has its own, and none lasts. And they say what any law
+    of true boxes says, where objects tend to be: where people always emerge at one place, false people stand there too.
 
     A ghost that lies on another box of its class is drawn again, up to TRIES times, then left out, as a detector
     suppresses duplicates. So fewer come where few places are free: up to 4 a picture hardly any is left out; of 16 a
