@@ -135,27 +135,32 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     _settle_output()
     try:
         sys.exit(_finished(arguments))
-    except (InvalidInput, MissingExtra) as error:
-        _complain(str(error))
-    except BrokenPipeError:
-        _leave_output()
-        sys.exit(UNREAD)
-    except OSError as error:
-        _leave_output()
-        _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except KeyboardInterrupt:
         if alone:
             interrupts.end_in_silence()
         words = 2 if arguments[:1] == ["train"] else 1
         _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", interrupts.INTERRUPTED)
     except Exception as error:
-        if DEBUG in given or os.environ.get("CARE_SIM_DEBUG"):
-            raise
-        told = f"unexpected {type(error).__name__}: {error}"
-        _complain(f"{told}; please report it, with the trace that {DEBUG} (or CARE_SIM_DEBUG=1) shows", UNEXPECTED)
+        _end_with(error, trace=DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
     finally:
         if alone:
             interrupts.end_in_silence()
+
+
+def _end_with(error: Exception, trace: bool) -> NoReturn:
+    """Say in one line what was wrong, and exit; a fault of the software is raised again where its trace is wanted."""
+    if isinstance(error, InvalidInput | MissingExtra):
+        _complain(str(error))
+    if isinstance(error, BrokenPipeError):
+        _leave_output()
+        sys.exit(UNREAD)
+    if isinstance(error, OSError):
+        _leave_output()
+        _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    if trace:
+        raise error
+    told = f"unexpected {type(error).__name__}: {error}"
+    _complain(f"{told}; please report it, with the trace that {DEBUG} (or CARE_SIM_DEBUG=1) shows", UNEXPECTED)
 
 
 def _settle_output() -> None:

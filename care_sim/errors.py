@@ -90,7 +90,7 @@ def _finite(value: Any) -> float:
 
 def check_whole(name: str, value: object, least: float, most: float = LARGEST) -> None:
     """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
-    whole = int(value) if isinstance(value, Integral) and is_number(value) else None  # type: ignore[call-overload]
+    whole = int(value) if isinstance(value, Integral) and is_number(value) else None
     if whole is None or not least <= whole <= most:
         upper = f" and <= {most}" if most < LARGEST or (whole is not None and whole > most) else ""
         raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
