@@ -15,7 +15,7 @@ import tyro
 from care_sim.bounds import bounded, settle
 from care_sim.errors import LARGEST, InvalidInput
 from care_sim.study.options import USUAL, Options, seeds_of
-from care_sim.study.running import MOST_WORKERS, Running, console, in_turn, playable
+from care_sim.study.running import MOST_WORKERS, Running, console, in_turn, playable, report_problems
 
 if TYPE_CHECKING:
     from care_sim.policies.base import Policy
@@ -234,7 +234,6 @@ class Report:
         from care_sim.study.page.build import write_page
 
         page = write_page(self.folder, path, self.episodes, self.workers)
-        for sentence in page.warnings:
-            print(f"care-sim: {sentence}", file=sys.stderr)
+        report_problems(page.warnings)
         print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {counted(page.watchable, 'episode')} to watch")
         return 0

@@ -7,6 +7,19 @@ from typing import Any
 
 from care_sim.study import config, episode, play_config, plays
 from care_sim.study.annotation import annotated, tagged
+from care_sim.study.columns import (
+    CONDITIONS,
+    COUNT,
+    FLAG,
+    PARAMETERS,
+    SEED,
+    SHARE,
+    SUM,
+    TEXT,
+    Column,
+    Schema,
+    with_gaps,
+)
 from care_sim.study.runner import Attempt
 from care_sim.study.task import Row
 from care_sim.types import Outcome
@@ -15,7 +28,7 @@ from care_sim.types import Outcome
 @dataclass(frozen=True)
 class Kind:
     """`unit` is what its tasks are called. `attempt` plays a batch; `finish` makes rows side by side into those that
-    are kept; `file` holds them, with at least the columns `required`; `listed` are configurations as plain data.
+    are kept; `file` holds them, in columns of the `schema`; `listed` are configurations as plain data.
     `aside` are further files, as columns by name, made of the rows as they were played.
     """
 
@@ -23,17 +36,32 @@ class Kind:
     attempt: Attempt
     finish: Callable[[Sequence[Row]], list[Row]]
     file: str
-    required: frozenset[str]
+    schema: Schema
     listed: Callable[[Any], dict[str, Any]]
     aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
 
 
+_ORIGIN = dict.fromkeys(("version", "digest", "episode_hash", "tags"), with_gaps(TEXT))
+_EPISODES = Schema(
+    {name: CONDITIONS.get(name, TEXT) for name in config.PLAIN_FIELDS}
+    | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
+    | {name: with_gaps(SUM) for name, kind in Outcome.__annotations__.items() if kind == float | None},
+    _ORIGIN,
+)
+_PLAYS = Schema(
+    {name: CONDITIONS.get(name, TEXT) for name in (*play_config.PLAY_FIELDS, "film_hash")}
+    | {"budget": SHARE, "keyframes": COUNT, "floor_seed": COUNT, "ttfds": Column("lists of whole numbers", least=0)}
+    | dict.fromkeys((*plays.SUMS, "tracks", "explained"), SUM)
+    | dict.fromkeys(("differing_keyframes", "differing_cells"), with_gaps(COUNT)),
+    _ORIGIN | dict.fromkeys(("recording", "camera_detections"), with_gaps(TEXT)),
+    plays.SUMS,
+)
 EPISODES = Kind(
     "episodes",
     episode.attempt,
     annotated,
     "episodes.parquet",
-    frozenset({*config.PLAIN_FIELDS, *Outcome.__dataclass_fields__}),
+    _EPISODES,
     config.listed,
 )
 PLAYS = Kind(
@@ -41,7 +69,7 @@ PLAYS = Kind(
     plays.attempt,
     lambda rows: [plays.without_events(row) for row in tagged(rows)],
     "plays.parquet",
-    frozenset({*play_config.PLAY_FIELDS, *plays.SUMS}),
+    _PLAYS,
     play_config.listed,
     lambda rows: {"events.parquet": plays.event_columns(rows)},
 )
@@ -55,7 +83,7 @@ def kind_in(folder: Path) -> Kind:
 
 def is_parameter(name: str) -> bool:
     """Whether a column of rows holds what a task was given."""
-    return name in _PARAMETERS or name.startswith(("scenario.", "policy.", "detector."))
+    return name in _PARAMETERS or name.startswith(PARAMETERS)
 
 
 _PARAMETERS = frozenset({*config.PLAIN_FIELDS, *play_config.PLAY_FIELDS, "scene", "camera_detections", "presence"})

@@ -137,8 +137,8 @@ class Plays:
 
     def difference(self, policy: str, budget: float) -> AllocationDifference:
         """How its allocations differ from those of the reference, over all plays for which that is known."""
-        known = [row for row in self.rows(policy, budget) if row["differing_keyframes"] is not None]
         columns = ("keyframes", "differing_keyframes", "differing_cells")
+        known = [row for row in self.rows(policy, budget) if None not in (row[column] for column in columns)]
         return AllocationDifference(*(int(sum(row[column] for row in known)) for column in columns))
 
     def strata(self) -> dict[str, list[str]]:
@@ -152,7 +152,7 @@ class Plays:
 def plays_of(rows: Sequence[Row]) -> list[Plays]:
     """The plays of every setting in the order of their first rows; the full scan alone makes none where others do.
 
-    Raises InvalidInput where the plays of a scene are of two films.
+    Raises InvalidInput where the plays of a scene are of two films, or one does not tell the TTFD of its events.
     """
     _check_films(rows)
     groups: dict[Setting, list[Row]] = {}
@@ -174,6 +174,10 @@ def _check_films(rows: Sequence[Row]) -> None:
     films: dict[tuple[str, ...], str] = {}
     for row in rows:
         scene = (row["source"], row["scene"], row.get("camera_detections") or "")
+        if len(row["ttfds"]) != row["events"]:
+            raise InvalidInput(
+                f"a play of scene {row['scene']} has {len(row['ttfds'])} TTFD of {row['events']:g} events"
+            )
         if films.setdefault(scene, row["film_hash"]) != row["film_hash"]:
             raise InvalidInput(
                 f"the plays of scene {row['scene']} are of two films, its data changed between runs: take a new --out"

@@ -90,7 +90,10 @@ def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
     if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
         raise InvalidInput(f"{folder} holds an unfinished study; the command that began it goes on there")
     path = folder / kind.file
-    return read_rows(path, kind.required), study_of(path), read_notes(path)[1]
+    study = study_of(path)
+    if study.kind is not kind:
+        raise InvalidInput(f"{path} holds no rows of the study {study.name}, which are in {study.kind.file}")
+    return read_rows(path, study.schema), study, read_notes(path)[1]
 
 
 @dataclass(frozen=True)

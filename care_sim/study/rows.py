@@ -1,7 +1,7 @@
 """Rows of a study in a Parquet file."""
 
 import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 from care_sim.errors import InvalidInput
 from care_sim.files import replacing
 from care_sim.json_text import parsed
+from care_sim.study.columns import Schema
 from care_sim.study.task import Row
 
 STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"
@@ -58,22 +59,32 @@ def _with_tuples(value: Any) -> Any:
     return tuple(map(_with_tuples, value)) if isinstance(value, list) else value
 
 
-def read_rows(path: Path, required: Collection[str] = ()) -> list[Row]:
-    """Read rows back. Raises InvalidInput for a file that is damaged or lacks a required column."""
-    rows = [with_tuples(row) for row in _read(path).to_pylist()]
-    missing = set(required) - set(rows[0] if rows else ())
-    if missing or not rows:
-        lacking = f"it lacks {', '.join(sorted(missing))}" if missing else "it is empty"
-        raise InvalidInput(f"{path} holds no rows of a study: {lacking}")
-    return rows
+def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
+    """Read rows back, of a schema the columns that it knows. Raises InvalidInput for a file that is damaged, is empty,
+    or has not the schema.
+    """
+    table = _read(path)
+    for fault in (schema or Schema()).faults(table):
+        raise InvalidInput(f"{path} holds no rows of a study: {fault}")
+    known = table.select(schema.known(table)) if schema else table
+    try:
+        return [with_tuples(row) for row in known.to_pylist()]
+    except (pa.ArrowException, ValueError, OverflowError) as error:
+        raise InvalidInput(f"{path} is not a readable Parquet file: {_first_line(error)}") from error
 
 
 def read_notes(path: Path) -> tuple[str | None, list[str]]:
     """The name of the study that wrote a file, None without one, and what it left out. Raises InvalidInput for a
-    damaged file.
+    damaged file, or other notes.
     """
     notes = _read(path).schema.metadata or {}
-    return (notes[STUDY].decode() if STUDY in notes else None), parsed(notes.get(LEFT_OUT, b"[]"))
+    try:
+        study, left_out = notes[STUDY].decode() if STUDY in notes else None, parsed(notes.get(LEFT_OUT, b"[]"))
+    except ValueError as error:
+        raise InvalidInput(f"{path} has notes that cannot be read: {_first_line(error)}") from error
+    if not isinstance(left_out, list) or not all(isinstance(each, str) for each in left_out):
+        raise InvalidInput(f"{path} has notes that cannot be read: what is left out must be a list of texts")
+    return study, left_out
 
 
 def _read(path: Path) -> pa.Table:
@@ -82,4 +93,8 @@ def _read(path: Path) -> pa.Table:
     try:
         return pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
-        raise InvalidInput(f"{path} is not a readable Parquet file: {str(error).splitlines()[0]}") from error
+        raise InvalidInput(f"{path} is not a readable Parquet file: {_first_line(error)}") from error
+
+
+def _first_line(error: BaseException) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)

@@ -1,7 +1,7 @@
 """The studies by name: what is shown of their rows."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -10,7 +10,8 @@ from care_sim.errors import unknown
 from care_sim.study import budget_figure, crowding_figure, faults_figure
 from care_sim.study.ablations import ablation_tables
 from care_sim.study.captions import CAPTION, COMPARED
-from care_sim.study.crowding import crowding_tables
+from care_sim.study.columns import COUNT, Column, Schema
+from care_sim.study.crowding import COLUMN, crowding_tables
 from care_sim.study.faults import fault_tables
 from care_sim.study.kinds import EPISODES, PLAYS, Kind
 from care_sim.study.paper import NO_COLLISION
@@ -31,7 +32,7 @@ class Study:
 
     `title` names it to readers; `closing` are sentences after the tables; `figure_names` every figure that the study
     can draw, as patterns in which a * stands for any text; `caption` says how to read its tables; `kind` is what it
-    plays.
+    plays; `columns` are further ones that its tables need.
     """
 
     name: str
@@ -42,6 +43,12 @@ class Study:
     figure_names: tuple[str, ...]
     caption: str = CAPTION
     kind: Kind = EPISODES
+    columns: Mapping[str, Column] = field(default_factory=dict)
+
+    @property
+    def schema(self) -> Schema:
+        """The columns that its rows must have."""
+        return replace(self.kind.schema, needed={**self.kind.schema.needed, **self.columns})
 
 
 def collisions(rows: Sequence[Row]) -> str:
@@ -86,6 +93,7 @@ _ALL = (
         _sweep_closing,
         (crowding_figure.NAME,),
         COMPARED,
+        columns={COLUMN: COUNT},
     ),
     Study("ablate", "Ablations of the closed loop", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
     Study(

@@ -33,7 +33,7 @@ def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
     path = folder / study.kind.file
     if not path.is_file():
         return
-    rows, there = read_rows(path), read_notes(path)[0] or SWEEP.name
+    rows, there = read_rows(path, study.kind.schema.lenient), read_notes(path)[0] or SWEEP.name
     unit = study.kind.unit.removesuffix("s")
     here, wanted = counted(len(rows), unit), counted(len(configs), unit)
     if there != study.name:

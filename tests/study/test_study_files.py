@@ -44,7 +44,7 @@ def test_a_truncated_file_is_named(tmp_path):
 def test_a_file_of_something_else_is_named(tmp_path):
     write_rows([{"apples": 3}], tmp_path / "episodes.parquet")
     with pytest.raises(InvalidInput, match=r"it lacks .*policy"):
-        read_rows(tmp_path / "episodes.parquet", EPISODES.required)
+        read_rows(tmp_path / "episodes.parquet", EPISODES.schema)
 
 
 def test_the_journal_passes_over_a_torn_line_and_goes_on_behind_it(tmp_path):

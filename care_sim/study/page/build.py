@@ -134,7 +134,7 @@ def write_page(folder: Path, path: Path, most: int, workers: int, make_executor:
             print(f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr)
         episodes = played_again(watched, workers, make_executor)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
-        unfinished.write_text(page.html(), encoding="utf-8")
+        unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")
     return page
 
 
