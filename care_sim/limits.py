@@ -35,8 +35,8 @@ MAX_AGE_S = 3600.0
 MAX_SIZE_M = 50.0
 MAX_TURN = 4 * np.pi
 
+_EGO = (MAX_SPEED_MPS, MAX_TURN, MAX_ACCELERATION_MPS2)
 _BOX, _YAW_CHANGE = slice(2, 6), 8
-_CAMERA = ImageDetections.COLUMNS.index("camera")
 _PLACE, _YAW, _VELOCITY = slice(2, 5), 8, slice(9, 11)
 
 
@@ -51,8 +51,7 @@ class Limits:
     @cached_property
     def ego(self) -> Floats:
         """Of speed, yaw rate and acceleration."""
-        most = np.array([MAX_SPEED_MPS, MAX_TURN, MAX_ACCELERATION_MPS2])
-        return np.stack([-most, most])
+        return np.array([np.negative(_EGO), _EGO])
 
     @cached_property
     def detections(self) -> Floats:
@@ -77,8 +76,10 @@ class Limits:
         return Belief(self._own(ego), self.rig.budget, seen, self._kept(self._followed(tracks), seen), ranges)
 
     def _own(self, ego: Ego) -> Ego:
-        values = np.clip([ego.speed, ego.yaw_rate, ego.acceleration], *self.ego)
-        return Ego(*values.tolist())
+        values = ego.speed, ego.yaw_rate, ego.acceleration
+        if all(abs(value) <= most for value, most in zip(values, _EGO, strict=True)):
+            return ego
+        return Ego(*np.clip(values, *self.ego).tolist())
 
     @cached_property
     def _pictured(self) -> tuple[Floats, Floats]:
@@ -91,8 +92,9 @@ class Limits:
     def _seen(self, detections: ImageDetections) -> ImageDetections:
         rows, (least, most) = detections.rows(), self._pictured
         most = most[detections.cameras]
-        if len(rows) <= MAX_DETECTIONS and bool(((least <= rows) & (rows <= most)).all()):
+        if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
             return detections
+        rows = rows.copy()
         left, top, right, bottom = rows[:, _BOX].T
         width, height = most[:, _BOX][:, 2:].T
         shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
@@ -101,8 +103,9 @@ class Limits:
 
     def _followed(self, tracks: Tracks) -> Tracks:
         rows, (least, most) = tracks.rows(), self.tracks
-        if bool(((least <= rows) & (rows <= most)).all()):
+        if _within(rows, least, most):
             return tracks
+        rows = rows.copy()
         rows[:, _YAW] = _unwound(rows[:, _YAW])
         for columns in (_PLACE, _VELOCITY):
             rows[:, columns] = _shortened(rows[:, columns], most[columns.start])
@@ -118,6 +121,10 @@ class Limits:
         order = np.ones(len(tracks), np.int64)
         order[first[first >= 0]] = 0
         return tracks.take(np.sort(np.argsort(order, kind="stable")[:MAX_TRACKS]))
+
+
+def _within(rows: Floats, least: Floats, most: Floats) -> bool:
+    return bool((rows >= least).all() and (rows <= most).all())
 
 
 def _unwound(angles: Floats) -> Floats:

@@ -89,8 +89,12 @@ class ImageDetections:
         return cls(classes, table[:, 1], table[:, 2:6], cameras, table[:, 7], table[:, 8])
 
     def rows(self) -> Floats:
-        """(n, 9) table in the order of `COLUMNS`."""
-        return np.column_stack([self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes])
+        """(n, 9) table in the order of `COLUMNS`, read-only."""
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> Floats:
+        return _table(self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes)
 
 
 @dataclass(frozen=True)
@@ -131,8 +135,12 @@ class Tracks:
         return Tracks(*(getattr(self, column.name)[rows] for column in fields(self)))
 
     def rows(self) -> Floats:
-        """(n, 13) table in the order of `COLUMNS`."""
-        return np.column_stack([self.ids, self.classes, self.boxes, self.velocities, self.misses, self.hits])
+        """(n, 13) table in the order of `COLUMNS`, read-only."""
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> Floats:
+        return _table(self.ids, self.classes, self.boxes, self.velocities, self.misses, self.hits)
 
 
 @dataclass(frozen=True)
@@ -209,6 +217,12 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray
                 f"class 0 to {len(CLASSES) - 1}"
             )
     return rows
+
+
+def _table(*columns: NDArray[np.generic]) -> Floats:
+    table: Floats = np.column_stack(columns)
+    table.flags.writeable = False
+    return table
 
 
 def _padded(what: str, rows: Floats, length: int) -> NDArray[np.float32]:
