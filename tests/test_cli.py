@@ -9,9 +9,10 @@ from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.commands import Reproduce
 from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.episode import run_episode
 from care_sim.study.kinds import EPISODES
 from care_sim.study.options import Options
-from care_sim.study.rows import read_rows
+from care_sim.study.rows import read_rows, write_rows
 
 SHORT = ["--scenario-parameters", "duration_s=0.3"]
 
@@ -60,6 +61,34 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_pat
     assert err.startswith("care-sim: ")
     assert err.count("\n") == 1
     assert all(name in err for name in names), err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "run dartout --picture",
+        "run dartout --video",
+        "run dartout --record",
+        "compare dartout --record",
+        "bench --out",
+        "parity --out",
+        "train learned-scorer --out",
+        "report NOTHING -o",
+    ],
+)
+def test_what_stands_where_a_file_is_wanted_is_one_line_before_anything_is_computed(command, capsys, tmp_path):
+    """Somebody's table, and a folder."""
+    table, results = tmp_path / "table.png", tmp_path / "results"
+    table.write_bytes(b"PAR1 and rows")
+    write_rows(
+        [run_episode(EpisodeConfig("dartout", "random", scenario_parameters=(("duration_s", 0.1),)))],
+        results / EPISODES.file,
+    )
+    for place in (table, tmp_path) if "video" not in command else (table,):
+        code, out, err = run(capsys, *command.replace("NOTHING", str(results)).split(), place)
+        assert (code, out, err.count("\n")) == (2, "", 1), err
+        assert str(place) in err
+    assert table.read_bytes() == b"PAR1 and rows"
 
 
 def test_a_folder_that_cannot_be_written_is_named(capsys, tmp_path):

@@ -19,13 +19,13 @@ def run(config: BenchConfig) -> int:
     """Measure, print the tables, write JSON and figure; 0 whether or not the targets are met."""
     if config.out is not None:
         check_figure(config.out)
-    with nullcontext() if config.out is None else replacing(config.out, JSON) as out:
+    with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = measure(config, partial(print, "measuring", file=sys.stderr))
         console = Console(highlight=False)
         for table in tables(report):
             console.print(table.rich())
-        if out is not None:
-            out.write_text(json.dumps(report, indent=2) + "\n")
+        if unfinished is not None:
+            unfinished.write_text(json.dumps(report, indent=2) + "\n")
     if config.out is not None:
         save(growth_figure(report), config.out)
     return 0

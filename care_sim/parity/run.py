@@ -26,13 +26,13 @@ Compared = TypeVar("Compared")
 
 def run(config: ParityConfig) -> int:
     """Compare, print the tables, write JSON; 1 if the engines do not agree, see `agree`."""
-    with nullcontext() if config.out is None else replacing(config.out, JSON) as out:
+    with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = measure(config)
         console = Console(highlight=False)
         for table in tables(report):
             console.print(table.rich())
-        if out is not None:
-            out.write_text(json.dumps(report, indent=2) + "\n")
+        if unfinished is not None:
+            unfinished.write_text(json.dumps(report, indent=2) + "\n")
     return 0 if agree(report) else 1
 
 

@@ -37,10 +37,10 @@ class Export(PlayOptions):
         from care_sim.files import JSON, replacing
 
         configs = self._configs()
-        with replacing(self.out, JSON) as file:
+        with replacing(self.out, JSON) as unfinished:
             shown = track(configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty())
             results = {token: boxes for config in shown for token, boxes in found(config).items()}
-            file.write_text(json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8")
+            unfinished.write_text(json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8")
         count = sum(map(len, results.values()))
         print(f"{count} boxes in {len(results)} samples of {len(configs)} scenes are in {self.out}")
         if not count:

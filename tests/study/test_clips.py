@@ -78,10 +78,10 @@ def test_a_folder_is_no_clip_and_what_was_there_stays_until_the_new_one_is_whole
     with pytest.raises(InvalidInput, match="is a folder"):
         Film(tmp_path / "clip.mp4")
     path = tmp_path / "clip.gif"
-    path.write_text("old")
+    path.write_text("GIF8 old")
     with pytest.raises(ZeroDivisionError):
         write_clip(path, (PICTURES[1 // (2 - number)] for number in range(3)), 0.1, 0.3)
-    assert path.read_text() == "old"
+    assert path.read_text() == "GIF8 old"
     assert len(list(tmp_path.iterdir())) == 2
 
 

@@ -195,9 +195,9 @@ def test_a_folder_is_no_recording_and_an_old_recording_stays_until_the_new_one_i
     with pytest.raises(InvalidInput, match="is a folder"):
         recording(tmp_path, ["care"])
     file = tmp_path / "out.rrd"
-    file.write_text("old")
+    file.write_text("RRF old")
     with recording(file, ["care"]):
-        assert file.read_text() == "old"
+        assert file.read_text() == "RRF old"
     assert file.stat().st_size > 1000
     assert list(tmp_path.iterdir()) == [file]
 
