@@ -153,8 +153,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _settle_output() -> None:
-    """Let output go nowhere where there is none, write what an encoding lacks as an escape, and help for a terminal of a
-    few columns, in which tyro does not come to an end, as for one of NARROWEST.
+    """Let output go nowhere where there is none, write what an encoding lacks as an escape, and take a terminal of few
+    columns, for which tyro never ends its help, for one of NARROWEST.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

@@ -89,7 +89,7 @@ def _finite(value: Any) -> float:
 
 def check_whole(name: str, value: object, least: float, most: float = LARGEST) -> None:
     """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
-    whole = int(value) if isinstance(value, Integral) and is_number(value) else None  # type: ignore[call-overload]
+    whole = int(value) if isinstance(value, Integral) and is_number(value) else None
     if whole is None or not least <= whole <= most:
         upper = f" and <= {most}" if most < LARGEST or (whole is not None and whole > most) else ""
         raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
@@ -128,7 +128,7 @@ def check_path(name: str, value: object) -> None:
     too_long = len(path) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in path.split(b"/"))
     if not path or b"\0" in path or too_long:
         least = "empty" if not path else "longer than a file system allows" if too_long else "with a null character"
-        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(value)}")
+        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}")
 
 
 def as_array(name: str, value: Any) -> NDArray[Any]:

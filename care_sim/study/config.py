@@ -113,6 +113,8 @@ def grid(
 
     `common` are further fields of `EpisodeConfig`.
     """
+    for seed in seeds:
+        check_seed(seed)
     axes = list(product(budgets, false_negative_rates, camera_latencies))
     configs = (
         _config(scenario, policy, budget, {"false_negative_rate": rate, "camera_latency": latency} | common)
