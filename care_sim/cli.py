@@ -164,8 +164,8 @@ def _end_with(error: Exception, trace: bool) -> NoReturn:
 
 
 def _settle_output() -> None:
-    """Let output go nowhere where there is none. Write what an encoding lacks as an escape, and help for a terminal of
-    a few columns, in which tyro does not come to an end, as for one of NARROWEST.
+    """Let output go nowhere where there is none. Write what an encoding lacks as an escape. Take a terminal of few
+    columns, for which tyro never ends its help, for one of NARROWEST.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

@@ -129,7 +129,7 @@ def check_path(name: str, value: object) -> None:
     too_long = len(path) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in path.split(b"/"))
     if not path or b"\0" in path or too_long:
         least = "empty" if not path else "longer than a file system allows" if too_long else "with a null character"
-        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(value)}")
+        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}")
 
 
 def as_array(name: str, value: Any) -> NDArray[Any]:

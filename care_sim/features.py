@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.errors import check_whole
 from care_sim.grid import Cells
 from care_sim.residual import camera_layers
 from care_sim.tiling import Tiling
@@ -36,6 +37,8 @@ class GridFeatures:
     rows: int = 8
 
     def __post_init__(self) -> None:
+        check_whole("columns", self.columns, 1, self.rig.grid.columns)
+        check_whole("rows", self.rows, 1, self.rig.grid.rows)
         self.blocks  # noqa: B018 (refuses what does not divide)
 
     @cached_property

@@ -25,7 +25,7 @@ class Tiling:
     def __post_init__(self) -> None:
         sides = (("azimuths", self.azimuths, self.grid.columns), ("elevations", self.elevations, self.grid.rows))
         for name, count, cells in sides:
-            check_whole(name, count, 1)
+            check_whole(name, count, 1, cells)
             if cells % count:
                 raise InvalidInput(f"{name} must divide the {cells} of the grid, got {count}")
 

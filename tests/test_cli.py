@@ -246,3 +246,76 @@ def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
         main(["run", "dartout", "--picture", str(picture), "--scenario-parameters", "duration_s=0.2"])
     assert "no picture" in capsys.readouterr().err
     assert not picture.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["sweep", "--seeds", "9" * 22], "seeds"),
+        (["sweep", "--seeds", "9" * 5000], "seeds"),
+        (["reproduce", "--seeds", "1000000000"], "seeds"),
+        (["run", "dense", "--seed", str(2**64)], "seed"),
+        (["run", "dense", "--floor-seed", str(2**64)], "floor_seed"),
+        (["run", "dense", "--false-negative-burst", str(10**19)], "false_negative_burst"),
+        (["run", "dense", "--ego-speed-sigma", "1e19"], "ego_speed_sigma"),
+        (["run", "dense", "--scenario-parameters", "ego_speed_mps=(1e300,1e300)"], "ego_speed_mps of dense"),
+        (["run", "dense", "--scenario-parameters", "self=1"], "parameter of dense"),
+        (["run", "dense", "--policy-parameters", "a={[1]}"], "unknown parameter"),
+        (["run", "dense", "--policy-parameters", "a=" + "-" * 5000 + "1"], "unknown parameter"),
+        (["run", "dense", "--policy-parameters", "name=x"], "unknown parameter"),
+        (["run", "dense", "--policy", "care-sbf", "--policy-parameters", "k_safe={1}"], "k_safe"),
+        (["run", "\ud800"], "no text"),
+        (["run", "a\0b"], "no text"),
+        (["run", "dense", "--policy", "\udcff\x1b[31m"], r"\udcff\x1b[31m"),
+        (["run", "dense", "--video", ""], "an argument is empty"),
+        (["sweep", "--out="], "an argument is empty"),
+        (["run", "dense", "--export", "a" * 300], "path must be a path"),
+        (["protocol", "--scenes", "9" * 5000], "scenes"),
+        (["sweep", "--workers", str(10**30)], "workers"),
+        (["bench", "--seconds", "inf"], "seconds"),
+        (["parity", "--scenes", str(2**70)], "scenes"),
+    ],
+)
+def test_absurd_input_is_one_line_and_exit_code_2(arguments, named, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("care-sim: ")
+    assert err.rstrip("\n").isprintable()
+    assert named in err
+    assert len(err) < 2100
+
+
+@pytest.mark.parametrize("fault", [TypeError, RecursionError, MemoryError, OverflowError])
+def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, capsys, monkeypatch):
+    def fails(self):
+        raise fault("deep\ninside")
+
+    monkeypatch.delenv("CARE_SIM_DEBUG", raising=False)
+    monkeypatch.setattr("care_sim.cli.Scenarios.__call__", fails)
+    code, _, err = run(capsys, "scenarios")
+    assert code == 70
+    assert err.startswith(f"care-sim: unexpected {fault.__name__}: deep inside; please report it")
+    assert err.count("\n") == 1
+    with pytest.raises(fault):
+        main(["scenarios", "--debug"])
+    monkeypatch.setenv("CARE_SIM_DEBUG", "1")
+    with pytest.raises(fault):
+        main(["scenarios"])
+
+
+@pytest.mark.parametrize(
+    ("shell", "code", "complaint"),
+    [
+        ("{} policies | true; exit ${{PIPESTATUS[0]}}", 141, ""),
+        ("{} policies > /dev/full", 2, "care-sim: [Errno 28] No space left on device\n"),
+        ("{} policies >&-", 0, ""),
+        ("{} policies >&- 2>&-", 0, ""),
+        ("COLUMNS=1 timeout 60 {} run --help > /dev/null", 0, ""),
+        ("PYTHONIOENCODING=ascii {} policies > /dev/null", 0, ""),
+    ],
+)
+def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):
+    command = shell.format(f"{sys.executable} -c 'from care_sim.cli import main; main()'")
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
+    assert (ended.returncode, ended.stderr) == (code, complaint)

@@ -14,7 +14,7 @@ from zipfile import ZipInfo
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, is_number
+from care_sim.errors import InvalidInput, check_path, is_number
 from care_sim.files import ZIP, replacing
 from care_sim.grid import AngularGrid
 from care_sim.json_text import parsed
@@ -120,6 +120,7 @@ def load(path: str | PathLike[str]) -> Weights:
 
     Whatever a spoilt archive provokes in its readers becomes that one line.
     """
+    check_path("a file of weights", path)
     try:
         with np.load(path, allow_pickle=False) as file:
             _check_contents(file.zip.infolist())

@@ -1,8 +1,9 @@
 """Who plays the episodes: processes of this machine, or the workers of a dask cluster."""
 
+import asyncio
 import logging
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
@@ -10,7 +11,7 @@ from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from care_sim.children import end_with_parent, starting
-from care_sim.errors import InvalidInput, MissingExtra, shown
+from care_sim.errors import InvalidInput, MissingExtra, one_line
 
 if TYPE_CHECKING:
     from dask.distributed import Client
@@ -20,6 +21,9 @@ T = TypeVar("T")
 
 ExecutorFactory = Callable[[int], Executor]
 """Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
+
+PATIENCE_S = 10.0
+"""How long a scheduler may take to answer."""
 
 
 class ClusterLost(OSError):
@@ -120,9 +124,21 @@ def _connect(address: str) -> "Client":
     for logger in ("distributed", "distributed.client"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
-        return Client(address, timeout="10s")
+        with ThreadPoolExecutor(1) as aside:
+            aside.submit(asyncio.run, _knock(address)).result()
+        return Client(address, timeout=PATIENCE_S)
     except Exception as error:  # of each protocol its own, those of libraries that are not there among them
-        raise InvalidInput(f"no dask scheduler answers at {shown(address)}; one looks like tcp://HOST:8786") from error
+        told = one_line(str(address))
+        raise InvalidInput(f"no dask scheduler answers at {told}; one looks like tcp://HOST:8786") from error
+
+
+async def _knock(address: str) -> None:
+    """Raise what speaks against a connection: a client that fails at it leaves a thread that nobody can end."""
+    from dask.distributed import Security
+    from distributed.comm import connect
+
+    comm = await connect(address, timeout=PATIENCE_S, **Security().get_connection_args("client"))
+    await comm.close()
 
 
 def _is_death(error: BaseException) -> bool:

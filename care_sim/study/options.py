@@ -61,7 +61,7 @@ def parameters(texts: Sequence[str]) -> "Parameters":
 def _pair(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not (name and equals):
-        raise InvalidInput(f"parameters are given as NAME=VALUE, got {text!r}")
+        raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
     if len(text) > LONGEST:
         raise InvalidInput(f"a parameter must be at most {LONGEST} characters long, got {shown(text)}")
     with warnings.catch_warnings(action="ignore", category=SyntaxWarning):

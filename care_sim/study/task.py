@@ -122,6 +122,7 @@ def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, An
     """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither camera nor
     allocator.
     """
+    check_policy(policy)
     felt = conditions | {"budget": budget}
     if parameters := conditions.get("policy_parameters"):
         felt["policy_parameters"] = own(policy, parameters)
