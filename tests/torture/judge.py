@@ -21,7 +21,8 @@ from torture.case import DONE, INTERRUPTED, REFUSED, Fault
 ROOT = Path(__file__).resolve().parents[2]
 ENDINGS = {0: DONE, 1: REFUSED, 2: REFUSED, 130: INTERRUPTED}
 BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP)
-"""Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said why."""
+"""Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said why, or where all
+was said and done and Python was about to leave."""
 NOTICES = (
     r"episodes \d+ of \d+.*",
     r"plays \d+ of \d+.*",
@@ -84,6 +85,8 @@ def ending(code, out, err, arguments=()):
     _check_control_codes(out, told, "stdout")
     if code in BY_SIGNAL and own:
         code = 130
+    if code in BY_SIGNAL and out.strip() and not lines:
+        return INTERRUPTED
     if code not in ENDINGS:
         raise Fault(f"exit code {code}", told)
     _check_count(code, lines, own, told)

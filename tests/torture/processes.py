@@ -75,15 +75,13 @@ class Command:
     """`care-sim` with arguments, in a session of its own; a context manager that leaves nothing behind.
 
     `file_bytes`: the largest file that it may write, which stands in for a full disk. `stdout`: a device in its place,
-    "closed", or a "closed pipe".
+    or a "closed pipe".
     """
 
     def __init__(self, arguments, folder, file_bytes=None, stdout=None, **environment):
         self.arguments, self.mark = [str(argument) for argument in arguments], new_mark()
 
         def limited():
-            if stdout == "closed":
-                os.close(1)
             signal.signal(signal.SIGINT, signal.default_int_handler)
             if file_bytes is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
@@ -151,7 +149,7 @@ class Command:
 
 def _output(name):
     """Where stdout goes."""
-    if name is None or name == "closed":
+    if name is None:
         return subprocess.PIPE
     if name != "closed pipe":
         return os.open(name, os.O_WRONLY)

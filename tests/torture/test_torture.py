@@ -79,6 +79,7 @@ def test_the_judge_knows_a_fault(code, err, kind):
         (1, "care-sim: left out: policy torn cannot be loaded\n", "refused"),
         (2, "care-sim: budget must lie in (0, 1], got 2\n", "refused"),
         (130, "care-sim: interrupted\n", "interrupted"),
+        (-2, "care-sim: interrupted\n", "interrupted"),
     ],
 )
 def test_the_judge_knows_a_good_ending(code, err, ended):
