@@ -83,6 +83,11 @@ class Parity:
 
 
 @dataclass(frozen=True)
+class Certify:
+    """Play a published list of episodes and say whether they go as published, or where one does not."""
+
+
+@dataclass(frozen=True)
 class Train:
     """Train a learned policy on an environment: `care-sim train --help` lists the learners."""
 
@@ -107,10 +112,11 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "scenarios": Scenarios,
     "bench": Bench,
     "parity": Parity,
+    "certify": Certify,
     "train": Train,
 }
 
-MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig"}
+MEASURES = {"bench": "BenchConfig", "parity": "ParityConfig", "certify": "CertifyConfig"}
 """Commands of packages that are imported for them alone, and what they are told in."""
 STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 KEPT = dict.fromkeys(STUDIES, "; what is finished is kept, the same command goes on from there")
