@@ -79,8 +79,11 @@ class Journal:
             pass  # a file system without locks
 
     def _write(self, text: str) -> None:
-        self._file.write(text)
-        self._file.flush()
+        try:
+            self._file.write(text)
+            self._file.flush()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._file.name) from error
 
 
 def _line(row: Row) -> str:
