@@ -15,6 +15,7 @@ import tyro
 import care_sim.wrappers
 from care_sim import cli
 from care_sim.bench.config import BenchConfig
+from care_sim.certify.config import CertifyConfig
 from care_sim.envs import IDS
 from care_sim.parity.config import ParityConfig
 from care_sim.training import COMMANDS as LEARNERS
@@ -67,7 +68,7 @@ def test_a_block_runs_on_its_own(block, tmp_path, drive):
 
 def parsed(arguments):
     """What the command line makes of arguments, without running it."""
-    measures = {"bench": BenchConfig, "parity": ParityConfig}
+    measures = {"bench": BenchConfig, "parity": ParityConfig, "certify": CertifyConfig}
     first, *rest = arguments
     if first in measures:
         return tyro.cli(measures[first], args=rest)
