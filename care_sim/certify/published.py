@@ -13,8 +13,9 @@ FILE = Path(__file__).with_name("published.parquet")
 
 def read(path: Path = FILE) -> list[bytes]:
     """The trails by number. Raises InvalidInput for a file that is missing or damaged."""
-    trails = [row.get("trail") for row in read_rows(path)]
-    if not all(isinstance(trail, bytes) and len(trail) > DIGEST_BYTES for trail in trails):
+    rows = read_rows(path)
+    trails = [trail for row in rows if isinstance(trail := row.get("trail"), bytes) and len(trail) > DIGEST_BYTES]
+    if len(trails) < len(rows):
         raise InvalidInput(f"{path} holds no trails: install the package again")
     return trails
 
