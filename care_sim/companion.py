@@ -12,6 +12,12 @@ from care_sim.sensors.ghosts import Pool
 from care_sim.types import Rig
 from care_sim.world.world import World
 
+NEAR_S = 2.0
+"""How far in time a false box may be from the moment it was taken at. A scenario runs by the clock: a person seen long
+before anybody can have emerged would be known as false by the time alone. With less, false boxes would fall on what
+stands there so often that those which are left would stand out by their places.
+"""
+
 
 def seen_on_a_drive(
     world: World, duration_s: float, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence]
@@ -31,4 +37,4 @@ def seen_on_a_drive(
             seen.append(loop.sights.detections)
             times.append(world.time)
             over = loop.keyframe(cells).impact_speed_mps is not None or world.time >= duration_s - 1e-9
-    return Pool.of(seen, times, rig.cameras)
+    return Pool.of(seen, times, rig.cameras, near_s=NEAR_S)

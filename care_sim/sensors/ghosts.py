@@ -29,14 +29,16 @@ _BOX = slice(2, 6)
 @dataclass(frozen=True, eq=False)
 class Pool:
     """True boxes seen another time, from which ghosts are made: `rows` (n, 9) as `ImageDetections.rows`, `times_s` (n,)
-    when each was seen, `middles` (n, 2) of their pictures. At a moment those serve that were seen at least `apart_s`
-    before or after it.
+    when each was seen, `middles` (n, 2) of their pictures, `moments_s` (k,) when pictures were taken. At a moment those
+    serve that were seen at least `apart_s` and at most `near_s` before or after it.
     """
 
     rows: Floats
     times_s: Floats
     middles: Floats
+    moments_s: Floats
     apart_s: float = 0.0
+    near_s: float = np.inf
 
     @classmethod
     def of(
@@ -45,16 +47,29 @@ class Pool:
         times_s: Sequence[float],
         cameras: Sequence[PinholeCamera],
         apart_s: float = 0.0,
+        near_s: float = np.inf,
     ) -> "Pool":
         """All that `cameras` have `seen` (k,) at the moments `times_s` (k,)."""
         rows = np.concatenate([NO_ROWS, *(detections.rows() for detections in seen)])
         middles = np.array([(camera.width / 2, camera.height / 2) for camera in cameras]).reshape(-1, 2)
-        times = np.repeat(np.asarray(times_s, float), [len(detections) for detections in seen])
-        return cls(rows, times, middles[rows[:, 6].astype(np.int64)], apart_s)
+        moments = np.asarray(times_s, float)
+        times = np.repeat(moments, [len(detections) for detections in seen])
+        return cls(rows, times, middles[rows[:, 6].astype(np.int64)], moments, apart_s, near_s)
 
     def serving(self, time_s: float) -> Rows:
         """The rows that serve at a moment."""
-        return np.flatnonzero(np.abs(self.times_s - time_s) >= self.apart_s - 1e-9)
+        return np.flatnonzero(self._serves(self.times_s, time_s))
+
+    def plenty(self, time_s: float) -> float:
+        """How many boxes a picture holds at the moments that serve, over how many one holds at any."""
+        pictures = np.count_nonzero(self._serves(self.moments_s, time_s))
+        usual = len(self.rows) / max(len(self.moments_s), 1)
+        return len(self.serving(time_s)) / pictures / usual if pictures and usual else 0.0
+
+    def _serves(self, times_s: Floats, time_s: float) -> NDArray[np.bool_]:
+        away = np.abs(times_s - time_s)
+        serves: NDArray[np.bool_] = (away >= self.apart_s - 1e-9) & (away <= self.near_s + 1e-9)
+        return serves
 
     def varied(self, rows: Rows, draws: Floats) -> Floats:
         """(k, 9) the boxes at `rows` (k,) as `draws` (k, 3) from 0 to 1 vary them: nearer or farther, aside, more or
@@ -123,19 +138,19 @@ class Pool:
 
 
 NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
-NOTHING_TO_HAUNT = Pool(NO_ROWS, np.empty(0), np.empty((0, 2)))
+NOTHING_TO_HAUNT = Pool(NO_ROWS, np.empty(0), np.empty((0, 2)), np.empty(0))
 
 
 class Ghosts:
-    """False boxes by the law of the true ones: a Poisson number a keyframe, `rate` a picture on the mean over `cameras`
-    pictures, each a box drawn evenly from a pool and varied a little. So their classes, places, sizes, confidences and
-    cameras are those of true boxes. They flicker: every keyframe has its own, and none lasts. And they say what any law
-    of true boxes says, where objects tend to be: where people always emerge at one place, false people stand there too.
+    """False boxes by the law of the true ones: a Poisson number per keyframe, `rate` per picture on the mean over
+    `cameras` pictures and all moments, more where the pool has more. Each is a box drawn evenly from what serves, and
+    varied a little. So their classes, places, sizes, confidences and cameras are those of true boxes. They flicker:
+    every keyframe has its own, and none lasts. And they say what any law of true boxes says, where objects tend to be:
+    where people always emerge at one place, false people stand there too.
 
     A ghost that lies on another box of its class is drawn again, up to TRIES times, then left out, as a detector
-    suppresses duplicates. So fewer come where few places are free: up to 4 a picture hardly any is left out; of 16 a
-    picture 16 come in the dense street, 15 on the streets and in the dart-out, 12 in the cut-in; from an empty pool
-    none. The draws do not depend on what is there: every policy meets the same.
+    suppresses duplicates. So fewer come where few places are free: up to 4 a picture hardly any is left out. None comes
+    at a moment at which the pool has none. The draws do not depend on what is there: every policy meets the same.
     """
 
     def __init__(self, pool: Pool, rate: float, cameras: int, rng: np.random.Generator):
@@ -146,8 +161,8 @@ class Ghosts:
         if not self._mean:
             return NO_ROWS
         serving = self._pool.serving(time_s)
-        draws = self._rng.random((self._rng.poisson(self._mean), TRIES, 4))
-        if not len(serving) or not len(draws):
+        draws = self._rng.random((self._rng.poisson(self._mean * self._pool.plenty(time_s)), TRIES, 4))
+        if not len(draws):
             return NO_ROWS
         picks = serving[(draws[..., 0] * len(serving)).astype(np.int64)]
         tried = self._pool.varied(picks.ravel(), draws[..., 1:].reshape(-1, 3)).reshape(*picks.shape, -1)

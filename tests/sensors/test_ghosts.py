@@ -237,6 +237,16 @@ def test_no_classifier_tells_false_boxes_from_true_ones(world, request):
     assert all(abs(area - 0.5) <= CHANCE for area in areas.values()), areas
 
 
+def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
+    """Scenarios run by the clock: 40% of the false people stood there too early when any moment lent its boxes."""
+    true, false = (
+        [n for episode in dense for n, both in enumerate(episode) for row in both[kind] if row[0] == PEDESTRIAN]
+        for kind in (0, 1)
+    )
+    assert len(false) > 30
+    assert np.mean(np.array(false) < min(true)) < 0.3
+
+
 @pytest.mark.parametrize("world", ["dense", "streets"])
 def test_who_remembers_all_boxes_meets_no_more_copies_among_the_false_ones(world, request):
     """Give or take what chance does: three standard errors of a share of one in ten of some hundred boxes."""
