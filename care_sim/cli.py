@@ -5,6 +5,7 @@ import importlib
 import inspect
 import io
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable, Sequence
@@ -245,13 +246,22 @@ def _in_one_line(parse: Callable[[], Any]) -> Any:
     except SystemExit as end:
         if end.code in (0, None):
             raise
+        if refusal := _refusal(end):
+            raise refusal from None
     raise InvalidInput(_one_line(complaint.getvalue()))
+
+
+def _refusal(end: BaseException | None) -> InvalidInput | None:
+    """What an options' class refused, of which tyro makes a mistake of its own."""
+    while end is not None and not isinstance(end, InvalidInput):
+        end = end.__cause__ or end.__context__
+    return end
 
 
 def _one_line(box: str) -> str:
     """The message that tyro draws as a box: sections between rules, without title, second guesses and help."""
-    lines = [line.strip(" │╭╮╰╯") for line in box.splitlines()][1:]
-    sections = " ".join(lines).replace("─" * 3, "\n").replace("─", "").splitlines()
+    lines = [line.strip(" │╭╮╰╯|+") for line in box.splitlines()][1:]
+    sections = re.sub("─+|-{5,}", "\n", " ".join(lines)).splitlines()
     texts = [" ".join(section.split()).partition(" in care-sim ")[0] for section in sections]
     return "; ".join(text.rstrip(".") for text in texts if text and not text.startswith("For full helptext"))
 

@@ -123,7 +123,7 @@ def check_seed(seed: object, name: str = "seed") -> None:
 def check_path(name: str, value: object) -> None:
     """Raise InvalidInput for what no file or folder can be called."""
     try:
-        path = os.fsencode(value)  # type: ignore[arg-type]
+        path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
     except (TypeError, UnicodeError) as error:
         raise InvalidInput(f"{name} must be a path, got {shown(value)}") from error
     too_long = len(path) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in path.split(b"/"))

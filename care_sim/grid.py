@@ -39,7 +39,7 @@ class AngularGrid:
     rows: int = bounded(32, 2, MOST_ROWS)
     top: float = bounded(float(np.deg2rad(10.67)), -np.pi / 2, np.pi / 2)
     bottom: float = bounded(float(np.deg2rad(-30.67)), -np.pi / 2, np.pi / 2)
-    range_m: float = bounded(50.0, 1, 10_000)
+    range_m: float = bounded(50.0, 1, 1_000_000)
 
     def __post_init__(self) -> None:
         settle(self, " of the grid")

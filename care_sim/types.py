@@ -21,6 +21,7 @@ from care_sim.pinhole import Lenses, PinholeCamera
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
 """The five driving classes shared by both detectors and the scoring (paper, Sec. 5.1)."""
+_LABELS = frozenset(range(len(CLASSES)))
 
 MAX_DETECTIONS = 128
 """Rows of the observation; six cameras in dense traffic saw up to 67 boxes in recorded drives."""
@@ -163,13 +164,12 @@ class Belief:
         """Read an observation of the environments back, without loss. Raises InvalidInput for another."""
         if not (isinstance(observation, Mapping) and all(key in observation for key in OBSERVED)):
             raise InvalidInput("an observation of CARE-Sim's environments is needed, as they give it without wrappers")
-        speed, yaw_rate, acceleration = _read(observation, "ego", (3,)).tolist()
-        (budget,) = _read(observation, "budget", (1,)).tolist()
+        ego, (budget,) = (_numbers(observation, key, size) for key, size in (("ego", 3), ("budget", 1)))
         ranges = _read(observation, "ranges", (None, None)).astype(np.float32, copy=False)
-        if not (0 <= budget <= 1 and ranges.min(initial=0) >= 0):
-            raise InvalidInput("an observation's budget must lie in [0, 1], its ranges must not be below 0")
+        if not (0 <= budget <= 1 and ranges.min(initial=0) >= 0 and ranges.max(initial=0) <= HIGHEST):
+            raise InvalidInput("an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more")
         return cls(
-            Ego(speed, yaw_rate, acceleration),
+            Ego(*ego),
             round(budget * ranges.size),
             ImageDetections.from_rows(_rows(observation, "detections", ImageDetections.COLUMNS)),
             Tracks.from_rows(_rows(observation, "tracks", Tracks.COLUMNS)),
@@ -192,30 +192,39 @@ class Belief:
 
 
 def _read(observation: Observation, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another shape, and for what no
-    sensor says.
-    """
+    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another shape."""
     array = as_array(f"{key} of an observation", observation[key])
     fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
     if not (fits and array.dtype.kind in "iuf"):
         wanted = " x ".join("any" if n is None else str(n) for n in shape)
         raise InvalidInput(f"{key} of an observation must be {wanted} numbers, got {array.dtype} of {array.shape}")
-    if not (array.min(initial=0) >= -HIGHEST and array.max(initial=0) <= HIGHEST):
-        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
     return array
 
 
+def _numbers(observation: Observation, key: str, size: int) -> list[float]:
+    """A vector of an observation. Raises InvalidInput for what no sensor says."""
+    numbers: list[float] = _read(observation, key, (size,)).tolist()
+    if not all(-HIGHEST <= number <= HIGHEST for number in numbers):
+        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+    return numbers
+
+
 def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray[Any]:
-    """A table of an observation. Raises InvalidInput for rows that are neither padding nor of a known class."""
-    rows = _read(observation, key, (None, len(columns)))
-    leads = rows[:, 0]
-    classes = rows[leads >= 0, columns.index("class")]
-    for numbers, least, most in ((leads, -1, HIGHEST), (classes, 0, len(CLASSES) - 1)):
-        if numbers.min(initial=0) < least or numbers.max(initial=0) > most or (numbers != np.floor(numbers)).any():
-            raise InvalidInput(
-                f"{key} of an observation: a row must begin with a whole number, -1 where it is padding, and be of a "
-                f"class 0 to {len(CLASSES) - 1}"
-            )
+    """The rows of a table that are no padding. Raises InvalidInput for those that are neither padding nor of a known
+    class, and for what no sensor says.
+    """
+    table = _read(observation, key, (None, len(columns)))
+    given = table[:, 0] >= 0
+    rows = table[given]
+    if not (rows.min(initial=0) >= -HIGHEST and rows.max(initial=0) <= HIGHEST):
+        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+    leads, labels = rows[:, 0].tolist(), rows[:, columns.index("class")].tolist()
+    padded = (table[~given, 0] == -1).all()
+    if not (padded and all(label in _LABELS for label in labels) and all(lead == int(lead) for lead in leads)):
+        raise InvalidInput(
+            f"{key} of an observation: a row must begin with a whole number, -1 where it is padding, and be of a class "
+            f"0 to {len(CLASSES) - 1}"
+        )
     return rows
 
 
@@ -285,8 +294,7 @@ class Rig:
         belief = Belief.from_observation(observation)
         if belief.ranges.shape != self.grid.shape:
             raise InvalidInput(f"ranges of an observation must be {self.grid.shape}, got {belief.ranges.shape}")
-        numbers = belief.detections.cameras
-        if numbers.min(initial=0) < 0 or numbers.max(initial=-1) >= len(self.cameras):
+        if not all(0 <= number < len(self.cameras) for number in belief.detections.cameras.tolist()):
             raise InvalidInput(f"detections of an observation must be of cameras 0 to {len(self.cameras) - 1}")
         return belief
 

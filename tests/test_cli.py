@@ -313,6 +313,7 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
         ("{} policies >&- 2>&-", 0, ""),
         ("COLUMNS=1 timeout 60 {} run --help > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} policies > /dev/null", 0, ""),
+        ("PYTHONIOENCODING=ascii {} bench --seconds 0", 2, "care-sim: seconds must lie in [0.001, 3600], got 0.0\n"),
     ],
 )
 def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):

@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 
-from care_sim.errors import InvalidInput, MissingExtra, check_known
+from care_sim.errors import InvalidInput, MissingExtra, check_known, shown
 from care_sim.perception.cluster import ClusterDetector
 from care_sim.perception.detectors import Detector, ReturnsProxy
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
@@ -52,7 +52,7 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     except (InvalidInput, MissingExtra):
         raise
     except (Exception, SystemExit) as error:
-        raise BrokenDetector(f"detector {name} refuses {parameters}: {_in_a_line(error)}") from error
+        raise BrokenDetector(f"detector {name} refuses {shown(parameters)}: {_in_a_line(error)}") from error
     if not callable(getattr(detector, "detect", None)):
         raise BrokenDetector(f"detector {name} is no PointDetector: {type(detector).__name__} has no method detect")
     return PointsOnly(name, detector, sensor_height_m)

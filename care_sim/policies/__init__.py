@@ -97,7 +97,7 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
         raise
     except Exception as error:
         raise BrokenPolicy(
-            f"policy {name} refuses {parameters or 'to start'}: {type(error).__name__}: {error}"
+            f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: {type(error).__name__}: {error}"
         ) from error
     if not isinstance(policy, Policy):
         raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from care_sim.errors import InvalidInput, check_known, shown
+from care_sim.errors import InvalidInput, check_known, shortened
 from care_sim.film import Film
 from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
 from care_sim.streets.recording import record
@@ -88,7 +88,7 @@ class Recorded:
         return own
 
 
-LONGEST_NUMBER = 20
+LONGEST_NUMBER = 40
 """Digits that are read of a number of scenes."""
 SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
@@ -121,7 +121,9 @@ def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     if len(names) == 1 and names[0].isdecimal():
         count = int(names[0][:LONGEST_NUMBER])
         if not 1 <= count <= len(scenes):
-            raise InvalidInput(f"scenes must be a number from 1 to {len(scenes)} or names, got {shown(names[0])}")
+            raise InvalidInput(
+                f"scenes must be a number from 1 to {len(scenes)} or names, got {shortened(names[0], LONGEST_NUMBER)}"
+            )
         return scenes[:count]
     known = {scene.name: scene for scene in scenes}
     for name in names:

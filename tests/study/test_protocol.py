@@ -214,7 +214,7 @@ def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
         (["--scenes", "street-9"], "unknown scene 'street-9'"),
         (["--policies", "nobody"], "unknown policy 'nobody'"),
         (["--budgets", "1.5"], "budget"),
-        (["--floor-seeds", "0"], "floor_seeds must be a whole number >= 1, got 0"),
+        (["--floor-seeds", "0"], "floor_seeds must be a whole number >= 1 and <= 1000, got 0"),
         (["--detector", "yolo"], "unknown detector 'yolo'"),
         (["--engine", "bullet"], "engine cannot be changed in the open loop"),
         (["--camera-latency", "1", "--camera-latencies", "0", "1"], "give camera_latency one value or several"),
