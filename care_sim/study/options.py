@@ -43,14 +43,14 @@ def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
     """The seeds that one number, or several, stand for. Raises InvalidInput for less than one, and for more than a
     study can hold.
     """
-    from care_sim.study.task import check_size
+    from care_sim.study.task import MOST_TASKS
 
-    if len(numbers) != 1:
-        return numbers
-    if numbers[0] < 1:
-        raise InvalidInput(f"seeds must be a number of seeds >= 1 or a list of seeds, got {shown(numbers[0])}")
-    check_size(numbers[0])
-    return range(numbers[0])
+    if len(numbers) == 1 and not 1 <= numbers[0] <= MOST_TASKS:
+        raise InvalidInput(
+            f"seeds must be a number of seeds from 1 to {MOST_TASKS:,}, whose rows a study holds in memory, "
+            f"or a list of seeds, got {shown(numbers[0])}"
+        )
+    return range(numbers[0]) if len(numbers) == 1 else numbers
 
 
 def parameters(texts: Sequence[str]) -> "Parameters":

@@ -16,7 +16,7 @@ from care_sim.sources.nuscenes.cameras import CHANNELS
 
 FAULTS = {
     "false_negative_rate": st.floats(0, 1),
-    "false_negative_per_m": st.floats(0, 1e6),
+    "false_negative_per_m": st.floats(0, 1),
     "false_negative_burst": st.integers(1, 1000),
     "false_positive_rate": st.floats(0, 64),
     "camera_latency": st.integers(0, 50),
