@@ -8,11 +8,14 @@ from made_rows import STUDY, rows
 
 from care_sim.cli import main
 from care_sim.errors import InvalidInput
-from care_sim.study.config import grid
+from care_sim.evaluation.sightings import PRESENCES
+from care_sim.study.config import PLAIN_FIELDS, grid
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import EPISODES
+from care_sim.study.kinds import _PARAMETERS, EPISODES, KINDS, PLAYS
+from care_sim.study.play_config import PLAY_FIELDS, play_grid
 from care_sim.study.report import JOURNAL, conduct, write_report
 from care_sim.study.rows import read_notes, read_rows, write_rows
+from care_sim.study.scenes import source_of
 from care_sim.study.studies import STUDIES
 from care_sim.study.takeover import check_results
 
@@ -157,3 +160,21 @@ def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
         policy_parameters=(("k_safe", 1.0),),
     )
     check_results(tmp_path, asked, SWEEP)
+
+
+def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tmp_path):
+    streets = source_of("streets")
+    by = {name: play_grid(streets, streets.scenes()[:2], ["care"], [0.1], presence=name) for name in PRESENCES}
+    for own, other in (PRESENCES, PRESENCES[::-1]):
+        write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
+        check_results(tmp_path, by[own], STUDIES["protocol"])
+        check_results(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
+        with pytest.raises(InvalidInput, match="; 2 of them, the first street-0000-straight care"):
+            check_results(tmp_path, by[other], STUDIES["protocol"])
+
+
+def test_every_parameter_is_a_column_that_is_read():
+    """What a reader drops is no part of what a row was asked with."""
+    known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in KINDS}
+    assert {*PLAIN_FIELDS} <= known[EPISODES.file]
+    assert {*PLAY_FIELDS} | (_PARAMETERS - {*PLAIN_FIELDS}) <= known[PLAYS.file]
