@@ -109,6 +109,41 @@ def test_a_study_that_cannot_be_shown_replaces_nothing(folder, monkeypatch):
         conduct(short(), folder, 1)
 
 
+MOODY = """
+from pathlib import Path
+from care_sim.policies.history import History
+
+class Moody(History):
+    def demand(self, belief):
+        if (Path(__file__).parent / "mood.txt").read_text() == "bad":
+            raise RuntimeError("no")
+        return super().demand(belief)
+"""
+
+
+def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
+    """The same command after a file of the policy has changed, by which it fails."""
+    install("moody_policy", MOODY, moody="Moody")
+    mood, out = tmp_path / "moody_policy" / "mood.txt", tmp_path / "out"
+    mood.write_text("good")
+    configs = short(("history", "moody"))
+    assert conduct(configs, out, workers=1) == []
+    before = held(out)
+    del before[JOURNAL]
+    mood.write_text("bad")
+    capsys.readouterr()
+    (failure,) = conduct(short(("history", "moody")), out, workers=1)
+    assert failure.config.policy == "moody"
+    assert [line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line] == [
+        f"the results in {out} stay as they were: 1 of their 2 episodes, the first dartout moody 0.1, would be gone, "
+        "since this time only 1 episode did not fail; the journal keeps what was played: mend what failed, or "
+        "--force to replace them"
+    ]
+    assert {name: content for name, content in held(out).items() if name != JOURNAL} == before
+    conduct(short(("history", "moody")), out, workers=1, force=True)
+    assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
+
+
 def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
     with Journal(tmp_path / JOURNAL, "faults") as journal:
         journal.append({"digest": "a"})
