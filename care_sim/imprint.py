@@ -32,7 +32,7 @@ def imprint(*parts: Content | tuple[Content, ...]) -> bytes:
 
 def _imprint(part: object) -> bytes:
     if isinstance(part, str):
-        text = part.encode()
+        text = part.encode(errors="surrogatepass")
         return b"text %d " % len(text) + text
     if isinstance(part, tuple):
         return b"tuple %d " % len(part) + imprint(*part)

@@ -16,12 +16,14 @@ from care_sim.errors import InvalidInput
 
 def streams(entropy: tuple[int, ...], count: int, secret: str = "") -> list[np.random.SeedSequence]:
     """`count` streams of an episode; `entropy` is its seed, and in the open loop a number of its scene's."""
-    return np.random.SeedSequence(closed(entropy, secret) if secret else entropy).spawn(count)
+    return np.random.SeedSequence(closed("episode", entropy, secret) if secret else entropy).spawn(count)
 
 
-def closed(entropy: tuple[int, ...], secret: str) -> int:
-    """256 bits of an episode and a secret (HMAC-SHA-256), of which neither can be told."""
-    message = " ".join(str(int(number)) for number in entropy)
+def closed(what: str, entropy: tuple[int, ...], secret: str) -> int:
+    """256 bits of what is drawn, its seed and a secret (HMAC-SHA-256), of which neither can be told. An episode and a
+    street of one seed have nothing in common.
+    """
+    message = " ".join([what, *(str(int(number)) for number in entropy)])
     return int.from_bytes(hmac.digest(secret.encode(), message.encode(), "sha256"))
 
 

@@ -13,6 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from care_sim.film import NO_ANNOTATIONS, Annotations
 from care_sim.imprint import STEP, imprint
 from care_sim.streets.recording import record
 from care_sim.streets.street import make_street
@@ -86,9 +87,17 @@ def test_whole_numbers_are_taken_exactly(values, place):
 
 def test_parts_do_not_run_into_each_other():
     assert imprint([1, 2], [3]) != imprint([1], [2, 3]) != imprint([1, 2, 3])
+    assert imprint("a\udcff") != imprint("a?")
     assert imprint("ab", "c") != imprint("a", "bc")
     assert imprint(((1, 2), 3)) != imprint((1, (2, 3)))
     assert imprint(np.zeros((2, 3), int)) != imprint(np.zeros((3, 2), int))
+
+
+def test_who_is_hidden_at_the_start_of_a_film_counts():
+    film = some_keyframes(make_street(1))
+    behind = Annotations(np.array([900]), np.array([0]), np.array([[9.0, 2.0, 0.0, 4.0, 2.0, 1.5, 0.0]]))
+    farther = replace(behind, boxes=behind.boxes + 0.01)
+    assert len({film_hash(replace(film, hidden=hidden)) for hidden in (NO_ANNOTATIONS, behind, farther)}) == 3
 
 
 def test_the_step_is_far_from_what_errs_and_from_what_counts():

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.errors import InvalidInput
-from care_sim.streams import check_secret, streams
+from care_sim.streams import check_secret, closed, streams
 
 
 def states(sequences):
@@ -21,12 +21,18 @@ def test_without_a_secret_the_streams_are_those_of_the_seed(seed, scene):
 
 @given(st.integers(0, 2**63 - 1), st.text(st.characters(codec="ascii"), min_size=1))
 def test_a_secret_makes_all_of_them_others_and_the_same_ones_again(seed, secret):
-    public, closed = states(streams((seed,), 5)), states(streams((seed,), 5, secret))
-    assert closed == states(streams((seed,), 5, secret))
-    drawn = [*map(tuple, public), *map(tuple, closed)]
+    public, hidden = states(streams((seed,), 5)), states(streams((seed,), 5, secret))
+    assert hidden == states(streams((seed,), 5, secret))
+    drawn = [*map(tuple, public), *map(tuple, hidden)]
     assert len(set(drawn)) == len(drawn)
     for other in (streams((seed + 1,), 5, secret), streams((seed,), 5, secret + "x"), streams((seed, 0), 5, secret)):
-        assert not {*map(tuple, closed)} & {*map(tuple, states(other))}
+        assert not {*map(tuple, hidden)} & {*map(tuple, states(other))}
+
+
+def test_a_street_and_an_episode_of_one_seed_and_secret_have_no_root_in_common():
+    assert closed("street", (3,), "key") != closed("episode", (3,), "key")
+    root = np.random.SeedSequence(closed("episode", (3,), "key"))
+    assert states(streams((3,), 2, "key")) == states(root.spawn(2))
 
 
 @pytest.mark.parametrize("secret", [7, b"0d5", ["0d5"], "0d5\ud800", "0d5ü"])

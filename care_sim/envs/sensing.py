@@ -11,7 +11,7 @@ from care_sim.allocation import budget_cells, fired_cells
 from care_sim.conditions import Conditions
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.envs.truth import EpisodeTruth, Loop
-from care_sim.errors import InvalidInput, check_seed, shown
+from care_sim.errors import InvalidInput, check_flag, check_seed, shown
 from care_sim.floor import Floor
 from care_sim.grid import AngularGrid, Cells
 from care_sim.pinhole import PinholeCamera
@@ -45,8 +45,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         scoring_info: bool,
     ):
         check_secret(secret)
-        if not isinstance(scoring_info, bool):
-            raise InvalidInput(f"scoring_info must be True or False, got {scoring_info!r}")
+        check_flag("scoring_info", scoring_info)
+        if not cameras:
+            raise InvalidInput("cameras must be at least one, got none: observations tell of each what it sees")
         grid = AngularGrid()
         dead_cells(grid, conditions.lidar_dead_rows)
         self.conditions, self.scoring_info = conditions, scoring_info

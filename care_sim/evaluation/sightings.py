@@ -29,7 +29,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_number
+from care_sim.errors import InvalidInput, check_number, shown
 from care_sim.film import NO_ANNOTATIONS, Annotations
 from care_sim.frames import Floats
 from care_sim.grid import Cells
@@ -122,7 +122,7 @@ class Sightings:
 def check_presence(presence: object) -> None:
     """Raise InvalidInput for what is none of `PRESENCES`."""
     if not isinstance(presence, str) or presence not in PRESENCES:
-        raise InvalidInput(f"presence must be {' or '.join(map(repr, PRESENCES))}, got {presence!r}")
+        raise InvalidInput(f"presence must be {' or '.join(map(repr, PRESENCES))}, got {shown(presence)}")
 
 
 def _appearing(frames: ObjectFrames) -> Cells:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from care_sim.errors import check_whole, unknown
+from care_sim.errors import check_known, check_whole
 from care_sim.frames import Floats, Frame
 from care_sim.policies.base import Policy
 from care_sim.streams import streams
@@ -32,8 +32,7 @@ class SeedFinder(Policy):
     def __init__(self, rig: Rig, scenario: str = "dense", seeds: int = 30):
         from care_sim.scenarios import SCENARIOS
 
-        if scenario not in SCENARIOS:
-            raise unknown("scenario", scenario, SCENARIOS)
+        check_known("scenario", scenario, SCENARIOS)
         check_whole("seeds", seeds, 1, 10**6)
         super().__init__(rig)
         self._scenario, self._seeds = scenario, seeds

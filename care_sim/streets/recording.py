@@ -51,7 +51,7 @@ def street_film(seed: int, secret: str = "") -> Film:
 def _street_film(seed: int, secret: str) -> Film:
     if not secret:
         return record(make_street(seed))
-    return record(replace(make_street(closed((seed,), secret)), name=f"street-{seed:04d}-secret"))
+    return record(replace(make_street(closed("street", (seed,), secret)), name=f"street-{seed:04d}-secret"))
 
 
 class _Stage:

@@ -1,8 +1,15 @@
-"""The files that decide what an installed policy or detector does, as far as distribution and code name them."""
+"""The files that decide what an installed policy or detector does, as far as distribution and code name them.
 
+Not seen are names that code puts together while it plays, or reads from elsewhere.
+"""
+
+import ast
 import inspect
+import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import fields, is_dataclass
+from functools import cache
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from os import PathLike
@@ -12,7 +19,12 @@ from typing import Any
 
 LONGEST_PATH = 4096
 """Characters of a path on Linux."""
+DEEPEST = 8
+"""Values within values that are looked through for names of files."""
 _OF_INSTALLERS = (".dist-info", ".egg-info")
+_SCRIPTS = (["bin"], ["Scripts"])
+_OF_THE_SYSTEM = tuple(map(Path, ("/proc", "/sys", "/dev")))
+"""What is no file of anybody, and another one at every look."""
 
 
 def shipped(entry: EntryPoint) -> dict[str, Path] | None:
@@ -52,15 +64,61 @@ def named(entry: EntryPoint) -> dict[str, Path]:
     }
 
 
-def paths(value: object, *places: Path) -> Iterator[Path]:
-    """What a value names of files and folders that are there, from here or from further places."""
+def written(files: Collection[Path]) -> dict[str, Path]:
+    """The further files that texts in the code among these name, wherever they stand in it: relative names from here
+    and from the code. A folder that a text happens to name is left out.
+    """
+    own = {file.resolve() for file in files}
+    found = {
+        f"{source.name} {text} {number}": path
+        for source in files
+        if source.suffix == ".py"
+        for text in _file_names(source)
+        for number, path in enumerate(paths(text, source.parent))
+    }
+    return {name: path for name, path in found.items() if path.is_file() and path.resolve() not in own}
+
+
+def paths(value: object, *places: Path, depth: int = DEEPEST) -> Iterator[Path]:
+    """What a value names of files and folders that are there, from here or from further places; of structures what
+    they hold.
+    """
+    if isinstance(value, str | PathLike):
+        yield from _named_by(value, places)
+    elif depth:
+        for each in _held(value):
+            yield from paths(each, *places, depth=depth - 1)
+
+
+def _held(value: object) -> Iterable[object]:
     if isinstance(value, list | tuple):
-        for each in value:
-            yield from paths(each, *places)
-    elif isinstance(value, str | PathLike) and 0 < len(str(value)) <= LONGEST_PATH:
-        for path in dict.fromkeys([Path(value), *(place / value for place in places)]):
-            if _exists(path):
+        return value
+    if isinstance(value, set | frozenset):
+        return sorted(value, key=repr)
+    if isinstance(value, dict):
+        return [*value.keys(), *value.values()]
+    if is_dataclass(value) and not isinstance(value, type):
+        return [getattr(value, field.name, None) for field in fields(value)]
+    return ()
+
+
+def _named_by(value: "str | PathLike[str]", places: Iterable[Path]) -> Iterator[Path]:
+    name = os.path.expanduser(os.path.expandvars(str(value)))
+    if 0 < len(name) <= LONGEST_PATH:
+        for path in dict.fromkeys([Path(value), Path(name), *(place / name for place in places)]):
+            if _exists(path) and not any(path.is_relative_to(place) for place in _OF_THE_SYSTEM):
                 yield path
+
+
+@cache
+def _file_names(source: Path) -> tuple[str, ...]:
+    """The texts in a file of code that look like a file's name, once a process, which has it loaded."""
+    try:
+        tree = ast.parse(source.read_bytes())
+    except (OSError, ValueError, SyntaxError, RecursionError):
+        return ()
+    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    return tuple(sorted(text for text in texts if text.isprintable() and Path(text).suffix))
 
 
 def _exists(path: Path) -> bool:
@@ -80,10 +138,11 @@ def _listed(entry: EntryPoint) -> dict[str, Path]:
 
 
 def _counts(name: Path) -> bool:
-    """Whether a file is the author's own: not an installer's note, not what Python and Numba keep beside code."""
+    """Whether a file is the author's own: no installer's note or script, not what Python and Numba keep beside code."""
+    inner = [part for part in name.parts if part != ".."]
     return not (
-        name.parts[0] in ("..", "__pycache__")
-        or "__pycache__" in name.parts
+        "__pycache__" in inner
+        or (name.parts[0] == ".." and inner[:1] in _SCRIPTS)
         or name.parts[0].endswith(_OF_INSTALLERS)
         or name.suffix in (".pyc", ".pth")
         or name.name.startswith("__editable__")

@@ -32,13 +32,14 @@ def _is_parameter(kind: pa.DataType) -> bool:
     return _is_text(kind) or _is_number(kind) or pa.types.is_boolean(kind) or _is_list_of(_is_parameter, kind)
 
 
+_ANY = "text, numbers, flags or lists of them"
 KINDS: dict[str, Callable[[pa.DataType], bool]] = {
     "text": _is_text,
     "true or false": pa.types.is_boolean,
     "whole numbers": pa.types.is_integer,
     "numbers": _is_number,
     "lists of whole numbers": lambda kind: _is_list_of(pa.types.is_integer, kind),
-    "text, numbers, flags or lists of them": _is_parameter,
+    _ANY: _is_parameter,
 }
 
 
@@ -75,7 +76,6 @@ class Column:
             yield f"must hold {self.kind} from {self.least:g} to {self.most:g}"
 
 
-_ANY = "text, numbers, flags or lists of them"
 TEXT, FLAG = Column("text"), Column("true or false")
 COUNT = Column("whole numbers", least=0)
 SEED = Column("whole numbers", least=0, most=math.inf)

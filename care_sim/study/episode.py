@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 
 import care_sim
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, one_line
 from care_sim.imprint import imprint
 from care_sim.loop import ClosedLoop
 from care_sim.policies.base import Policy
@@ -40,9 +40,9 @@ def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
     try:
         return play(*arguments)
     except InvalidInput as error:
-        return _one_line(str(error))
+        return one_line(str(error))
     except (Exception, SystemExit) as error:
-        return _one_line(f"{type(error).__name__}: {error}") + _place(error)
+        return one_line(f"{type(error).__name__}: {error}").removesuffix(":") + _place(error)
 
 
 def run_episode(config: EpisodeConfig) -> Row:
@@ -115,10 +115,6 @@ def _place(error: BaseException) -> str:
     """Where it was raised, for whoever has to find it in a file of their own."""
     frames = extract_tb(error.__traceback__)
     return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split()).removesuffix(":")
 
 
 def peak_rss_mb() -> float:

@@ -53,7 +53,9 @@ _PLAYS = Schema(
     | {"budget": SHARE, "keyframes": COUNT, "floor_seed": COUNT, "ttfds": Column("lists of whole numbers", least=0)}
     | dict.fromkeys((*plays.SUMS, "tracks", "explained"), SUM)
     | dict.fromkeys(("differing_keyframes", "differing_cells"), with_gaps(COUNT)),
-    _ORIGIN | dict.fromkeys(("recording", "camera_detections"), with_gaps(TEXT)),
+    _ORIGIN
+    | dict.fromkeys(("recording", "camera_detections", "presence"), with_gaps(TEXT))
+    | {"emerging": with_gaps(COUNT)},
     plays.SUMS,
 )
 EPISODES = Kind(

@@ -146,7 +146,7 @@ def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def film_hash(film: Film) -> str:
-    """A hash over what a film shows, measured numbers rounded (`care_sim.imprint`).
+    """A hash over what a film shows and who is hidden at its start, measured numbers rounded (`care_sim.imprint`).
 
     Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a round body by
     iteration, which makes a millimetre of a last bit.
@@ -158,6 +158,8 @@ def film_hash(film: Film) -> str:
         content.update(imprint(shot.time_s, shot.token, astuple(shot.ego)))
         content.update(imprint(seen.objects, seen.classes, seen.boxes, sights.detections.rows(), sights.objects))
         content.update(imprint(cloud.cells, cloud.objects))
+    hidden = film.hidden
+    content.update(imprint(hidden.objects, hidden.classes, hidden.boxes))
     return content.hexdigest()[:16]
 
 

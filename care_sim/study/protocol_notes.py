@@ -35,7 +35,7 @@ def played(plays: Plays) -> str:
 
 def by_both_counts(scenes: Collection[Row]) -> str:
     """How many events there are by the other presence, given one row of every scene; nothing where rows do not tell."""
-    if any("emerging" not in row for row in scenes):
+    if any(row.get("emerging") is None for row in scenes):
         return ""
     emerging = sum(row["emerging"] for row in scenes)
     if any(row.get("presence") == VISIBLE for row in scenes):

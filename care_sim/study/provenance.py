@@ -40,8 +40,8 @@ def code_digest() -> str:
 
 def policy_digest(policy: str) -> str | None:
     """Hash of the files that decide what an installed policy does: those of its distribution and package, and those
-    that it names as defaults (`care_sim.study.belongings`). Empty for a built-in policy, None where there are no files
-    to read.
+    that its defaults, constants and code name (`care_sim.study.belongings`). Empty for a built-in policy, None where
+    there are no files to read.
     """
     return "" if policy in BUILT_IN else _entry_digest(entries()[policy])
 
@@ -89,7 +89,8 @@ def _entry_digest(entry: EntryPoint) -> str | None:
     if files is None:
         return None
     shipped = [f"{name} {_loaded(file) if file.suffix in CODE else _content(file)}" for name, file in files.items()]
-    named = [(name, file_digest(path)) for name, path in belongings.named(entry).items()]
+    further = belongings.named(entry) | belongings.written(files.values())
+    named = [(name, file_digest(path)) for name, path in further.items()]
     if any(digest is None for _, digest in named):
         return None
     return _combined([*sorted(shipped), *(f"{name} {digest}" for name, digest in named)])

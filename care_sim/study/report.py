@@ -23,7 +23,7 @@ from care_sim.study.rows import check_columns, read_notes, read_rows, write_colu
 from care_sim.study.runner import Failure
 from care_sim.study.studies import STUDIES, SWEEP, Study, study_of
 from care_sim.study.table import unmarked
-from care_sim.study.takeover import check_journal, check_kind, check_results
+from care_sim.study.takeover import check_journal, check_kind, check_results, lost
 from care_sim.study.task import Row, Task
 from care_sim.text import printable
 
@@ -42,7 +42,8 @@ def conduct(
 
     Writes `journal.jsonl` as they finish; then, if there are any, `config.json` with the configurations and what
     failed, the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`, `tables.tex`
-    and the figures of `study`; the folder is this study's until all that is written. Raises InvalidInput for no task
+    and the figures of `study`; the folder is this study's until all that is written. Where tasks failed and the folder
+    holds rows that were therefore not obtained, these files stay, unless `force`. Raises InvalidInput for no task
     or no worker, when the folder cannot be written, and unless `force` when it holds another study, or rows of this one
     that are none of `configs`.
     """
@@ -56,9 +57,12 @@ def conduct(
         _check(folder, configs, study, force, journal)
         _say_what_is_found(configs, journal, folder, kind.unit)
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
-        rows = [journal[config.key] for config in configs if config.key in journal]
-        if rows:
-            _write(rows, configs, folder, study, failures)
+        played = [config for config in configs if config.key in journal]
+        left = lost(folder, played, study) if failures and not force else ""
+        if left:
+            print(left, file=sys.stderr)
+        elif played:
+            _write([journal[config.key] for config in played], configs, folder, study, failures)
     return failures
 
 

@@ -33,7 +33,8 @@ def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
     path = folder / study.kind.file
     if not path.is_file():
         return
-    rows, there = read_rows(path, study.kind.schema.lenient), read_notes(path)[0] or SWEEP.name
+    there = read_notes(path)[0] or SWEEP.name
+    rows, gone = _rows_and_gone(path, configs, study)
     unit = study.kind.unit.removesuffix("s")
     here, wanted = counted(len(rows), unit), counted(len(configs), unit)
     if there != study.name:
@@ -41,13 +42,25 @@ def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
             f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, would replace: "
             f"{WAYS_OUT}"
         )
-    asked = {_identity(config.row()) for config in configs}
-    gone = [row for row in rows if _identity(row) not in asked]
     if gone:
         raise InvalidInput(
             f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first {_label(gone[0])}, would be "
             f"gone from the study {study.name} that is asked for, {wanted}: {WAYS_OUT}"
         )
+
+
+def lost(folder: Path, played: Sequence[Task], study: Study) -> str:
+    """In one line, which rows of the folder are not among those played, where others failed; empty for none."""
+    path = folder / study.kind.file
+    rows, gone = _rows_and_gone(path, played, study) if path.is_file() else ([], [])
+    unit = study.kind.unit.removesuffix("s")
+    if not gone:
+        return ""
+    return (
+        f"the results in {folder} stay as they were: {len(gone)} of their {counted(len(rows), unit)}, the first "
+        f"{_label(gone[0])}, would be gone, since this time only {counted(len(played), unit)} did not fail; the "
+        "journal keeps what was played: mend what failed, or --force to replace them"
+    )
 
 
 def check_journal(folder: Path, journal: Journal, study: Study) -> None:
@@ -57,6 +70,12 @@ def check_journal(folder: Path, journal: Journal, study: Study) -> None:
             f"{folder} holds the unfinished study {_joined(journal.studies)}, {counted(len(journal), 'row')}, beside "
             f"which the study {study.name} would be played: {WAYS_OUT}"
         )
+
+
+def _rows_and_gone(path: Path, configs: Sequence[Task], study: Study) -> tuple[list[Row], list[Row]]:
+    """The rows of a file, and those that are none of `configs`."""
+    rows, own = read_rows(path, study.kind.schema.lenient), {_identity(config.row()) for config in configs}
+    return rows, [row for row in rows if _identity(row) not in own]
 
 
 def _identity(row: Row) -> frozenset[tuple[str, object]]:

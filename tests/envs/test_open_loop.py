@@ -11,9 +11,11 @@ from gymnasium.utils.env_checker import check_env
 
 import care_sim
 from care_sim.envs import OPEN_LOOP
+from care_sim.envs.open_loop import FilmEnv
 from care_sim.errors import InvalidInput
 from care_sim.evaluation.recall import score
 from care_sim.evaluation.sightings import Sightings
+from care_sim.film import Film
 from care_sim.streets.recording import street_film
 
 EXPLAINED = ("symmetric and normalized Box action space", "unconventional shape")
@@ -233,3 +235,8 @@ def test_recordings_that_are_not_there_are_named(drive, arguments, complaint):
     arguments = arguments | {"source": arguments["source"].format(drive=drive)}
     with pytest.raises(InvalidInput, match=complaint):
         gymnasium.make("CARE-Replay-v0", disable_env_checker=True, **arguments)
+
+
+def test_a_film_without_cameras_is_refused_in_one_line():
+    with pytest.raises(InvalidInput, match="cameras must be at least one, got none"):
+        FilmEnv(Film("bare", (), 1.8, 0.5, ()))

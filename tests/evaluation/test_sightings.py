@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.errors import InvalidInput
-from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings
+from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings, check_presence
 from care_sim.film import Annotations
 from care_sim.frames import turned
 from care_sim.types import CLASSES
@@ -196,3 +196,10 @@ def test_with_nobody_hidden_the_two_presences_agree_and_hiding_takes_events_alon
 def _without(annotations, others):
     kept = ~np.isin(annotations.objects, others.objects)
     return Annotations(annotations.objects[kept], annotations.classes[kept], annotations.boxes[kept])
+
+
+def test_a_presence_that_is_none_is_shown_in_a_short_line():
+    with pytest.raises(InvalidInput) as refused:
+        check_presence("x\n\x1b" * 9999)
+    assert len(str(refused.value)) < 200
+    assert str(refused.value).isprintable()

@@ -103,6 +103,7 @@ def test_all_leaves_controls_out_unless_they_are_named():
     ("parameters", "message"),
     [
         ({"scenario": "moon"}, "unknown scenario 'moon'"),
+        ({"scenario": ["moon"]}, "unknown scenario"),
         ({"seeds": 0}, "seeds must be"),
         ({"seeds": 1.5}, "seeds must"),
     ],

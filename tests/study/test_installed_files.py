@@ -1,8 +1,12 @@
 """What an installed policy or detector ships, or names as a default, counts in the key of a row."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from care_sim.policies.installed import entries
+from care_sim.study import belongings
 from care_sim.study.config import EpisodeConfig
 from care_sim.study.journal import Journal
 from care_sim.study.kinds import EPISODES
@@ -94,6 +98,80 @@ def test_a_file_that_changes_while_a_study_runs_fails_what_met_it_late(site, tmp
     assert {failure.reason for failure in failures} == {
         "the worker runs another version of care-sim or of the policy, or their files changed while the study ran"
     }
+
+
+ELSEWHERE = {
+    "a default in the home folder": ("", 'path="~/weights.npz"', "Path(path).expanduser()"),
+    "a default below a variable": ("", 'path="$WEIGHTS/weights.npz"', "os.path.expandvars(path)"),
+    "a constant table": ('PATHS = {"a": Path.home() / "weights.npz"}', "n=1", 'self.PATHS["a"]'),
+    "a default table": ("", 'paths={"a": Path.home() / "weights.npz"}', 'paths["a"]'),
+    "a default configuration": ("", "config=Config()", "config.path"),
+    "a configuration made in the body": ("", "config=None", "Path((config or Late()).path).expanduser()"),
+    "a text in the body": ("", "path=None", 'path or "weights.npz"'),
+}
+CONFIGS = """
+import os
+from dataclasses import dataclass
+@dataclass
+class Config:
+    path: Path = Path.home() / "weights.npz"
+@dataclass
+class Late:
+    path: str = "~/weights.npz"
+"""
+
+
+@pytest.mark.parametrize("form", ELSEWHERE)
+def test_weights_that_lie_elsewhere_count_by_whatever_names_them(form, install, tmp_path, monkeypatch):
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("WEIGHTS", str(home))
+    monkeypatch.chdir(home)
+    write(home, 1)
+    constant, parameter, opened = ELSEWHERE[form]
+    install(
+        "mine_policy", HEAD + CONFIGS + BODY.format(constant=constant, parameter=parameter, opened=opened), mine="Mine"
+    )
+    config = EpisodeConfig("dartout", "mine")
+    before = config.digest()
+    write(home, 2)
+    assert config.digest() != before
+    write(home, 1)
+    assert config.digest() == before
+
+
+def test_a_text_in_code_names_no_folder_and_nothing_of_the_system(install, tmp_path, monkeypatch):
+    install("mine_policy", HEAD + BODY.format(constant="", parameter="n=1", opened='"/proc/self/stat.d"'), mine="Mine")
+    source = tmp_path / "mine_policy" / "mine_policy.py"
+    source.write_text(source.read_text() + "SEEN = ('/proc/self/status', {'a': ['/dev/null']})\nX = 'runs.d'\n")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs.d").mkdir()
+    files = belongings.shipped(entries()["mine"]).values()
+    assert belongings.written(files) == {}
+    assert [*belongings.paths(("/proc/self/status", {"a": ["/dev/null"]}))] == []
+
+
+def test_structures_that_hold_themselves_end():
+    cycle = {}
+    cycle["a"] = [cycle, "/"]
+    assert set(belongings.paths(cycle)) == {Path("/")}
+
+
+def test_data_files_of_a_wheel_count_and_scripts_do_not(site, tmp_path):
+    folder = site("nothing but code")
+    data, script = tmp_path / "share" / "mine" / "table.csv", tmp_path / "bin" / "mine"
+    for file in (data, script):
+        file.parent.mkdir(parents=True)
+        file.write_text("1")
+    info = folder / "mine_policy-1.5.dist-info"
+    listed = ("mine_policy.py", "weights.npz", "../share/mine/table.csv", "../bin/mine")
+    (info / "RECORD").write_text("".join(f"{name},,\n" for name in listed))
+    before = policy_digest("mine")
+    script.write_text("#!/elsewhere")
+    assert policy_digest("mine") == before
+    data.write_text("2")
+    assert policy_digest("mine") != before
 
 
 def test_all_files_of_the_distribution_count_wherever_they_lie(site):

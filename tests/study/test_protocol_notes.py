@@ -3,11 +3,13 @@
 from made_plays import found, play, study
 from rich.console import Console
 
+from care_sim.study.kinds import PLAYS
 from care_sim.study.latex import escaped
 from care_sim.study.protocol_closing import protocol_closing
 from care_sim.study.protocol_notes import BY_EVENTS, NO_INTERVAL
 from care_sim.study.protocol_tables import protocol_tables
-from care_sim.study.report import print_report, write_report
+from care_sim.study.report import print_report, reported, write_report
+from care_sim.study.rows import write_rows
 from care_sim.study.studies import STUDIES
 from care_sim.study.table import Bold
 
@@ -102,3 +104,21 @@ def test_the_notes_tell_the_events_by_both_counts_where_the_rows_do():
     )
     alone = protocol_closing([play("a", "full", [0], [1], emerging=1)])
     assert "1 object hidden within range at scene start is no event" in alone[0]
+
+
+def test_what_a_folder_keeps_says_the_same_of_presence_and_emerging(tmp_path):
+    for number, more in enumerate(({}, {"emerging": 2}, {"emerging": 2, "presence": "visible"})):
+        rows = study({"care": (5, 5), "history": (4, 5)}, scenes=6, events=20, **more)
+        (tmp_path / str(number)).mkdir()
+        write_rows(rows, tmp_path / str(number) / PLAYS.file, "protocol")
+        kept, protocol, _ = reported(tmp_path / str(number))
+        assert [str(table.markdown()) for table in protocol.tables(kept)] == [
+            str(table.markdown()) for table in protocol_tables(rows)
+        ]
+        assert ("presence visible" in protocol.tables(kept)[0].title) == ("presence" in more)
+
+
+def test_rows_of_which_some_do_not_tell_the_other_count_tell_none():
+    rows = study({"care": (5, 5), "history": (4, 5)}, scenes=6, events=20, emerging=2)
+    some = [row | {"emerging": None} if row["scene"] == "scene 001" else row for row in rows]
+    assert "hidden within range" not in " ".join(tables(some)[CONTRASTS].notes)

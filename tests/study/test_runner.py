@@ -11,8 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from care_sim.errors import InvalidInput
 from care_sim.study.config import EpisodeConfig, grid
-from care_sim.study.episode import run_episode, trace
+from care_sim.study.episode import answer, run_episode, trace
 from care_sim.study.journal import Journal
 from care_sim.study.kinds import EPISODES
 from care_sim.study.report import JOURNAL, conduct
@@ -161,6 +162,14 @@ def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
     assert (third_party.parent / "killed").exists()
     assert len((tmp_path / JOURNAL).read_text().splitlines()) == 4
     assert Counter(audience.ended) == Counter((config, True) for config in configs)
+
+
+def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
+    def fail(error):
+        raise error
+
+    assert answer(fail, InvalidInput("no\n\x1b[2J idea")) == r"no \x1b[2J idea"
+    assert answer(fail, RuntimeError()).startswith("RuntimeError (test_runner.py, line ")
 
 
 def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):

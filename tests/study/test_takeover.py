@@ -8,11 +8,14 @@ from made_rows import STUDY, rows
 
 from care_sim.cli import main
 from care_sim.errors import InvalidInput
-from care_sim.study.config import grid
+from care_sim.evaluation.sightings import PRESENCES
+from care_sim.study.config import PLAIN_FIELDS, grid
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import EPISODES
+from care_sim.study.kinds import _PARAMETERS, EPISODES, KINDS, PLAYS
+from care_sim.study.play_config import PLAY_FIELDS, play_grid
 from care_sim.study.report import JOURNAL, conduct, write_report
 from care_sim.study.rows import read_notes, read_rows, write_rows
+from care_sim.study.scenes import source_of
 from care_sim.study.studies import STUDIES
 from care_sim.study.takeover import check_results
 
@@ -106,6 +109,41 @@ def test_a_study_that_cannot_be_shown_replaces_nothing(folder, monkeypatch):
         conduct(short(), folder, 1)
 
 
+MOODY = """
+from pathlib import Path
+from care_sim.policies.history import History
+
+class Moody(History):
+    def demand(self, belief):
+        if (Path(__file__).parent / "mood.txt").read_text() == "bad":
+            raise RuntimeError("no")
+        return super().demand(belief)
+"""
+
+
+def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
+    """The same command after a file of the policy has changed, by which it fails."""
+    install("moody_policy", MOODY, moody="Moody")
+    mood, out = tmp_path / "moody_policy" / "mood.txt", tmp_path / "out"
+    mood.write_text("good")
+    configs = short(("history", "moody"))
+    assert conduct(configs, out, workers=1) == []
+    before = held(out)
+    del before[JOURNAL]
+    mood.write_text("bad")
+    capsys.readouterr()
+    (failure,) = conduct(short(("history", "moody")), out, workers=1)
+    assert failure.config.policy == "moody"
+    assert [line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line] == [
+        f"the results in {out} stay as they were: 1 of their 2 episodes, the first dartout moody 0.1, would be gone, "
+        "since this time only 1 episode did not fail; the journal keeps what was played: mend what failed, or "
+        "--force to replace them"
+    ]
+    assert {name: content for name, content in held(out).items() if name != JOURNAL} == before
+    conduct(short(("history", "moody")), out, workers=1, force=True)
+    assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
+
+
 def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
     with Journal(tmp_path / JOURNAL, "faults") as journal:
         journal.append({"digest": "a"})
@@ -157,3 +195,21 @@ def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
         policy_parameters=(("k_safe", 1.0),),
     )
     check_results(tmp_path, asked, SWEEP)
+
+
+def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tmp_path):
+    streets = source_of("streets")
+    by = {name: play_grid(streets, streets.scenes()[:2], ["care"], [0.1], presence=name) for name in PRESENCES}
+    for own, other in (PRESENCES, PRESENCES[::-1]):
+        write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
+        check_results(tmp_path, by[own], STUDIES["protocol"])
+        check_results(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
+        with pytest.raises(InvalidInput, match="; 2 of them, the first street-0000-straight care"):
+            check_results(tmp_path, by[other], STUDIES["protocol"])
+
+
+def test_every_parameter_is_a_column_that_is_read():
+    """What a reader drops is no part of what a row was asked with."""
+    known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in KINDS}
+    assert {*PLAIN_FIELDS} <= known[EPISODES.file]
+    assert {*PLAY_FIELDS} | (_PARAMETERS - {*PLAIN_FIELDS}) <= known[PLAYS.file]
