@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -12,6 +13,9 @@ from typing import TypeVar
 from care_sim.interrupts import SIGNALS, held_back
 
 T = TypeVar("T")
+
+LOOK_S = 1.0
+"""Between two looks whether the starter is there."""
 
 UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
 """What a terminal sends to all processes in it. SIGTERM is how a pool ends a worker."""
@@ -47,6 +51,17 @@ def following(make: Callable[[], T]) -> T:
     """What `make` makes, in a process that ends with its parent."""
     end_with_parent()
     return make()
+
+
+def end_with_starter(starter: int) -> None:
+    """End this process, an interpreter that the process `starter` started, as soon as that is gone."""
+    threading.Thread(target=_end_without, args=[starter], name="end with starter", daemon=True).start()
+
+
+def _end_without(starter: int) -> None:
+    while os.getppid() == starter:
+        time.sleep(LOOK_S)
+    os._exit(1)
 
 
 def _end_after(parent: "multiprocessing.process.BaseProcess") -> None:

@@ -16,6 +16,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from care_sim.certify.design import ASYNC, HASH_SEED, INTERLEAVED, REPLAY, SINGLE, SUBPROCESS, SYNC, Drawn, drawn
 from care_sim.certify.trail import Trail
+from care_sim.children import end_with_starter, following, starting
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
 
@@ -61,10 +62,14 @@ def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None
     makers = [partial(make, episode, source) for episode in episodes]
     with ExitStack() as stack:
         twins = _twins(stack, episodes, source)
-        vector = SyncVectorEnv(makers) if context is None else AsyncVectorEnv(makers, context=context)
-        stack.enter_context(closing(vector))
+        vector = stack.enter_context(closing(SyncVectorEnv(makers) if context is None else _forked(makers, context)))
         envs = vector.envs if isinstance(vector, SyncVectorEnv) else twins
         return _stepped(episodes, envs, vector, vector.reset()[0])
+
+
+def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorEnv:
+    with starting():
+        return AsyncVectorEnv([partial(following, maker) for maker in makers], context=context)
 
 
 def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
@@ -73,17 +78,18 @@ def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
         return [trail for episode in episodes for trail in in_turns([episode], source)]
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
-    makers: list[Callable[[], Trail]] = [partial(make, episode, source) for episode in episodes]
+    makers: list[Any] = [partial(following, partial(make, episode, source)) for episode in episodes]
     with ExitStack() as stack:
         twins = _twins(stack, episodes, source)
-        vector = stack.enter_context(closing(SubprocVecEnv(makers, start_method="fork")))  # type: ignore[arg-type]
+        with starting():
+            vector = stack.enter_context(closing(SubprocVecEnv(makers, start_method="fork")))
         return _stepped(episodes, twins, vector, vector.reset())
 
 
 def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Left]:
     """In an interpreter whose hash seed is another than this one's."""
     seed = next(seed for seed in HASH_SEEDS if seed != os.environ.get("PYTHONHASHSEED"))
-    asked = json.dumps([[episode.number for episode in episodes], source])
+    asked = json.dumps([os.getpid(), [episode.number for episode in episodes], source])
     command = [sys.executable, "-c", "from care_sim.certify.modes import answer_parent; answer_parent()"]
     done = subprocess.run(
         command, env=os.environ | {"PYTHONHASHSEED": seed}, input=asked, capture_output=True, text=True, check=False
@@ -95,7 +101,8 @@ def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Left]:
 
 def answer_parent() -> None:
     """What that interpreter does: play what it is told on stdin, and print the trails."""
-    numbers, source = json.load(sys.stdin)
+    starter, numbers, source = json.load(sys.stdin)
+    end_with_starter(starter)
     trails = [in_turns([drawn(number)], source)[0] for number in numbers]
     print(json.dumps([trail.hex() if isinstance(trail, bytes) else [trail] for trail in trails]))
 
@@ -124,11 +131,15 @@ def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:
 
 
 def _stepped(episodes: Sequence[Drawn], envs: Sequence[Any], vector: Any, observations: Any) -> list[Left]:
-    """Play a vector until the longest episode is over; the policies choose here."""
+    """Play a vector until the longest episode is over; the policies choose here. Where one is over its last action is
+    given on: truth ends with it.
+    """
     policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
+    actions: list[Any] = [None] * len(episodes)
     for _ in range(max(episode.keyframes for episode in episodes)):
-        rows = ({name: column[n] for name, column in observations.items()} for n in range(len(episodes)))
-        actions = [policy(row) for policy, row in zip(policies, rows, strict=True)]
+        for n, env in enumerate(envs):
+            if not env.over:
+                actions[n] = policies[n]({name: column[n] for name, column in observations.items()})
         observations = vector.step(np.stack(actions))[0]
     return list(vector.get_attr("left"))
 

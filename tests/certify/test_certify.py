@@ -74,6 +74,8 @@ def test_recordings_and_privileged_policies_play_in_vectors_too(source):
     recorded = of([e for e in LIST if e.environment == REPLAY and e.mode == "subprocess"], 2)
     trails = [alone(episode, source) for episode in recorded]
     assert play("async", recorded, source) == play("sync", recorded, source) == trails
+    beyond = replace(recorded[0], policy="history-oracle", keyframes=40)
+    assert play("sync", [beyond], source) == [alone(beyond, source)]
     privileged = of([e for e in LIST if e.policy == "history-oracle" and e.environment in CLOSED], 3)
     assert play("sync", privileged, source) == [alone(episode) for episode in privileged]
 
