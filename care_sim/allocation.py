@@ -1,6 +1,6 @@
 """Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any
 
@@ -30,13 +30,14 @@ def budget_cells(budget: float, cells: int) -> int:
     return round(float(budget) * cells)
 
 
-def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Iterable[int] | None = None) -> Cells:
+def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Sequence[int] | Cells | None = None) -> Cells:
     """Choose at most `budget` cells, in order of selection.
 
     Exploitation sets fill at most round((1 - rho) B) cells, round-robin; then each reserve layer in
     order, round-robin, up to B; then `floor`, a permutation of all cells, up to B. Within a set cells
     are taken in ascending order, and a cell already taken costs the set no turn. rho = 0 keeps no
-    reserve: layers then take only what exploitation leaves. Raises InvalidInput for a demand of another form.
+    reserve: layers then take only what exploitation leaves. Raises InvalidInput for another
+    form of demand or floor.
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     check_whole("budget", budget, 0, HIGHEST_CELL)
@@ -72,10 +73,10 @@ def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells
     return chosen
 
 
-def _free(floor: Iterable[int], chosen: Cells, count: int) -> Cells:
+def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
     """The first `count` cells of the floor that are not chosen."""
     taken, free = set(chosen.tolist()), list[int]()
-    for cell in map(int, floor):
+    for cell in cell_indices(floor, "floor").tolist():
         if len(free) >= count:
             break
         if cell not in taken:

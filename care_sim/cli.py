@@ -138,20 +138,29 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     alone = arguments is None
     given = list(sys.argv[1:] if arguments is None else arguments)
     arguments = [argument for argument in given if argument != DEBUG]
-    interrupts.raise_them()
-    _settle_output()
     try:
+        if alone:
+            interrupts.raise_them()
+        _settle_output()
         sys.exit(_finished(arguments))
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Exception) as error:
+        if not _is_interrupt(error):
+            _end_with(error, trace=DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
         words = 2 if arguments[:1] == ["train"] else 1
         _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", interrupts.INTERRUPTED)
-    except Exception as error:
-        _end_with(error, trace=DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
     finally:
         if alone:
             interrupts.end_in_silence()
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    """Whether it is one, or what an import has made of one."""
+    link: BaseException | None = error
+    while link is not None and not isinstance(link, KeyboardInterrupt):
+        link = link.__cause__ or link.__context__ if isinstance(error, ImportError | SystemError) else None
+    return link is not None
 
 
 def _end_with(error: Exception, trace: bool) -> NoReturn:

@@ -100,13 +100,8 @@ def check_range(name: str, value: Any, least: float = -math.inf, most: float = m
     """Raise InvalidInput unless `value` is a pair of numbers, low and high, within `least` and `most`."""
     fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(is_number, value))
     if not (fits and least <= _finite(value[0]) <= _finite(value[1]) <= most):
-        within = f" within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
-        raise InvalidInput(f"{name} must be two numbers, low and high,{within} got {shown(value)}")
-
-
-def is_text(value: str) -> bool:
-    """Whether files can hold the text: no half of a surrogate pair, as Python makes of bytes that are no UTF-8."""
-    return not any("\ud800" <= character <= "\udfff" for character in value)
+        within = f", within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
+        raise InvalidInput(f"{name} must be two numbers, low and high{within}, got {shown(value)}")
 
 
 def check_flag(name: str, value: object) -> None:

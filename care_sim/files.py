@@ -4,10 +4,11 @@ import errno
 import os
 import re
 import shutil
+import socket
 import stat
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,6 +18,7 @@ PNG, GIF, WEBP, MP4 = rb"\x89PNG", rb"GIF8", rb"RIFF", rb".{4}ftyp"
 HTML, JSON, SVG, ZIP, PARQUET, RERUN = rb"<!DOCTYPE", rb"\s*[{[]", rb"<\?xml|<svg", rb"PK", rb"PAR1", rb"RRF"
 """What files of these kinds begin with, as patterns. Weights and checkpoints are ZIP."""
 
+_MORE_BYTES = 2**16
 _being_written: set[Path] = set()
 
 
@@ -47,6 +49,7 @@ def check_output(path: Path, kind: bytes = b"") -> None:
         _check_old(path, kind)
     with _moved_to(path, keep=False):
         pass
+    _clear_away_before(path)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -72,8 +75,7 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
     place = _resolved(path)
     if place in _being_written:
         raise InvalidInput(f"{path} is being written already: close what writes it, or name another file")
-    end_of_name = os.fsencode(place.name)[-200:].decode(errors="ignore")  # of 255 bytes that a name may have
-    unfinished = place.with_name(f".{os.getpid()}.{end_of_name}")
+    unfinished = place.with_name(f".{_host()}.{os.getpid()}.{_end_of_name(place)}")
     _being_written.add(place)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -90,6 +92,18 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
         unfinished.unlink(missing_ok=True)
 
 
+def why_unwritable(path: Path) -> str | None:
+    """Why a file cannot grow, which libraries that wrote to it may not have told; None where it can."""
+    try:
+        with path.open("ab", buffering=0) as file:
+            written = file.write(bytes(_MORE_BYTES))
+            # A disk takes what fits, and says at the next byte why not more.
+            file.write(bytes(_MORE_BYTES - written))
+    except OSError as error:
+        return error.strerror
+    return None
+
+
 @contextmanager
 def _written_into(path: Path) -> Iterator[Path]:
     """A file elsewhere whose content goes into the stream `path`."""
@@ -103,6 +117,36 @@ def _written_into(path: Path) -> Iterator[Path]:
                 shutil.copyfileobj(content, target)
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _clear_away_before(path: Path) -> None:
+    """Remove what writers of the file have left beside it that were killed on this host."""
+    place = _resolved(path)
+    ours = re.compile(rf"\.{_host()}\.(\d{{1,9}})\.{re.escape(_end_of_name(place))}")
+    for name in os.listdir(place.parent):
+        left = ours.fullmatch(name)
+        if left and not _runs(int(left[1])):
+            with suppress(OSError):
+                place.with_name(name).unlink()
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True
+
+
+def _host() -> str:
+    return re.sub(r"\W", "-", socket.gethostname(), flags=re.ASCII)[:30]
+
+
+def _end_of_name(place: Path) -> str:
+    """Of the 255 bytes that a name may have."""
+    return os.fsencode(place.name)[-200:].decode(errors="ignore")
 
 
 def _is_stream(path: Path) -> bool:

@@ -144,12 +144,12 @@ class AngularGrid:
         return self.columns, self.rows, self.column_width, float(self.top), float(self.row_height)
 
 
-def cell_indices(cells: Sequence[int] | Cells) -> NDArray[np.integer]:
+def cell_indices(cells: Sequence[int] | Cells, name: str = "a set of cells") -> NDArray[np.integer]:
     """`cells` as an array. Raises InvalidInput for what is no list of indices."""
-    array = as_array("a set of cells", cells)
+    array = as_array(name, cells)
     if array.ndim != 1 or not (array.dtype.kind in "iu" or array.size == 0):
         raise InvalidInput(
-            f"a set of cells must be a list of cell indices, got {array.dtype} of shape {array.shape}"
+            f"{name} must be a list of cell indices, got {array.dtype} of shape {array.shape}"
             " (of a mask take np.flatnonzero)"
         )
     return array

@@ -16,6 +16,7 @@ INTERRUPTED = 130
 """Exit code of what was interrupted."""
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name))
 """All end a command in the same way."""
+_HEARD = (*SIGNALS, signal.SIGALRM)
 SOON_S = 0.02
 """After which an interrupt that came at a bad moment comes again."""
 
@@ -27,8 +28,8 @@ def end_at_once() -> None:
 
 def raise_them() -> None:
     """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls into an import,
-    which may turn it into another error, comes after it; one that falls into code whose errors nobody can catch
-    (finalisers, callbacks) comes again.
+    which may turn it into another error, comes after it, or with the next one; one that falls into code whose errors
+    nobody can catch (finalisers, callbacks) comes again.
     """
     _listen(_raise)
     signal.signal(signal.SIGALRM, _raise)
@@ -37,8 +38,8 @@ def raise_them() -> None:
 
 def end_in_silence() -> None:
     """From now on an interrupt is the system's to handle: all is said, and the interpreter is ending."""
-    _listen(signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_REAL, 0)
+    _listen(signal.SIG_DFL)
 
 
 @contextmanager
@@ -48,16 +49,30 @@ def held_back() -> Iterator[None]:
         yield
         return
     waiting: list[int] = []
-    before = {number: handler for number in (*SIGNALS, signal.SIGALRM) if callable(handler := signal.getsignal(number))}
-    for number in before:
-        signal.signal(number, lambda number, _: waiting.append(number))
+    with _deaf():
+        handlers = {number: signal.getsignal(number) for number in _HEARD}
+        before = {number: handler for number, handler in handlers.items() if callable(handler)}
+        for number in before:
+            signal.signal(number, lambda number, _: waiting.append(number))
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        with _deaf():
+            for number, handler in before.items():
+                signal.signal(number, handler)
         for number in waiting[:1]:
             signal.raise_signal(number)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """What comes meanwhile is handled at the end, so that handlers change all at once."""
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    try:
+        signal.pthread_sigmask(signal.SIG_BLOCK, _HEARD)
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _listen(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
@@ -72,8 +87,9 @@ def _end(*_: object) -> None:
     os._exit(INTERRUPTED)
 
 
-def _raise(_number: int, frame: FrameType | None) -> None:
-    if _imports(frame):
+def _raise(number: int, frame: FrameType | None) -> None:
+    again = number != signal.SIGALRM and signal.getitimer(signal.ITIMER_REAL)[0] > 0
+    if _imports(frame) and not again:
         signal.setitimer(signal.ITIMER_REAL, SOON_S)
     else:
         raise KeyboardInterrupt

@@ -124,8 +124,11 @@ class Lenses(NamedTuple):
 
     @classmethod
     def of(cls, cameras: Sequence[PinholeCamera]) -> "Lenses":
-        """Those of k cameras."""
-        return cls(*(np.array(column) for column in zip(*(camera._lens for camera in cameras), strict=True)))
+        """Those of k cameras, of which there may be none."""
+        shapes = (3,), (3, 3), (), (2,)
+        columns = ([camera._lens[n] for camera in cameras] for n in range(len(shapes)))
+        arrays = (np.array(column, float) for column in columns)
+        return cls(*(array.reshape(-1, *shape) for array, shape in zip(arrays, shapes, strict=True)))
 
     def box_rays(self, boxes: Floats, cameras: NDArray[np.int64]) -> Floats:
         """As `PinholeCamera.box_rays`, of boxes (n, 4) in the pictures of `cameras` (n,), by number."""

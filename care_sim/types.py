@@ -29,6 +29,8 @@ MAX_TRACKS = 256
 """Rows of the observation: one that explains every detection, and as many again."""
 OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
 """What an observation consists of."""
+_EXACT = 2.0**53
+"""Up to this a float holds every whole number."""
 HIGHEST = 2.0**24
 """No number of an observation is larger: the largest whole number that float32 holds beside all smaller ones."""
 
@@ -84,9 +86,12 @@ class ImageDetections:
 
     @classmethod
     def from_rows(cls, rows: NDArray[np.floating]) -> "ImageDetections":
-        """Read rows in the order of `COLUMNS`; rows of class -1 are padding."""
+        """Read rows in the order of `COLUMNS`; rows of class -1 are padding.
+
+        Raises InvalidInput for a class or a camera that is no number, or too large to be held exactly.
+        """
         table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        classes, cameras = table[:, [0, 6]].astype(np.int64).T
+        classes, cameras = _whole("classes and cameras", table[:, [0, 6]]).T
         return cls(classes, table[:, 1], table[:, 2:6], cameras, table[:, 7], table[:, 8])
 
     def rows(self) -> Floats:
@@ -126,9 +131,12 @@ class Tracks:
 
     @classmethod
     def from_rows(cls, rows: NDArray[np.floating]) -> "Tracks":
-        """Read rows in the order of `COLUMNS`; rows of id -1 are padding."""
+        """Read rows in the order of `COLUMNS`; rows of id -1 are padding.
+
+        Raises InvalidInput for ids, classes, misses or hits that are no numbers, or too large to be held exactly.
+        """
         table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        ids, classes, misses, hits = table[:, [0, 1, 11, 12]].astype(np.int64).T
+        ids, classes, misses, hits = _whole("ids, classes, misses and hits", table[:, [0, 1, 11, 12]]).T
         return cls(ids, classes, table[:, 2:9], table[:, 9:11], misses, hits)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
@@ -226,6 +234,13 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray
             f"0 to {len(CLASSES) - 1}"
         )
     return rows
+
+
+def _whole(what: str, numbers: Floats) -> Cells:
+    """The numbers as integers. Raises InvalidInput for what none is."""
+    if not (numbers.min(initial=0) >= -_EXACT and numbers.max(initial=0) <= _EXACT):
+        raise InvalidInput(f"{what} must be numbers up to {_EXACT:g}, none of them NaN")
+    return numbers.astype(np.int64)
 
 
 def _table(*columns: NDArray[np.generic]) -> Floats:

@@ -127,6 +127,12 @@ def test_the_floor_comes_last_and_skips_what_is_taken():
     assert allocate(Demand([[1]], [[[2]]]), 4, 0.5, floor).tolist() == [1, 2, 3, 8]
 
 
+@pytest.mark.parametrize("floor", [0.0, "ab", [0.5], [[1]], object()])
+def test_a_floor_of_another_form_is_refused(floor):
+    with pytest.raises(InvalidInput, match="floor must be a"):
+        allocate(Demand([[1]]), 4, 0.5, floor)
+
+
 def test_without_floor_the_rest_is_unspent():
     assert allocate(Demand([[1]], [[[2]]]), 10, 0.5).tolist() == [1, 2]
     assert allocate(Demand(), 10, 0.3).tolist() == []

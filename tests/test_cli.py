@@ -1,10 +1,13 @@
+import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from care_sim.cli import main
+from care_sim.interrupts import SIGNALS
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.commands import Reproduce
@@ -23,6 +26,16 @@ def run(capsys, *arguments):
         main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
     return end.value.code, out, err
+
+
+def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_thread(capsys):
+    before = [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)]
+    with ThreadPoolExecutor(1) as threads:
+        code, out, err = threads.submit(run, capsys, "detectors").result()
+    assert (code, err) == (0, "")
+    assert "cluster" in out
+    assert run(capsys, "detectors")[0] == 0
+    assert [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)] == before
 
 
 @pytest.mark.parametrize(
@@ -313,6 +326,7 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
         ("{} policies >&- 2>&-", 0, ""),
         ("COLUMNS=1 timeout 60 {} run --help > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} policies > /dev/null", 0, ""),
+        ("PYTHONIOENCODING=ascii {} bench --x", 2, "care-sim: Unrecognized options: --x\n"),
         ("PYTHONIOENCODING=ascii {} bench --seconds 0", 2, "care-sim: seconds must lie in [0.001, 3600], got 0.0\n"),
     ],
 )

@@ -41,6 +41,27 @@ def test_a_file_has_one_writer_at_a_time(tmp_path, monkeypatch):
     assert (tmp_path / "table.csv").read_text() == "whole"
 
 
+def test_what_a_killed_writer_left_goes_and_what_others_write_stays(tmp_path):
+    program = (
+        "import os, sys; from pathlib import Path; from care_sim.files import replacing\n"
+        "with replacing(Path(sys.argv[1])) as unfinished:\n"
+        "    print(unfinished.name, flush=True); sys.stdin.read(1); os.kill(os.getpid(), 9)"
+    )
+    file = tmp_path / "table.csv"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as writer:
+        unfinished = tmp_path / writer.stdout.readline().strip()
+        check_output(file)
+        assert unfinished.exists()  # it is alive
+        writer.communicate("x")
+    others = [unfinished.name + "x", unfinished.name.replace("table", "cable"), f".elsewhere.{writer.pid}.table.csv"]
+    for name in others:
+        (tmp_path / name).touch()
+    check_output(file)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(others)
+
+
 def test_a_folder_is_refused(tmp_path):
     with pytest.raises(InvalidInput, match="is a folder"), replacing(tmp_path):
         pass

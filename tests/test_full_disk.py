@@ -96,5 +96,5 @@ def test_a_file_that_does_not_fit_is_named_and_nothing_of_it_is_left(write, name
     with no_file_larger_than(5_000), pytest.raises(OSError, match=r".") as error:
         write(file)
     assert error.value.filename == str(file)
-    assert error.value.strerror
+    assert "File too large" in error.value.strerror
     assert [path.name for path in file.parent.iterdir() if path.name != "episode.json"] == []

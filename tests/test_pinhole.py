@@ -132,3 +132,8 @@ def test_several_cameras_at_once_see_what_each_sees_alone():
 def test_a_camera_that_the_car_does_not_have_is_no_other():
     with pytest.raises(IndexError):
         Lenses.of(SURROUND_CAMERAS).box_rays(np.array([[10.0, 20, 30, 60]]), np.array([6]))
+
+
+def test_a_rig_may_have_no_camera():
+    assert [column.shape for column in Lenses.of(())] == [(0, 3), (0, 3, 3), (0,), (0, 2)]
+    assert [column.shape for column in Lenses.of(SURROUND_CAMERAS[:2])] == [(2, 3), (2, 3, 3), (2,), (2, 2)]

@@ -95,3 +95,14 @@ def test_take_by_index_and_by_mask():
     tracks = belief([[n, 0, n, *[0] * 10] for n in range(4)]).tracks
     assert tracks.take(np.array([2, 0])).ids.tolist() == [2, 0]
     assert tracks.take(np.array([True, False, False, True])).boxes[:, 0].tolist() == [0, 3]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", [ImageDetections, Tracks])
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e30])
+def test_rows_whose_whole_numbers_are_none_are_refused_in_one_line(kind, number):
+    rows = np.ones((3, len(kind.COLUMNS)))
+    rows[1, kind.COLUMNS.index("camera" if kind is ImageDetections else "hits")] = number
+    with pytest.raises(InvalidInput, match="must be numbers up to 9"):
+        kind.from_rows(rows)
+    assert len(kind.from_rows(rows[:1])) == 1

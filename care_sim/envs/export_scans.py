@@ -15,7 +15,7 @@ import numpy as np
 from care_sim.envs.watching import Watching, numbered
 from care_sim.errors import InvalidInput, check_path
 from care_sim.extras import import_open3d
-from care_sim.files import replacing, write_text
+from care_sim.files import replacing, why_unwritable, write_text
 from care_sim.frames import Floats
 from care_sim.loop import ClosedLoop
 from care_sim.moments import Moment
@@ -98,7 +98,8 @@ class ExportScans(Watching):
             written = self._open3d.t.io.write_point_cloud(str(unfinished), cloud)
             # Open3D does not tell of a disk that is full.
             if not written or unfinished.stat().st_size < len(points) * POINT_BYTES:
-                raise OSError(errno.EIO, "the point cloud could not be written", str(file))
+                reason = why_unwritable(unfinished) or "the point cloud could not be written"
+                raise OSError(errno.EIO, reason, str(file))
 
 
 def described(moment: Moment) -> dict[str, Any]:

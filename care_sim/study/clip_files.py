@@ -1,19 +1,17 @@
 """Moving pictures as files: MP4 through FFmpeg, animated GIF, WebP and PNG through Pillow."""
 
 import errno
-import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
-from shutil import disk_usage
 
 import numpy as np
 from PIL import Image
 
 from care_sim.errors import check_known
 from care_sim.extras import import_imageio_ffmpeg
-from care_sim.files import GIF, MP4, PNG, WEBP, check_output, replacing
+from care_sim.files import GIF, MP4, PNG, WEBP, check_output, replacing, why_unwritable
 
 GIF_COLOURS = 96
 """Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file goes."""
@@ -58,8 +56,7 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], picture_s: float, ho
         written = 0
     # FFmpeg does not tell us that it failed: a film that lacks a picture tells.
     if written != sent:
-        reason = "FFmpeg could not write it" if disk_usage(path.parent).free else os.strerror(errno.ENOSPC)
-        raise OSError(errno.EIO, reason, str(path))
+        raise OSError(errno.EIO, why_unwritable(path) or "FFmpeg could not write it", str(path))
 
 
 def _write_animation(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:

@@ -3,7 +3,6 @@
 What imports the simulator or draws is imported by the command that needs it: help stays quick.
 """
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ import tyro
 from care_sim.bounds import bounded, settle
 from care_sim.errors import LARGEST, InvalidInput
 from care_sim.study.options import USUAL, Options, seeds_of
-from care_sim.study.running import MOST_WORKERS, Running, console, in_turn, playable, report_problems
+from care_sim.study.running import CORES, MOST_WORKERS, Running, console, in_turn, playable, report_problems
 
 if TYPE_CHECKING:
     from care_sim.policies.base import Policy
@@ -208,7 +207,7 @@ class Report:
     """HTML file for the page, which needs nothing else to be read; the folder is left as it is (extra 'page')."""
     episodes: int = bounded(400, 0, LARGEST)
     """The most episodes that are played again to be watched in the page, seed by seed; 0 for none."""
-    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
+    workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play them."""
 
     def __post_init__(self) -> None:

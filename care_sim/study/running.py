@@ -22,13 +22,15 @@ PIPE_WIDTH = 180
 
 MOST_WORKERS = 1024
 """A process each takes 100 MB."""
+CORES = min(os.cpu_count() or 1, MOST_WORKERS)
+"""Workers unless another number is asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Running:
     """What commands have in common that play a study."""
 
-    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
+    workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play at the same time on this machine; a cluster plays as many as it has threads."""
     cluster: str | None = None
     """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""

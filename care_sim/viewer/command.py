@@ -14,9 +14,8 @@ import tyro
 
 from care_sim.errors import InvalidInput
 from care_sim.extras import import_rerun
+from care_sim.files import RERUN
 
-MAGIC = b"RRF"
-"""What a recording begins with."""
 HERE = "127.0.0.1"
 VIEWER = """
 import os, signal, sys, threading
@@ -52,7 +51,7 @@ class View:
         """Run it."""
         import_rerun()
         with self.file.open("rb") as recording:
-            if recording.read(len(MAGIC)) != MAGIC:
+            if recording.read(len(RERUN)) != RERUN:
                 raise InvalidInput(f"{self.file} is no recording of `care-sim run --record`")
         if not self.web:
             if not _rerun(str(self.file), "--port", "auto"):

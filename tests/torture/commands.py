@@ -99,11 +99,12 @@ def lay_out(arguments, folder):
 def run(arguments, encoding="utf-8", interrupted_after=None):
     """Play a command line in this process and judge its ending."""
     from care_sim.cli import main
+    from care_sim.interrupts import raise_them
 
     worker.streams.encode(encoding)
     code = None
+    raise_them()  # as the command does that has the process to itself
     if interrupted_after is not None:
-        signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
         signal.setitimer(signal.ITIMER_REAL, interrupted_after)
     try:
         with props.inline():

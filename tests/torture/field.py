@@ -26,6 +26,8 @@ from torture.judge import place_of_stack
 TESTS = Path(__file__).resolve().parents[1]
 MOST_CASES = 4000
 """Of one worker: what it gathers is let go then."""
+PREPARES_S = 300.0
+"""What a case needs has to be there by then, templates and imports."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class _Worker:
         self._mark = processes.new_mark()
         self._process = None
         self._played = 0
-        self._name = self._began = None
+        self._name = self._began = self._handed = None
 
     @property
     def busy(self):
@@ -141,14 +143,17 @@ class _Worker:
         if self._process is None or self._played >= MOST_CASES:
             self._begin_anew()
         self._name, self._began, self._buffer = name, None, b""
+        self._handed = time.monotonic()
         self._played += 1
         self._process.stdin.write(f"{name}\n".encode())
         self._process.stdin.flush()
 
     def overdue(self):
-        """Whether its case has taken too long."""
-        if self._began is None:
+        """Whether its case, or what that needs first, has taken too long."""
+        if self._name is None:
             return False
+        if self._began is None:
+            return time.monotonic() - self._handed > processes.patience() * PREPARES_S
         limit = importlib.import_module(f"torture.{self._name.campaign}").LIMIT_S
         clock, busy = self._began
         return time.monotonic() - clock > processes.patience() * limit or self._busy_s() - busy > limit
@@ -178,18 +183,20 @@ class _Worker:
     def _given_up(self):
         self._process.send_signal(signal.SIGUSR1)
         time.sleep(1.0)
-        return self._lost("hang")
+        return self._lost("hang" if self._began else "hang before it begins")
 
     def _died(self):
         code = self._process.wait()
         return self._lost("memory above 1 GB" if code == -signal.SIGKILL else f"the process died ({code})")
 
     def _lost(self, kind):
-        stack = self._stacks.read_text(errors="replace")
+        stack, steps = (
+            path.read_text(errors="replace") if path.exists() else "" for path in (self._stacks, self._steps)
+        )
         name, seconds = self._name, time.monotonic() - (self._began or (time.monotonic(),))[0]
         self.end()
         lost = {"kind": kind, "place": place_of_stack(stack), "detail": stack[:4000]}
-        lost["steps"] = self._steps.read_text(errors="replace").splitlines()
+        lost["steps"] = steps.splitlines() if self._began else []
         return lost | {"name": str(name), "ended": "fault", "seconds": seconds}
 
     def _begin_anew(self):

@@ -1,9 +1,13 @@
 """Campaign: damaged, changed and foreign files, read by the commands and calls that read such files."""
 
 import json
+import os
+import tempfile
+from functools import lru_cache
+from pathlib import Path
 
 from torture import calls, props, spoil
-from torture.case import DONE, Fault
+from torture.case import DONE, Case, Fault, Name
 from torture.commands import run
 from torture.judge import call
 
@@ -19,6 +23,28 @@ def prepare(_name):
     for name in ("results", "protocol", "drive", "base", "scorer", "ppo", "trained", "recording"):
         props.template(name)
     calls.good_env()
+    _check_pristine()
+
+
+@lru_cache(maxsize=1)
+def _check_pristine():
+    """What is as the program left it is accepted, or no damage to it would tell anything."""
+    with tempfile.TemporaryDirectory(dir=os.environ.get("TORTURE_FOLDER")) as folder:
+        here = os.getcwd()
+        os.chdir(folder)
+        try:
+            for kind in KINDS:
+                place = Path(folder) / kind.__name__
+                place.mkdir()
+                os.chdir(place)
+                if kind is not recordings and kind(_Pristine(Name("files", 0, 0), place)) != DONE:
+                    raise RuntimeError(f"refused as it is: {kind.__name__}")
+        finally:
+            os.chdir(here)
+
+
+class _Pristine(Case):
+    """A case that damages nothing."""
 
 
 def play(case):
@@ -29,6 +55,8 @@ def play(case):
 
 def _spoilt(case, path, *own):
     """Damage a file in one of its own ways, or in one that fits every file."""
+    if isinstance(case, _Pristine):
+        return
     rng = case.rng
     others = [
         file for name in ("results", "drive", "base") for file in props.template(name).rglob("*") if file.is_file()

@@ -1,7 +1,8 @@
 """What a command or a call may answer, and what is a fault.
 
-A command ends with code 0 (done), 1 (something failed or was left out), 2 (bad input) or 130 (interrupted). On stderr
-stand whole lines: `care-sim: ...`, or how far a study is. With 2 and 130 the last line says why, and it is the only one
+A command ends with code 0 (done), 1 (something failed or was left out), 2 (bad input), 130 (interrupted) or 141 (nobody
+reads its output any more). 70, a fault of the software itself, is always one. On stderr stand whole lines:
+`care-sim: ...`, or how far a study is. With 2 and 130 the last line says why, and it is the only one
 of its kind but for what was left out before; with 1 there is at least one. No line holds control codes, rules of a box
 or a Python traceback.
 
@@ -19,13 +20,14 @@ from pathlib import Path
 from torture.case import DONE, INTERRUPTED, REFUSED, Fault
 
 ROOT = Path(__file__).resolve().parents[2]
-ENDINGS = {0: DONE, 1: REFUSED, 2: REFUSED, 130: INTERRUPTED}
-BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP)
+OF_THE_SOFTWARE, UNREAD = 70, 141
+ENDINGS = {0: DONE, 1: REFUSED, 2: REFUSED, 130: INTERRUPTED, UNREAD: INTERRUPTED}
+BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGQUIT)
 """Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said why, or where all
 was said and done and Python was about to leave."""
 NOTICES = (
-    r"episodes \d+ of \d+.*",
-    r"plays \d+ of \d+.*",
+    r"(episodes|plays) \d+/\d+.*",
+    r"\d+ lines? of .* passed over, damaged or .*",
     r"\d+ (episodes|plays)? ?of \d+ .* found in .*",
     r"\d+ (episodes?|plays?) .*",
     r"full fires every cell, whatever the budget",
@@ -73,6 +75,8 @@ def ending(code, out, err, arguments=()):
     told = f"{_shown(arguments)}\nexit code {code}\nstdout ...{out[-1500:]!r}\nstderr {err[-4000:]}"
     if "Traceback (most recent call last)" in err + out:
         _raise_traceback(err + out, told)
+    if code == OF_THE_SOFTWARE:
+        raise Fault("a fault of the software", told, _kind_of(err.strip().rpartition("\n")[2]))
     lines = [line.rpartition("\r")[2] for line in err.splitlines()]
     lines = [line for line in lines if line.strip()]
     own = [line for line in lines if line.startswith("care-sim: ")]
@@ -83,6 +87,10 @@ def ending(code, out, err, arguments=()):
         _check_line(line, told)
     _check_control_codes(err, told, "stderr")
     _check_control_codes(out, told, "stdout")
+    return _ending(code, out, lines, own, told)
+
+
+def _ending(code, out, lines, own, told):
     if code in BY_SIGNAL and own:
         code = 130
     if code in BY_SIGNAL and out.strip() and not lines:

@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from contextlib import suppress
+from pathlib import Path
 
 from torture import judge, study
 from torture.case import DONE, Fault
@@ -14,7 +15,7 @@ LIMIT_S = 240.0
 SIGNALS = {
     signal.SIGKILL: 6, signal.SIGINT: 5, signal.SIGTERM: 4, signal.SIGHUP: 3, signal.SIGQUIT: 2,
 }  # fmt: skip
-SAYS_WHY = {signal.SIGINT: 130, signal.SIGTERM: 130}
+SAYS_WHY = set(SIGNALS) - {signal.SIGKILL}
 """Signals after which a command says that it was interrupted."""
 ENDS_WITHIN_S = 10.0
 
@@ -48,7 +49,7 @@ def _disturbed(case, out):
     with Command(study.command("out"), case.folder) as command:
         moment = _wait(case, command, out)
         case.tell(f"{signal.Signals(number).name} to {whom} {moment}{', twice' if twice else ''}")
-        started = "care_sim" in _maps(command)
+        started = _has_begun(command)
         whole = command.process.poll() is None
         told = _send(case, command, number, whom)
         if twice:
@@ -87,11 +88,11 @@ def _wait(case, command, out):
     return f"after {seconds:.2f} s"
 
 
-def _maps(command):
+def _has_begun(command):
     """Whether its own code has begun: the interpreter's first moments are Python's."""
     with suppress(OSError):
-        return "care_sim" if "multiarray" in open(f"/proc/{command.process.pid}/maps").read() else ""
-    return ""
+        return "multiarray" in Path(f"/proc/{command.process.pid}/maps").read_text()
+    return False
 
 
 def _send(case, command, number, whom):

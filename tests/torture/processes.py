@@ -65,10 +65,10 @@ def patience():
 
 
 def entry_point():
-    """Python code that does what the command `care-sim` does."""
+    """Python code that does what the command `care-sim` does, under its name."""
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
     module, function = scripts["care-sim"].split(":")
-    return f"import sys; from {module} import {function}; sys.exit({function}())"
+    return f"import sys; sys.argv[0] = 'care-sim'; from {module} import {function}; sys.exit({function}())"
 
 
 class Command:
@@ -88,11 +88,14 @@ class Command:
 
         usual = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         usual[MARK] = f"{os.environ.get(MARK, '')}/{self.mark}"
+        output = _output(stdout)
         self.process = subprocess.Popen(
             [sys.executable, "-c", entry_point(), *self.arguments], cwd=folder, stdin=subprocess.DEVNULL,
-            stdout=_output(stdout), stderr=subprocess.PIPE, env=os.environ | usual | environment,
+            stdout=output, stderr=subprocess.PIPE, env=os.environ | usual | environment,
             start_new_session=True, preexec_fn=limited,
         )  # fmt: skip
+        if stdout is not None:
+            os.close(output)
         self._said = [bytearray(), bytearray()]
         for stream, said in zip((self.process.stdout, self.process.stderr), self._said, strict=True):
             if stream:

@@ -148,7 +148,7 @@ def _make_trained(path):
     import json
 
     path.mkdir()
-    scores = {"mean_return": -3.0, "distance_m": 12.0}
+    scores = {"episodes": 2, "mean_return": -3.0, "distance_m": 12.0}
     from care_sim.training.config import Ppo
 
     (path / "config.json").write_text(Ppo().to_json())

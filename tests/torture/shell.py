@@ -8,7 +8,7 @@ import signal
 
 from torture import commands, props, spoil
 from torture.case import DONE, INTERRUPTED, Fault
-from torture.judge import ending
+from torture.judge import UNREAD, ending
 from torture.processes import Command
 
 LIMIT_S = 120.0
@@ -65,7 +65,7 @@ def _nobody_reads(case):
         code = command.wait()
         _, err = command.said()
         command.check_gone()
-    if stdout == "closed pipe" and code in (0, 1, -signal.SIGPIPE) and not err:
+    if stdout == "closed pipe" and code in (0, UNREAD, -signal.SIGPIPE) and not err:
         return DONE
     return ending(code, "", err, arguments)
 

@@ -63,7 +63,7 @@ def check_whole(folder, once=True):
             )
     if once:
         _check_played_once(folder)
-    left = sorted(path.name for path in folder.iterdir() if path.suffix in (".tmp", ".part"))
+    left = sorted(path.name for path in folder.iterdir() if path.name.startswith("."))
     if left:
         raise Fault("files left over", str(left))
 

@@ -38,7 +38,7 @@ def test_nothing_but_one_clear_line(field, campaign):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("campaign", filter(found, CAMPAIGNS))
+@pytest.mark.parametrize("campaign", [*filter(found, CAMPAIGNS)])
 def test_what_went_wrong_once_stays_right(field, campaign):
     tally = field.play(found(campaign))
     assert not tally.failures, told(tally)
@@ -63,6 +63,7 @@ def test_a_case_is_its_name(tmp_path):
         (1, "care-sim: failed: dense care: ValueError: x (world.py, line 3)\n", "exception told"),
         (1, "", "without a reason"),
         (3, "care-sim: x\n", "exit code 3"),
+        (70, "care-sim: unexpected KeyError: 5; please report it\n", "fault of the software"),
         (0, "/x/y.py:3: RuntimeWarning: overflow\n", "neither its own"),
     ],
 )
@@ -75,11 +76,14 @@ def test_the_judge_knows_a_fault(code, err, kind):
     ("code", "err", "ended"),
     [
         (0, "", "done"),
-        (0, "episodes 3 of 9, 5 s\n2 of 9 episodes found in x\n", "done"),
+        (0, "2 of 9 episodes found in x\nepisodes 3/9, 5 s left\n", "done"),
+        (0, "1 line of x/journal.jsonl passed over, damaged or of a version that wrote no checksums\n", "done"),
+        (141, "", "interrupted"),
         (1, "care-sim: left out: policy torn cannot be loaded\n", "refused"),
         (2, "care-sim: budget must lie in (0, 1], got 2\n", "refused"),
         (130, "care-sim: interrupted\n", "interrupted"),
         (-2, "care-sim: interrupted\n", "interrupted"),
+        (-3, "care-sim: interrupted\n", "interrupted"),
     ],
 )
 def test_the_judge_knows_a_good_ending(code, err, ended):
@@ -89,6 +93,13 @@ def test_the_judge_knows_a_good_ending(code, err, ended):
 def test_the_field_sees_a_hang_a_death_and_too_much_memory(field):
     tally = field.play([Name("wrong", 0, number) for number in range(len(WAYS))])
     assert [failure.kind for failure in tally.failures] == [*KINDS]
+
+
+def test_the_field_sees_a_hang_before_a_case_begins(monkeypatch):
+    monkeypatch.setattr("torture.field.PREPARES_S", 0.0)
+    with Field(1) as field:
+        (failure,) = field.play([Name("wrong", 0, 0)]).failures
+    assert failure.kind == "hang before it begins"
 
 
 def test_a_process_left_behind_is_seen(tmp_path, monkeypatch):
