@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from care_sim.certify.design import ASYNC, HASH_SEED, INTERLEAVED, REPLAY, SINGLE, SUBPROCESS, SYNC, Drawn, drawn
+from care_sim.certify.design import ASYNC, HASH_SEED, INTERLEAVED, REPLAY, SINGLE, STREET, SUBPROCESS, SYNC, Drawn, drawn
 from care_sim.certify.trail import Trail
 from care_sim.children import end_with_starter, following, starting
 from care_sim.policies import make_policy
@@ -61,7 +61,7 @@ def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None
     """In a vector of Gymnasium: of this process, or of processes of a `context` of multiprocessing."""
     makers = [partial(make, episode, source) for episode in episodes]
     with ExitStack() as stack:
-        twins = _twins(stack, episodes, source)
+        twins = _twins(stack, episodes, source) if context else []
         vector = stack.enter_context(closing(SyncVectorEnv(makers) if context is None else _forked(makers, context)))
         envs = vector.envs if isinstance(vector, SyncVectorEnv) else twins
         return _stepped(episodes, envs, vector, vector.reset()[0])
@@ -121,7 +121,12 @@ def make(episode: Drawn, source: str) -> Trail:
 
 def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Trail]:
     """Environments of this process beside those of others: policies are made for their rigs."""
-    return [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+    twins = [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+    for twin, episode in zip(twins, episodes, strict=True):
+        if episode.environment == STREET:
+            # Made here, a street is there for all that are forked from now on.
+            twin.reset()
+    return twins
 
 
 def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:

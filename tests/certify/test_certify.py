@@ -16,6 +16,7 @@ from care_sim.certify.verdict import compare
 from care_sim.conditions import CameraFaults, LidarFaults
 from care_sim.control import BrakingController
 from care_sim.envs import sensing
+from care_sim.errors import InvalidInput
 from care_sim.perception.memory import TrackMemory
 from care_sim.policies import BUILT_IN
 from care_sim.sensors.camera import CameraDetector
@@ -230,8 +231,10 @@ def test_the_combined_hash_is_over_the_order_of_the_numbers():
     assert published.combined([one, two]) != published.combined([two, one])
 
 
-def test_a_damaged_list_is_one_line(tmp_path):
+def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     file = tmp_path / "list.parquet"
+    with pytest.raises(InvalidInput, match=r"^the list of certify is missing: install the package again$"):
+        published.read(file)
     published.write([b"12345678" + b"x"], file)
     assert published.read(file) == [b"12345678x"]
     file.write_bytes(b"no")
