@@ -7,14 +7,24 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from functools import partial
-from importlib.util import find_spec
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from care_sim.certify.design import ASYNC, HASH_SEED, INTERLEAVED, REPLAY, SINGLE, STREET, SUBPROCESS, SYNC, Drawn, drawn
+from care_sim.certify.design import (
+    ASYNC,
+    HASH_SEED,
+    INTERLEAVED,
+    REPLAY,
+    SINGLE,
+    STREET,
+    SUBPROCESS,
+    SYNC,
+    Drawn,
+    drawn,
+)
 from care_sim.certify.trail import Trail
 from care_sim.children import end_with_starter, following, starting
 from care_sim.policies import make_policy
@@ -73,9 +83,7 @@ def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorE
 
 
 def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
-    """In the subprocesses of Stable-Baselines3; one after the other where it is not installed."""
-    if not has_subprocesses():
-        return [trail for episode in episodes for trail in in_turns([episode], source)]
+    """In the subprocesses of Stable-Baselines3 (extra 'rl')."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
     makers: list[Any] = [partial(following, partial(make, episode, source)) for episode in episodes]
@@ -105,11 +113,6 @@ def answer_parent() -> None:
     end_with_starter(starter)
     trails = [in_turns([drawn(number)], source)[0] for number in numbers]
     print(json.dumps([trail.hex() if isinstance(trail, bytes) else [trail] for trail in trails]))
-
-
-def has_subprocesses() -> bool:
-    """Whether Stable-Baselines3 is installed."""
-    return find_spec("stable_baselines3") is not None
 
 
 def make(episode: Drawn, source: str) -> Trail:
