@@ -1,12 +1,14 @@
 """How much is certified."""
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 import tyro
 
+from care_sim.bounds import bounded, settle
 from care_sim.errors import InvalidInput, check_whole
+from care_sim.study.running import MOST_WORKERS
 
 EPISODES, ALL_EPISODES = 1_000, 10_000
 
@@ -21,18 +23,19 @@ class CertifyConfig:
     """All 10,000 episodes; the first 1,000 without."""
     episode: int | None = None
     """This one alone, by its number in the list."""
-    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
     """Processes that play at the same time."""
     write: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """For maintainers: make what is played now the published list."""
+    """For maintainers, with all: make what is played now the published list."""
 
     def __post_init__(self) -> None:
-        check_whole("workers", self.workers, 1)
-        if self.episode is None:
-            return
-        check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
-        if self.every or self.write:
-            raise InvalidInput("episode plays one alone: it goes neither with all nor with write")
+        settle(self)
+        if self.episode is not None:
+            check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
+            if self.every or self.write:
+                raise InvalidInput("episode plays one alone: it goes neither with all nor with write")
+        elif self.write and not self.every:
+            raise InvalidInput("write publishes the whole list: give all too")
 
     @property
     def numbers(self) -> list[int]:

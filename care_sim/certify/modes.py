@@ -7,14 +7,24 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from functools import partial
-from importlib.util import find_spec
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from care_sim.certify.design import ASYNC, HASH_SEED, INTERLEAVED, REPLAY, SINGLE, SUBPROCESS, SYNC, Drawn, drawn
+from care_sim.certify.design import (
+    ASYNC,
+    HASH_SEED,
+    INTERLEAVED,
+    REPLAY,
+    SINGLE,
+    STREET,
+    SUBPROCESS,
+    SYNC,
+    Drawn,
+    drawn,
+)
 from care_sim.certify.trail import Trail
 from care_sim.children import end_with_starter, following, starting
 from care_sim.policies import make_policy
@@ -61,7 +71,7 @@ def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None
     """In a vector of Gymnasium: of this process, or of processes of a `context` of multiprocessing."""
     makers = [partial(make, episode, source) for episode in episodes]
     with ExitStack() as stack:
-        twins = _twins(stack, episodes, source)
+        twins = _twins(stack, episodes, source) if context else []
         vector = stack.enter_context(closing(SyncVectorEnv(makers) if context is None else _forked(makers, context)))
         envs = vector.envs if isinstance(vector, SyncVectorEnv) else twins
         return _stepped(episodes, envs, vector, vector.reset()[0])
@@ -73,9 +83,7 @@ def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorE
 
 
 def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
-    """In the subprocesses of Stable-Baselines3; one after the other where it is not installed."""
-    if not has_subprocesses():
-        return [trail for episode in episodes for trail in in_turns([episode], source)]
+    """In the subprocesses of Stable-Baselines3 (extra 'rl')."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
     makers: list[Any] = [partial(following, partial(make, episode, source)) for episode in episodes]
@@ -107,11 +115,6 @@ def answer_parent() -> None:
     print(json.dumps([trail.hex() if isinstance(trail, bytes) else [trail] for trail in trails]))
 
 
-def has_subprocesses() -> bool:
-    """Whether Stable-Baselines3 is installed."""
-    return find_spec("stable_baselines3") is not None
-
-
 def make(episode: Drawn, source: str) -> Trail:
     """The environment of an episode, which leaves its trail."""
     recorded = {"source": source} if episode.environment == REPLAY else {}
@@ -121,7 +124,12 @@ def make(episode: Drawn, source: str) -> Trail:
 
 def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Trail]:
     """Environments of this process beside those of others: policies are made for their rigs."""
-    return [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+    twins = [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+    for twin, episode in zip(twins, episodes, strict=True):
+        if episode.environment == STREET:
+            # Made here, a street is there for all that are forked from now on.
+            twin.reset()
+    return twins
 
 
 def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:

@@ -13,6 +13,8 @@ FILE = Path(__file__).with_name("published.parquet")
 
 def read(path: Path = FILE) -> list[bytes]:
     """The trails by number. Raises InvalidInput for a file that is missing or damaged."""
+    if not path.exists():
+        raise InvalidInput("the list of certify is missing: install the package again")
     rows = read_rows(path)
     trails = [trail for row in rows if isinstance(trail := row.get("trail"), bytes) and len(trail) > DIGEST_BYTES]
     if len(trails) < len(rows):

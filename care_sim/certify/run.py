@@ -5,25 +5,32 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 
 from care_sim.certify.config import CertifyConfig
-from care_sim.certify.design import SUBPROCESS, drawn
-from care_sim.certify.modes import has_subprocesses
+from care_sim.certify.design import drawn
+from care_sim.certify.needs import playable
 from care_sim.certify.playing import Played, played
 from care_sim.certify.published import combined, read, write
 from care_sim.certify.verdict import compare
-from care_sim.errors import InvalidInput
+from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.study.progress import Lines, bar
+from care_sim.study.running import report_problems
 
 
 def run(config: CertifyConfig) -> int:
-    """Play the list and tell; 0 where every episode goes as published, else 1."""
+    """Play the list and tell; 0 where every episode that can be played here goes as published, else 1.
+
+    Raises MissingExtra where none can be played, or not all that are to be published.
+    """
     published = [] if config.write else read()
     if config.numbers[-1] >= len(published) and not config.write:
         raise InvalidInput(f"the published list has {len(published):,} episodes")
-    _say_what_is_missing(config.numbers)
-    found = _played(config.numbers, config.workers)
+    episodes, lacking = playable([drawn(number) for number in config.numbers])
+    if lacking and (config.write or not episodes):
+        raise MissingExtra("; ".join(lacking))
+    report_problems(lacking)
+    found = _played([episode.number for episode in episodes], config.workers)
     if config.write:
         return _published(found)
-    verdict = compare(found, published)
+    verdict = compare(found, published, len(config.numbers))
     print(*verdict.lines(), sep="\n")
     return 0 if verdict.as_published else 1
 
@@ -44,13 +51,3 @@ def _published(found: Played) -> int:
     write(trails)
     print(f"{len(trails):,} episodes: {combined(trails)}, published")
     return 0
-
-
-def _say_what_is_missing(numbers: Sequence[int]) -> None:
-    many = sum(drawn(number).mode == SUBPROCESS for number in numbers)
-    if many and not has_subprocesses():
-        print(
-            f"{many} episodes for the subprocesses of Stable-Baselines3 are played alone: "
-            "they need the extra 'rl'; their hashes do not depend on it",
-            file=sys.stderr,
-        )

@@ -14,23 +14,25 @@ NOT_PLAYED = "not played"
 
 @dataclass(frozen=True)
 class Verdict:
-    """The hash of what was played, None with holes; and of the episodes that differ, by number, at which stage and
-    keyframe, or why they were not played.
+    """The hash of the `episodes` that were played of those that were `asked` for, None with holes; and of the episodes
+    that differ, by number, at which stage and keyframe, or why they failed.
     """
 
     episodes: int
+    asked: int
     hash: str | None
     differing: Mapping[int, tuple[str, int | None]]
     failures: Mapping[int, str]
 
     @property
     def as_published(self) -> bool:
-        """Whether all were played and none differs."""
+        """Whether none of those played failed or differs."""
         return not self.differing
 
     def lines(self) -> Iterator[str]:
         """What is printed."""
-        counted = f"{self.episodes:,} episodes" if self.episodes > 1 else "1 episode"
+        fewer = f"{self.episodes:,} of " if self.episodes < self.asked else ""
+        counted = f"{fewer}{self.asked:,} episodes" if self.asked > 1 else "1 episode"
         if self.as_published:
             yield f"{counted}: {self.hash}, as published"
             return
@@ -45,13 +47,15 @@ class Verdict:
         yield f"  care-sim certify --episode {first}"
 
 
-def compare(found: Played, published: Sequence[bytes]) -> Verdict:
-    """Hold trails against the published ones of the same numbers."""
+def compare(found: Played, published: Sequence[bytes], asked: int = 0) -> Verdict:
+    """Hold trails against the published ones of the same numbers; `asked`, where more were asked for than played."""
     failures = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, str)}
     trails = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, bytes)}
     parted = {number: stage(published[number], trail) for number, trail in trails.items() if trail != published[number]}
     differing = parted | dict.fromkeys(failures, (NOT_PLAYED, None))
-    return Verdict(len(found), None if failures else combined([*trails.values()]), differing, failures)
+    return Verdict(
+        len(found), asked or len(found), None if failures else combined([*trails.values()]), differing, failures
+    )
 
 
 def _where(name: str) -> str:

@@ -11,7 +11,7 @@ from care_sim.frames import Floats, turned
 from care_sim.grid import AngularGrid
 from care_sim.perception.clusters import clusters_of
 from care_sim.perception.road import ROAD_M, heights_above, road_plane
-from care_sim.perception.sides import fit_sides
+from care_sim.perception.sides import DECIMALS, fit_sides
 from care_sim.perception.sizes import MOST_MISFIT, Guess, best_guess
 from care_sim.types import Detections
 
@@ -85,7 +85,7 @@ def _one_a_place(found: list[_Candidate]) -> list[_Candidate]:
     Such are a windscreen behind a bonnet, and a side seen too obliquely to hang together.
     """
     kept: list[_Candidate] = []
-    for candidate in sorted(found, key=lambda one: (-one.points, np.hypot(*one.place))):
+    for candidate in sorted(found, key=lambda one: (-one.points, np.round(np.hypot(*one.place), DECIMALS))):
         if not any(_holds(other.guess.box, candidate.place) for other in kept):
             kept.append(candidate)
     return kept

@@ -15,6 +15,9 @@ STEP_DEG = 1.0
 ON_THE_SIDE_M = 0.02
 """Nearer to a side no point counts more: the noise of a range."""
 
+DECIMALS = 6
+"""Candidates whose scores agree in so many are equal, whatever the last bits of a processor, and the first is taken."""
+
 
 @dataclass(frozen=True)
 class Sides:
@@ -58,13 +61,14 @@ def fit_sides(plan: Floats) -> Sides:
     axes = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], axis=1)
     along = axes @ plan.T
     # Rounded, so that of headings equal but for the last bits the first is taken.
-    best = axes[np.argmax(np.round(_closeness(along), 6))]
+    best = axes[np.argmax(np.round(_closeness(along), DECIMALS))]
     return Sides(best, (best @ plan.T).min(axis=1), (best @ plan.T).max(axis=1))
 
 
 def _closeness(along: Floats) -> Floats:
     """(h,) the sum over the points of 1 / distance to the nearer of the two shown sides; `along` is (h, 2, n)."""
     to_low, to_high = along - along.min(axis=2, keepdims=True), along.max(axis=2, keepdims=True) - along
-    low_is_shown = np.linalg.norm(to_low, axis=2) <= np.linalg.norm(to_high, axis=2)
+    to_lows, to_highs = (np.round(np.linalg.norm(one, axis=2), DECIMALS) for one in (to_low, to_high))
+    low_is_shown = to_lows <= to_highs
     distance = np.where(low_is_shown[..., None], to_low, to_high).min(axis=1)
     return np.asarray((1.0 / np.maximum(distance, ON_THE_SIDE_M)).sum(axis=1))

@@ -11,7 +11,7 @@ import numpy as np
 from care_sim.frames import Floats
 from care_sim.grid import AngularGrid, Cells
 from care_sim.perception.clusters import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius
-from care_sim.perception.sides import Sides
+from care_sim.perception.sides import DECIMALS, Sides
 from care_sim.types import CLASSES
 from care_sim.world.bodies import CATALOGUE
 
@@ -42,7 +42,7 @@ class Guess:
 def best_guess(sides: Sides, top_m: float, road_z: float, sensor_height_m: float, grid: AngularGrid) -> Guess:
     """The class and box for `sides` whose highest point is `top_m` above the road, itself at `road_z`."""
     seen = np.append(sides.spans + _hidden_ends(sides, grid), top_m + grid.row_height * sides.range_m / 2)
-    misfits = _misfits(sides, seen, sensor_height_m, grid)
+    misfits = np.round(_misfits(sides, seen, sensor_height_m, grid), DECIMALS)
     best = int(np.argmin(misfits))
     return Guess(int(_CLASSES[best]), _completed(sides, seen, best, road_z), float(misfits[best]))
 
@@ -86,7 +86,7 @@ def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
     along = np.where(sides.low > 0, sides.low + half, np.where(sides.high < 0, sides.high - half, sides.middle))
     centre = along @ sides.axes
     forward = which // len(_KINDS)
-    heading = sides.axes[forward] * (1.0 if np.round(sides.middle[forward], 6) >= 0 else -1.0)
+    heading = sides.axes[forward] * (1.0 if np.round(sides.middle[forward], DECIMALS) >= 0 else -1.0)
     length_width = extents[[forward, 1 - forward]]
     yaw = np.arctan2(heading[1], heading[0])
     return np.array([*centre, road_z + extents[2] / 2, *length_width, extents[2], yaw])

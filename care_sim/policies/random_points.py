@@ -15,7 +15,8 @@ from care_sim.types import Rig
 class RandomPoints(MatchedFraction):
     """The first reference of the paper (Sec. 5.1): a matched fraction of the full cloud, drawn at random.
 
-    `seed` and the cloud decide the draw, so that no two keyframes or episodes share one.
+    `seed` and the cells that return decide the draw, so that no two keyframes or episodes share one in which others
+    do: whole numbers, which are the same on every processor.
     """
 
     name = "random-points"
@@ -28,5 +29,5 @@ class RandomPoints(MatchedFraction):
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
         """`count` cells at random."""
-        rng = np.random.default_rng((self._seed, crc32(points.tobytes())))
+        rng = np.random.default_rng((self._seed, crc32(cells.tobytes())))
         return rng.choice(cells, count, replace=False)

@@ -1,21 +1,25 @@
 """The certificate: the list holds all that can meet, no mode changes an episode, and a break is named where it is."""
 
+import sys
 from dataclasses import fields, replace
 from itertools import combinations, product
 
 import numpy as np
 import pytest
 
-from care_sim.certify import design, published
-from care_sim.certify.design import CLOSED, FAULTS, MODES, REPLAY, SETTINGS, STREET, drawn, modes
+from care_sim.certify import design, needs, published, run
+from care_sim.certify.config import CertifyConfig
+from care_sim.certify.design import CLOSED, FAULTS, MODES, POLICIES, REPLAY, SETTINGS, STREET, drawn, modes
 from care_sim.certify.drive import write_drive
 from care_sim.certify.modes import in_turns, play
+from care_sim.certify.needs import FARTHEST, playable
 from care_sim.certify.playing import batches, played
 from care_sim.certify.trail import CONFIGURATION, DIGEST_BYTES, OUTCOME, STAGES, stage
 from care_sim.certify.verdict import compare
 from care_sim.conditions import CameraFaults, LidarFaults
 from care_sim.control import BrakingController
 from care_sim.envs import sensing
+from care_sim.errors import InvalidInput, MissingExtra
 from care_sim.perception.memory import TrackMemory
 from care_sim.policies import BUILT_IN
 from care_sim.sensors.camera import CameraDetector
@@ -43,11 +47,11 @@ def alone(episode, source=""):
 
 def test_a_thousand_episodes_hold_every_pair_that_can_meet():
     met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
-    assert {(e, p) for e, p, _, _ in met} == set(product({*CLOSED, STREET, REPLAY}, BUILT_IN))
-    possible = {(e, m) for e, p in product({*CLOSED, STREET, REPLAY}, BUILT_IN) for m in modes(e, p)}
+    assert {(e, p) for e, p, _, _ in met} == set(product({*CLOSED, STREET, REPLAY}, POLICIES))
+    possible = {(e, m) for e, p in product({*CLOSED, STREET, REPLAY}, POLICIES) for m in modes(e, p)}
     assert {(e, m) for e, _, m, _ in met} == possible
     names = {name for one in (*FAULTS.values(), *SETTINGS.values()) for name in one}
-    assert {(p, n) for _, p, _, given in met for n in given} >= set(product(BUILT_IN, names))
+    assert {(p, n) for _, p, _, given in met for n in given} >= set(product(POLICIES, names))
     assert {(m, n) for _, _, m, given in met for n in given} >= set(product(MODES, names))
     faults = {name for one in FAULTS.values() for name in one}
     together = {pair for _, _, _, given in met for pair in combinations(sorted(given), 2)}
@@ -57,6 +61,11 @@ def test_a_thousand_episodes_hold_every_pair_that_can_meet():
 def test_every_fault_of_the_conditions_is_in_the_list():
     faults = {field.name for kind in (CameraFaults, LidarFaults) for field in fields(kind)} | {"ego_speed_sigma"}
     assert {name for one in FAULTS.values() for name in one} == faults
+
+
+def test_every_built_in_policy_is_in_the_list():
+    """One that is missing is added at the end of POLICIES, and the list is published anew."""
+    assert [name for name in BUILT_IN if name not in POLICIES] == []
 
 
 def test_an_episode_of_the_list_does_not_move():
@@ -99,6 +108,39 @@ def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch
     verdict = compare(found | {0: found[bad.number]}, [found[good.number]] * 1000)
     assert verdict.differing[bad.number] == ("not played", None)
     assert verdict.hash is None
+
+
+@pytest.mark.parametrize(("module", "extra"), [("open3d", "open3d"), ("stable_baselines3", "rl")])
+def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(module, extra, monkeypatch, capsys):
+    able, lines = playable(LIST)
+    assert (able, lines) == (LIST, [])
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(needs, "find_spec", lambda name: None if name == module else name)
+    able, (line,) = playable(LIST)
+    missing = len(LIST) - len(able)
+    assert line.startswith(f"{missing} of 1,000 not played: ")
+    assert f"extra '{extra}'" in line
+    trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(1000)]
+    monkeypatch.setattr(run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers})
+    monkeypatch.setattr(run, "read", lambda: trails)
+    assert run.run(CertifyConfig(workers=1)) == 0
+    told = capsys.readouterr()
+    assert told.err.splitlines() == [f"care-sim: {line}"]
+    left = published.combined([trails[episode.number] for episode in able])
+    assert told.out == f"{len(able)} of 1,000 episodes: {left}, as published\n"
+    lacking = next(one.number for one in LIST if one not in able)
+    for config in (CertifyConfig(episode=lacking), CertifyConfig(every=True, write=True)):
+        with pytest.raises(MissingExtra, match=f"extra '{extra}'"):
+            run.run(config)
+
+
+def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    closed = [episode for episode in playable(LIST)[0] if episode.environment in CLOSED]
+    policies = {episode.policy: replace(episode, keyframes=2) for episode in closed}
+    assert set(POLICIES) - set(policies) == {FARTHEST}
+    for episode in policies.values():
+        alone(episode)
 
 
 MADE = replace(
@@ -230,8 +272,10 @@ def test_the_combined_hash_is_over_the_order_of_the_numbers():
     assert published.combined([one, two]) != published.combined([two, one])
 
 
-def test_a_damaged_list_is_one_line(tmp_path):
+def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     file = tmp_path / "list.parquet"
+    with pytest.raises(InvalidInput, match=r"^the list of certify is missing: install the package again$"):
+        published.read(file)
     published.write([b"12345678" + b"x"], file)
     assert published.read(file) == [b"12345678x"]
     file.write_bytes(b"no")
