@@ -163,7 +163,7 @@ def _is_interrupt(error: BaseException) -> bool:
     return link is not None
 
 
-def _end_with(error: Exception, trace: bool) -> NoReturn:
+def _end_with(error: BaseException, trace: bool) -> NoReturn:
     """Say in one line what was wrong, and exit; a fault of the software is raised again where its trace is wanted."""
     if isinstance(error, InvalidInput | MissingExtra):
         _complain(str(error))

@@ -60,8 +60,9 @@ def prepare(name):
     if first == "train":
         import sb3_contrib  # noqa: F401
         import stable_baselines3  # noqa: F401
-    if first in ("bench", "parity"):
+    if first in ("bench", "parity", "certify"):
         import care_sim.bench.run
+        import care_sim.certify.run
         import care_sim.parity.run  # noqa: F401
     if "--record" in text:
         import rerun  # noqa: F401

@@ -39,16 +39,20 @@ class Inline(Executor):
 @contextmanager
 def inline(seconds=PLAYS_S):
     """Studies play in this process, for so long."""
+    from care_sim.certify.playing import played
     from care_sim.study import executors
-    from care_sim.study.page import build
+    from care_sim.study.page.build import write_page
 
-    usual, defaults = executors.processes, build.write_page.__defaults__
+    usual, defaults = executors.processes, {made: made.__defaults__ for made in (write_page, played)}
     executors.processes = partial(Inline, seconds)
-    build.write_page.__defaults__ = (executors.processes,)
+    for made, values in defaults.items():
+        made.__defaults__ = tuple(executors.processes if value is usual else value for value in values)
     try:
         yield
     finally:
-        executors.processes, build.write_page.__defaults__ = usual, defaults
+        executors.processes = usual
+        for made, values in defaults.items():
+            made.__defaults__ = values
 
 
 def care_sim(*arguments):

@@ -11,7 +11,7 @@ from torture.judge import ending
 from torture.processes import Command
 from torture.wrong import KINDS, WAYS
 
-SHORT = {"commands": 100, "shell": 5, "calls": 500, "files": 80, "journals": 15, "kills": 2, "writers": 1, "disk": 3}
+SHORT = {"commands": 60, "shell": 4, "calls": 300, "files": 40, "journals": 8, "kills": 1, "writers": 1, "disk": 2}
 """Cases of each campaign: under a minute together, on two cores."""
 
 
