@@ -116,5 +116,6 @@ def test_a_last_bit_does_not_choose_between_two_headings_that_fit_alike(span, bi
 def test_a_last_bit_does_not_choose_the_side_that_is_shown(bit):
     """Of points whose mean is midway, both sides are as near."""
     even = np.array([[[0.0, 4.0, 4.0, 1.0, 6.0], [0.0, 10.0, 20.0, 30.0, 60.0]]])
-    moved = even + [[[0.0, bit, 0.0, 0.0, 0.0], [0.0] * 5]]
+    moved = even.copy()
+    moved[0, 0, 1] += bit
     assert _closeness(moved) == pytest.approx(_closeness(even))
