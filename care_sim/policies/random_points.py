@@ -7,6 +7,7 @@ import numpy as np
 from care_sim.errors import check_seed
 from care_sim.frames import Floats
 from care_sim.grid import Cells
+from care_sim.imprint import imprint
 from care_sim.policies.matched_fraction import MatchedFraction
 from care_sim.truth import Truth
 from care_sim.types import Rig
@@ -15,8 +16,8 @@ from care_sim.types import Rig
 class RandomPoints(MatchedFraction):
     """The first reference of the paper (Sec. 5.1): a matched fraction of the full cloud, drawn at random.
 
-    `seed` and the cells that return decide the draw, so that no two keyframes or episodes share one in which others
-    do: whole numbers, which are the same on every processor.
+    `seed` and the cloud decide the draw, so that no two keyframes or episodes share one; the last bits of the cloud,
+    which are a processor's own, do not.
     """
 
     name = "random-points"
@@ -29,5 +30,5 @@ class RandomPoints(MatchedFraction):
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
         """`count` cells at random."""
-        rng = np.random.default_rng((self._seed, crc32(cells.tobytes())))
+        rng = np.random.default_rng((self._seed, crc32(imprint(cells, points))))
         return rng.choice(cells, count, replace=False)

@@ -24,6 +24,7 @@ from care_sim.perception.memory import TrackMemory
 from care_sim.policies import BUILT_IN
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.lidar import Lidar
+from care_sim.sensors.recorded import RecordedLidar
 from care_sim.types import Scan
 from care_sim.world.world import World
 
@@ -248,6 +249,20 @@ def test_what_is_broken_is_named(broken, where, monkeypatch):
     sound = alone(MADE)
     broken(monkeypatch)
     assert stage(sound, alone(MADE)) == where
+
+
+def test_what_is_broken_in_a_recording_is_named(source, monkeypatch):
+    recorded = replace(MADE, environment=REPLAY)
+    sound = alone(recorded, source)
+    fire, calls = RecordedLidar.fire, []
+
+    def longer(self, cells, cloud):
+        returned = fire(self, cells, cloud)
+        calls.append(0)
+        return replace(returned, points=returned.points * (1 + 0.001 * (len(calls) == 3)))
+
+    monkeypatch.setattr(RecordedLidar, "fire", longer)
+    assert stage(sound, alone(recorded, source)) == (STAGES[4], 2)
 
 
 def test_another_configuration_is_named():

@@ -7,9 +7,11 @@ from hypothesis import strategies as st
 from made_points import HEIGHT, face, road, shell
 
 from care_sim.frames import turned
+from care_sim.grid import AngularGrid
 from care_sim.perception.clusters import NEAR_RADIUS_M, cluster_radius, clusters_of
 from care_sim.perception.road import STEEPEST, heights_above, road_plane
-from care_sim.perception.sides import fit_sides
+from care_sim.perception.sides import Sides, _closeness, fit_sides
+from care_sim.perception.sizes import best_guess
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.01, -0.025])
@@ -96,3 +98,24 @@ def test_a_round_post_is_fitted_alike_from_every_column(grid):
         ]
     )
     assert np.ptp(axes, axis=0) == pytest.approx([0, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("span", [0.3, 0.7, 1.8])
+@pytest.mark.parametrize("bit", [1e-13, -1e-13])
+def test_a_last_bit_does_not_choose_between_two_headings_that_fit_alike(span, bit):
+    low = np.array([8.0, 8.0])
+
+    def guess(moved):
+        return best_guess(Sides(np.eye(2), low, low + span + [0.0, moved]), 1.7, -HEIGHT, HEIGHT, AngularGrid())
+
+    assert guess(bit).label == guess(0.0).label
+    assert guess(bit).box == pytest.approx(guess(0.0).box)
+
+
+@pytest.mark.parametrize("bit", [1e-13, -1e-13])
+def test_a_last_bit_does_not_choose_the_side_that_is_shown(bit):
+    """Of points whose mean is midway, both sides are as near."""
+    even = np.array([[[0.0, 4.0, 4.0, 1.0, 6.0], [0.0, 10.0, 20.0, 30.0, 60.0]]])
+    moved = even.copy()
+    moved[0, 0, 1] += bit
+    assert _closeness(moved) == pytest.approx(_closeness(even))

@@ -163,6 +163,14 @@ def test_random_points_are_drawn_anew_for_every_cloud_and_seed(environment):
     assert max(pairs) < share + 0.05
 
 
+def test_random_points_do_not_hang_on_the_last_bits_of_the_cloud(environment):
+    policy = care_sim.make_policy("random-points", environment)
+    cells = np.arange(0, 900, 3)
+    points = np.random.default_rng(0).uniform(1, 50, (300, 3))
+    assert (policy.kept(cells, points, 20) == policy.kept(cells, np.nextafter(points, 99), 20)).all()
+    assert (policy.kept(cells, points, 20) != policy.kept(cells, points + 0.001, 20)).any()
+
+
 def test_the_seed_of_random_points_is_checked(environment):
     with pytest.raises(InvalidInput, match="seed must be a whole number >= 0, got -1"):
         care_sim.make_policy("random-points", environment, seed=-1)
