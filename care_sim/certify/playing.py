@@ -10,7 +10,7 @@ from care_sim.certify.design import CLOSED, HASH_SEED, STREET, SUBPROCESS, Drawn
 from care_sim.certify.drive import write_drive
 from care_sim.certify.modes import Left, play, together
 from care_sim.study.episode import answer
-from care_sim.study.executors import ExecutorFactory, processes
+from care_sim.study.executors import ExecutorFactory, Processes, processes
 
 Played = dict[int, Left]
 """The trail of every episode by number, or in one line why there is none."""
@@ -26,7 +26,7 @@ def played(
     show: Callable[[int], None] = lambda _done: None,
     make_executor: ExecutorFactory = processes,
 ) -> Played:
-    """Play episodes; `show` is told how many are done. An interrupt does not wait for those that have not begun."""
+    """Play episodes; `show` is told how many are done. An interrupt waits for none of them."""
     found: Played = {}
     with TemporaryDirectory(prefix="care-sim-certify-") as folder:
         source = write_drive(Path(folder))
@@ -40,6 +40,10 @@ def played(
                 except BrokenExecutor:
                     found |= {episode.number: "the process that played it died" for episode in futures[future]}
                 show(len(found))
+        except KeyboardInterrupt:
+            if isinstance(executor, Processes):
+                executor.end_at_once()
+            raise
         finally:
             executor.shutdown(cancel_futures=True)
     return found
