@@ -15,8 +15,8 @@ EPISODES, ALL_EPISODES = 1_000, 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class CertifyConfig:
-    """Play a published list of episodes, of every environment, built-in policy and fault, alone and in every kind of vector,
-    and say whether they go as published, or which one does not and where.
+    """Play a published list of episodes, of every environment, built-in policy and fault, alone and in every kind of
+    vector, and say whether they go as published, or which one does not and where.
     """
 
     every: Annotated[bool, tyro.conf.arg(name="all"), tyro.conf.FlagCreatePairsOff] = False

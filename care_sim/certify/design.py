@@ -77,7 +77,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 CLOSED_ALONE = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine", "keyframe_s")
 """What a film cannot take on."""
 
-CLOSED_KEYFRAMES = (4, 4, 4, 6, 6, 8, 8, 8, 8, 12, 12, 16, 16, 60)
+CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)
 OPEN_KEYFRAMES = (2, 4, 4, 8, 8, 12, 40)
 """Lengths: mostly short, some whole."""
 STREETS, MORE_STREETS = (3000, 3001), tuple(range(3000, 3012))
