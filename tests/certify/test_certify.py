@@ -3,12 +3,13 @@
 import sys
 from dataclasses import fields, replace
 from itertools import combinations, product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from care_sim.certify import design, needs, published, run
-from care_sim.certify.config import CertifyConfig
+from care_sim.certify.config import EPISODES, CertifyConfig
 from care_sim.certify.design import CLOSED, FAULTS, MODES, POLICIES, REPLAY, SETTINGS, STREET, drawn, modes
 from care_sim.certify.drive import write_drive
 from care_sim.certify.modes import in_turns, play
@@ -311,3 +312,8 @@ def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
     verdict = compare(played([number], 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
+
+
+def test_the_readme_tells_the_hash_of_the_list():
+    readme = Path(__file__).parents[2] / "README.md"
+    assert f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}" in readme.read_text()
