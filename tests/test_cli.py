@@ -60,7 +60,7 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["run", "dense", "--scenario-parameters", "wheels=3"], ["'wheels'", "vehicles"]),
         (["run", "dense", "--scenario-parameters", "wheels"], ["NAME=VALUE", "'wheels'"]),
         (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
-        (["sweep", "--seeds", "0"], ["seeds", ">= 1"]),
+        (["sweep", "--seeds", "0"], ["seeds", "from 1 to"]),
         (["sweep", "--budgets"], ["--budgets", "at least one"]),
         (["sweep", "--scenarios"], ["--scenarios", "at least one"]),
         (["reproduce", "--workers", "0"], ["workers", ">= 1"]),

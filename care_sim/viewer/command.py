@@ -50,6 +50,8 @@ class View:
     def __call__(self) -> int:
         """Run it."""
         import_rerun()
+        if self.file.exists() and not self.file.is_file():
+            raise InvalidInput(f"{self.file} is no file, a recording is wanted")
         with self.file.open("rb") as recording:
             if recording.read(len(RERUN)) != RERUN:
                 raise InvalidInput(f"{self.file} is no recording of `care-sim run --record`")

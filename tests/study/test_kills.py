@@ -9,7 +9,7 @@ from descendants import Marked, until
 
 from care_sim.study.report import JOURNAL
 
-COMMAND = [sys.executable, "-c", "import sys; from care_sim.cli import main; main(sys.argv[1:])"]
+COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'care-sim'; from care_sim.cli import main; main()"]
 STARTS = """
 import signal, sys, time
 for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
