@@ -16,7 +16,6 @@ RESERVE_FRACTION = 0.3
 HIGHEST_CELL = 2**24
 """A thousand times the cells of the paper's grid."""
 
-
 SETS = "a list of sets of cells"
 _NO_CELLS = np.empty(0, np.int64)
 

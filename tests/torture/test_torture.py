@@ -12,7 +12,7 @@ from torture.processes import Command
 from torture.wrong import KINDS, WAYS
 
 SHORT = {"commands": 60, "shell": 4, "calls": 300, "files": 40, "journals": 8, "kills": 1, "writers": 1, "disk": 2}
-"""Cases of each campaign: under a minute together, on two cores."""
+"""Cases of each campaign: about a minute together, on two cores."""
 
 
 @pytest.fixture(scope="module")
