@@ -11,8 +11,8 @@ from torture.judge import ending
 from torture.processes import Command
 from torture.wrong import KINDS, WAYS
 
-SHORT = {"commands": 60, "shell": 4, "calls": 300, "files": 40, "journals": 8, "kills": 1, "writers": 1, "disk": 2}
-"""Cases of each campaign: about a minute together, on two cores."""
+SHORT = {"commands": 45, "shell": 4, "calls": 300, "files": 40, "journals": 8, "kills": 1, "writers": 1, "disk": 2}
+"""Cases of each campaign: 50 seconds together, on two cores."""
 
 
 @pytest.fixture(scope="module")
