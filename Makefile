@@ -68,7 +68,7 @@ check: $(VENV)/.developing
 	$(MAKE) lint test
 
 torture: $(VENV)/.developing
-	PYTHONPATH=tests:tests/sources $(BIN)/python -m torture $(if $(CASE),--case $(CASE),--seed $(SEED) \
+	$(BIN)/python -m tests.torture $(if $(CASE),--case $(CASE),--seed $(SEED) \
 	  $(if $(CASES),--cases $(CASES),--seconds $(SECONDS)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)))
 
 $(OFFICIAL)/.installed: constraints-official.txt

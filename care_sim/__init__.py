@@ -5,19 +5,19 @@ Importing the package registers the environments of the closed loop, `CARE-Darto
 """
 
 # First of all: an interrupt may come while the rest is imported.
-import care_sim.interrupts  # noqa: F401
+import care_sim.base.interrupts  # noqa: F401
 
 # isort: split
 from importlib.metadata import version
 
-from care_sim.allocation import allocate
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.allocation import allocate
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import CLASSES, Belief, Demand, Detections, ImageDetections, Rig, Tracks
 from care_sim.envs import register_all
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.grid import AngularGrid
 from care_sim.policies import make_policy, policy_names
 from care_sim.policies.base import Policy
 from care_sim.policies.privileged import PrivilegedPolicy
-from care_sim.types import CLASSES, Belief, Demand, Detections, ImageDetections, Rig, Tracks
 
 __version__ = version("care-sim")
 __all__ = [

@@ -14,14 +14,14 @@ from typing import Any, NoReturn
 
 import tyro
 
-from care_sim import interrupts
-from care_sim.bounds import allowed
-from care_sim.errors import InvalidInput, MissingExtra, one_line, shortened, shown
-from care_sim.study.commands import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
-from care_sim.study.compare import Compare
-from care_sim.study.export import Export
-from care_sim.study.protocol import Protocol
-from care_sim.viewer.command import View
+from care_sim.base import interrupts
+from care_sim.base.bounds import allowed
+from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
+from care_sim.commands.closed_loop import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
+from care_sim.commands.compare import Compare
+from care_sim.commands.export import Export
+from care_sim.commands.protocol import Protocol
+from care_sim.commands.view import View
 
 BAD_INPUT, UNEXPECTED, UNREAD = 2, 70, 141
 """Exit codes: that of a fault in the software is `EX_SOFTWARE` of BSD, the last that of a shell for the signal."""
@@ -46,7 +46,7 @@ class Detectors:
 
     def __call__(self) -> int:
         """Run it."""
-        from care_sim.perception.registry import listing
+        from care_sim.perception.listing import listing
 
         print(*listing(), sep="\n")
         return 0
@@ -241,7 +241,7 @@ def _chosen_of(commands: dict[str, Callable[..., Any]], prog: str, about: str | 
 
 
 def _measure(name: str, *options: str) -> int:
-    config, run = (importlib.import_module(f"care_sim.{name}.{part}") for part in ("config", "run"))
+    config, run = (importlib.import_module(f"care_sim.measure.{name}.{part}") for part in ("config", "run"))
     parsed = _in_one_line(lambda: tyro.cli(getattr(config, MEASURES[name]), args=options, prog=f"care-sim {name}"))
     return int(run.run(parsed))
 

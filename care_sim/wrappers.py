@@ -2,9 +2,9 @@
 others watch an episode.
 """
 
-from care_sim.envs.export_scans import ExportScans
-from care_sim.envs.grid_observation import GridObservation
-from care_sim.envs.sector_actions import SectorReserve, SectorScores
-from care_sim.viewer.wrapper import RecordRerun
+from care_sim.envs.wrappers.export_scans import ExportScans
+from care_sim.envs.wrappers.grid_observation import GridObservation
+from care_sim.envs.wrappers.record_rerun import RecordRerun
+from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 
 __all__ = ["ExportScans", "GridObservation", "RecordRerun", "SectorReserve", "SectorScores"]

@@ -4,14 +4,15 @@ import sys
 
 import numpy as np
 import pytest
-from av2_log import at, box, write
 from hypothesis import settings
 
-from care_sim.errors import MissingExtra
-from care_sim.extras import import_open3d
-from care_sim.grid import AngularGrid
-from care_sim.types import CLASSES, ImageDetections, Tracks
+from care_sim.base.errors import MissingExtra
+from care_sim.base.extras import import_open3d
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.world.bullet import BulletWorld
+from tests.helpers.av2_log import at, box, write
+from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
 
 settings.register_profile("repeatable", deadline=None, derandomize=True, database=None, max_examples=60)
 settings.load_profile("repeatable")
@@ -100,3 +101,16 @@ def install(tmp_path, monkeypatch):
     yield put
     for package in packages:
         sys.modules.pop(package, None)
+
+
+@pytest.fixture
+def third_party(tmp_path, monkeypatch):
+    """An installed package whose policies do not behave."""
+    site = tmp_path / "site"
+    info = site / "misbehaving-1.0.dist-info"
+    info.mkdir(parents=True)
+    (site / "misbehaving.py").write_text(THIRD_PARTY)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: misbehaving\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.syspath_prepend(site)
+    return site

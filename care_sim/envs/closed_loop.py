@@ -1,4 +1,4 @@
-"""The closed-loop environments: thin Gymnasium adapters around `care_sim.loop`."""
+"""The closed-loop environments: thin Gymnasium adapters around `care_sim.loops.closed_loop`."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -7,18 +7,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim import reward as rewards
-from care_sim.companion import seen_on_a_drive
+from care_sim.base.errors import check_choice, check_number
+from care_sim.core.types import Action, Keyframe
+from care_sim.envs import reward as rewards
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
-from care_sim.errors import check_choice, check_number
 from care_sim.evaluation.metrics import outcome
-from care_sim.loop import ClosedLoop
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.other_drive import seen_on_a_drive
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.sensors.engines import check_engine
-from care_sim.sensors.ghosts import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.engines.engine import check_engine
+from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
 from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.types import Action, Keyframe
 from care_sim.world.world import STEP_S, whole_steps
 
 LONGEST_KEYFRAME_S = 1.0
@@ -44,10 +44,10 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
-    What is kept of more rows, and of numbers that no sensor can tell: `care_sim.limits`.
+    What is kept of more rows, and of numbers that no sensor can tell: `care_sim.core.observation_limits`.
 
     ### Reward
-    A weighted sum of `care_sim.reward.terms`: undetected time in view, clearance, collision, needless braking, and,
+    A weighted sum of `care_sim.envs.reward.terms`: undetected time in view, clearance, collision, needless braking, and,
     with `reward_weights={"gain": ...}`, the first-detection distance against the full-scan bound. Every term is at
     most 0, so is the best return. It knows what no observation shows: a learner may learn from it, no policy may read
     it while it plays.
@@ -68,9 +68,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `in_view` | whether a faultless camera shows that actor | scoring alone |
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
-    | `reward_terms` | `care_sim.reward.terms` | scoring alone |
+    | `reward_terms` | `care_sim.envs.reward.terms` | scoring alone |
     | `seed` | of `reset`: repeats the episode, and so tells all of it | scoring alone |
-    | `outcome` | at the end: a dict of `care_sim.types.Outcome` | scoring alone |
+    | `outcome` | at the end: a dict of `care_sim.core.types.Outcome` | scoring alone |
 
     (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector environments stack arrays of
     one length. (2) A car knows what it detected, and has it as tracks; which one the episode is about it does not know.
@@ -78,8 +78,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ### Arguments
     `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode` None or
     "rgb_array"; `scoring_info` (above); `secret`, a text that enters everything that a seed draws, so that an agent
-    that holds this package cannot look its episodes up (`care_sim.streams`; none, unless given); any field of the
-    scenario; and the conditions, any field of `care_sim.conditions.Conditions`. Of these, the allocator:
+    that holds this package cannot look its episodes up (`care_sim.base.random_streams`; none, unless given); any field of the
+    scenario; and the conditions, any field of `care_sim.core.conditions.Conditions`. Of these, the allocator:
     `reserve_fraction` rho, `floor`, `floor_seed`, `azimuth_margin`, `elevation_margin`. The detectors: `engine`,
     `min_returns`, `camera_confidence`. Camera faults: `false_negative_rate`, `false_negative_per_m`,
     `false_negative_burst` (keyframes), `false_positive_rate` (a picture), `camera_latency` and `camera_jitter` (whole
@@ -155,7 +155,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
         if self.render_mode is None:
             return None
-        from care_sim.envs.picture import draw_keyframe
+        from care_sim.viewer.pictures.keyframe import draw_keyframe
 
         return draw_keyframe(self.loop, self.keyframes[-1] if self.keyframes else None)
 

@@ -1,4 +1,4 @@
-"""The open-loop environments: thin Gymnasium adapters around `care_sim.openloop`."""
+"""The open-loop environments: thin Gymnasium adapters around `care_sim.loops.open_loop`."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -10,22 +10,22 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.conditions import MIN_RETURNS
+from care_sim.base.errors import InvalidInput, check_choice, shown
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import Action
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
-from care_sim.errors import InvalidInput, check_choice, shown
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import Score
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
-from care_sim.film import Film
-from care_sim.openloop import Exposure, OpenLoop
-from care_sim.perception.registry import PROXY, check_detector, make_detector
-from care_sim.pinhole import PinholeCamera
+from care_sim.loops.film import Film
+from care_sim.loops.open_loop import Exposure, OpenLoop
+from care_sim.perception.listing import PROXY, check_detector, make_detector
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.recordings import film_of, recordings
-from care_sim.streets.draft import KEYFRAME_S
-from care_sim.streets.recording import street_film
-from care_sim.types import Action
+from care_sim.sources.streets.draft import KEYFRAME_S
+from care_sim.sources.streets.recording import street_film
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film, once made, cannot take on."""
@@ -61,10 +61,10 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     ### Arguments
     `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in the closed loop;
-    `detector` by name (`care_sim.perception.registry.detector_names`) and `detector_parameters`; `presence`
+    `detector` by name (`care_sim.perception.listing.detector_names`) and `detector_parameters`; `presence`
     "annotated" or "visible", who is present at scene start and so never a first sighting
     (`care_sim.evaluation.sightings`); any field of
-    `care_sim.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the
+    `care_sim.core.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the
     cameras' mount, the engine. `min_returns` is the `returns` detector's. A value that is not allowed raises
     `care_sim.InvalidInput`.
     """
@@ -144,7 +144,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """A picture (H, W, 3) of the last keyframe from above: who was found, what returned, what fired."""
         if self.render_mode is None:
             return None
-        from care_sim.envs.plan import draw_plan
+        from care_sim.viewer.pictures.scene_from_above import draw_plan
 
         exposure = self.exposures[-1] if self.exposures else None
         index = exposure.index if exposure else self.loop.index
@@ -158,7 +158,7 @@ class FilmEnv(OpenLoopEnv):
 
     def __init__(self, film: Film, **parameters: Any):
         if not isinstance(film, Film):
-            raise InvalidInput(f"film must be a care_sim.film.Film, got {shown(film)}")
+            raise InvalidInput(f"film must be a care_sim.loops.film.Film, got {shown(film)}")
         self.film = film
         super().__init__(film.cameras, film.sensor_height_m, film.keyframe_s, **parameters)
 

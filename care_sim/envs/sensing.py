@@ -7,18 +7,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from care_sim.allocation import budget_cells, fired_cells
-from care_sim.conditions import Conditions
+from care_sim.base.errors import InvalidInput, check_flag, check_seed, shown
+from care_sim.base.random_streams import check_secret, streams
+from care_sim.core.allocation import budget_cells, fired_cells
+from care_sim.core.conditions import Conditions
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.random_floor import Floor
+from care_sim.core.types import Action, Belief, Rig
 from care_sim.envs.spaces import checked_scores, observation_space
-from care_sim.envs.truth import EpisodeTruth, Loop
-from care_sim.errors import InvalidInput, check_flag, check_seed, shown
-from care_sim.floor import Floor
-from care_sim.grid import AngularGrid, Cells
-from care_sim.pinhole import PinholeCamera
+from care_sim.loops.episode_truth import EpisodeTruth, Loop
+from care_sim.loops.truth import Truth
 from care_sim.sensors.lidar import dead_cells
-from care_sim.streams import check_secret, streams
-from care_sim.truth import Truth
-from care_sim.types import Action, Belief, Rig
 
 Observed = dict[str, NDArray[np.float32]]
 
@@ -92,7 +92,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
-        """`count` independent streams of an episode; see `care_sim.streams`."""
+        """`count` independent streams of an episode; see `care_sim.base.random_streams`."""
         return streams(entropy, count, self._secret)
 
     def told(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:

@@ -6,14 +6,14 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, as_array
-from care_sim.frames import Floats
-from care_sim.limits import Limits
-from care_sim.types import MAX_DETECTIONS, MAX_TRACKS, Rig
+from care_sim.base.errors import InvalidInput, as_array
+from care_sim.core.frames import Floats
+from care_sim.core.observation_limits import Limits
+from care_sim.core.types import MAX_DETECTIONS, MAX_TRACKS, Rig
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:
-    """The bounded observation space of a rig; keys and columns as in `care_sim.types`, bounds of `care_sim.limits`."""
+    """The bounded observation space of a rig; keys and columns as in `care_sim.core.types`, bounds of `care_sim.core.observation_limits`."""
     grid, limits = rig.grid, Limits(rig)
     return spaces.Dict(
         {

@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
-from care_sim.grid import Cells
+from care_sim.base.errors import InvalidInput
+from care_sim.core.grid import Cells
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 
 RESAMPLES = 10_000
 """Paired resamples (paper, Remark 1)."""

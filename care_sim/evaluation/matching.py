@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from care_sim.errors import InvalidInput
-from care_sim.film import Annotations
-from care_sim.frames import Floats
-from care_sim.types import Detections
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats
+from care_sim.core.types import Detections
+from care_sim.loops.film import Annotations
 
 MATCH_M = 2.0
 """Greatest planar distance between the centres of an object and of its detection, this value included."""

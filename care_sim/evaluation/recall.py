@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_whole
+from care_sim.base.errors import InvalidInput, check_whole
+from care_sim.core.grid import Cells
+from care_sim.core.types import CLASSES, Detections
 from care_sim.evaluation import matching
 from care_sim.evaluation.sightings import Sightings
-from care_sim.grid import Cells
-from care_sim.types import CLASSES, Detections
 
 CENSORED_AT = 6
 """K, in keyframes: three seconds at 2 Hz (paper, Remark 1)."""

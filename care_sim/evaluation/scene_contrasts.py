@@ -9,11 +9,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats
 from care_sim.evaluation.bootstrap import Interval, paired_difference, ratio_of_sums
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
-from care_sim.frames import Floats
 
 Tallies = Mapping[str, Tally]
 """The tally of every scene, by its name."""

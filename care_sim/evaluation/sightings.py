@@ -14,7 +14,7 @@ settles every case:
 - never within R: no event.
 
 The sentence says nothing of who could be seen. So an object that its source annotates within R at the first keyframe
-is present there though neither a return nor a pixel tells of it (`care_sim.film.Film.hidden`), and is no event when it
+is present there though neither a return nor a pixel tells of it (`care_sim.loops.film.Film.hidden`), and is no event when it
 shows itself: `presence="annotated"`, the rule. That takes out the very case after which the closed loop is made: the
 person who stands behind a parked van from the first keyframe on and then walks out. How much it takes out depends on
 who annotates. People drew the boxes of recordings, and seldom drew one where they saw nothing; the generator of a
@@ -29,10 +29,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, check_number, shown
-from care_sim.film import NO_ANNOTATIONS, Annotations
-from care_sim.frames import Floats
-from care_sim.grid import Cells
+from care_sim.base.errors import InvalidInput, check_number, shown
+from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
+from care_sim.loops.film import NO_ANNOTATIONS, Annotations
 
 RANGE_M = 50.0
 """R: planar distance from the sensor to the centre of the box, this value included (paper, Remark 1)."""
@@ -44,7 +44,7 @@ ANNOTATED, VISIBLE = PRESENCES = ("annotated", "visible")
 class ObjectFrames:
     """Every annotated object at every keyframe at which it is in range, in order of keyframe, as columns of one table.
 
-    `keyframes` (r,) from 0, `objects` (r,) numbers of the film, `classes` (r,) into `care_sim.types.CLASSES`,
+    `keyframes` (r,) from 0, `objects` (r,) numbers of the film, `classes` (r,) into `care_sim.core.types.CLASSES`,
     `ranges` (r,) planar metres and `azimuths` (r,) radians from straight ahead towards the left, in the sensor frame.
     """
 

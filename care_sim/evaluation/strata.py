@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import ObjectFrames
-from care_sim.types import CLASSES
 
 NEAR_M, FAR_M = 20.0, 35.0
 """Bounds of the range strata. 20 m is the paper's near field (Sec. 5.4); 35 m halves what is left of the 50 m."""

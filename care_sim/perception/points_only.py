@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.film import NOBODY, Annotations, Cloud
-from care_sim.frames import Floats, turned
-from care_sim.grid import Cells
-from care_sim.types import CLASSES, Detections
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.frames import Floats, turned
+from care_sim.core.grid import Cells
+from care_sim.core.types import CLASSES, Detections
+from care_sim.loops.film import NOBODY, Annotations, Cloud
 
 MOST_DETECTIONS = 500
 """Boxes a keyframe: as many as the official nuScenes evaluation takes."""
@@ -36,7 +36,7 @@ class PointDetector(Protocol):
 
 
 class PointsOnly:
-    """Makes a `PointDetector` a `care_sim.perception.detectors.Detector`.
+    """Makes a `PointDetector` a `care_sim.perception.proxy.Detector`.
 
     The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be reached from it. What
     it returns is copied and checked; only then the objects are named.

@@ -23,18 +23,18 @@ from pathlib import Path
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
-from care_sim.extras import import_torch
-from care_sim.frames import Floats
+from care_sim.base.errors import InvalidInput
+from care_sim.base.extras import import_torch
+from care_sim.core.frames import Floats
+from care_sim.core.types import Detections
 from care_sim.perception.points_only import inside
-from care_sim.types import Detections
 
 
 class TorchScriptDetector:
     """Runs the module in `file`: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
 
     `points` is a float32 tensor (P, 3) in the sensor frame, `sensor_height_m` a float; `classes` (n,) index
-    `care_sim.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw in the sensor frame, `scores`
+    `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw in the sensor frame, `scores`
     (n,) lie in [0, 1]. Runs on the CPU. Needs torch. Raises MissingExtra without it, InvalidInput for a file that is
     no TorchScript module.
     """

@@ -2,26 +2,26 @@
 
 import gymnasium
 
-from care_sim.errors import BrokenPolicy, InvalidInput, MissingExtra, check_known, shown
-from care_sim.policies.all_camera import AllCamera
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, check_known, shown
 from care_sim.policies.base import Policy
-from care_sim.policies.beam_reduce import BeamReduce
-from care_sim.policies.care import Care
-from care_sim.policies.care_priority import CarePriority
-from care_sim.policies.care_sbf import CareSbf
-from care_sim.policies.farthest_points import FarthestPoints
-from care_sim.policies.full import Full
-from care_sim.policies.history import History
-from care_sim.policies.history_oracle import HistoryOracle
-from care_sim.policies.history_uniform import HistoryUniform
+from care_sim.policies.controls.seed_finder import SeedFinder
 from care_sim.policies.installed import ENTRY_POINTS, entries, load
-from care_sim.policies.learned_scorer import LearnedScorer
+from care_sim.policies.learned.learned_scorer import LearnedScorer
+from care_sim.policies.learned.ppo import Ppo, PpoDartout
+from care_sim.policies.paper.all_camera import AllCamera
+from care_sim.policies.paper.beam_reduce import BeamReduce
+from care_sim.policies.paper.care import Care
+from care_sim.policies.paper.care_priority import CarePriority
+from care_sim.policies.paper.care_sbf import CareSbf
+from care_sim.policies.paper.farthest_points import FarthestPoints
+from care_sim.policies.paper.full import Full
+from care_sim.policies.paper.history import History
+from care_sim.policies.paper.history_oracle import HistoryOracle
+from care_sim.policies.paper.history_uniform import HistoryUniform
+from care_sim.policies.paper.random import Random
+from care_sim.policies.paper.random_points import RandomPoints
+from care_sim.policies.paper.uncertainty import Uncertainty
 from care_sim.policies.parameters import Maker, check_parameters, is_privileged
-from care_sim.policies.ppo import Ppo, PpoDartout
-from care_sim.policies.random import Random
-from care_sim.policies.random_points import RandomPoints
-from care_sim.policies.seed_finder import SeedFinder
-from care_sim.policies.uncertainty import Uncertainty
 
 __all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "contenders", "make_policy", "policy_names", "tags_of"]
 

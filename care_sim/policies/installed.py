@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 from care_sim.policies.base import TAGS, Policy
 from care_sim.policies.parameters import Maker
 

@@ -2,9 +2,9 @@
 
 from typing import ClassVar
 
+from care_sim.core.types import Rig
+from care_sim.loops.truth import Truth
 from care_sim.policies.base import Policy
-from care_sim.truth import Truth
-from care_sim.types import Rig
 
 
 class PrivilegedPolicy(Policy):

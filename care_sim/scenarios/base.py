@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.bounds import bounded, settle
+from care_sim.base.bounds import bounded, settle
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 

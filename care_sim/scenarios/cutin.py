@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.bounds import bounded
+from care_sim.base.bounds import bounded
 from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
     EGO_SPEEDS_MPS,

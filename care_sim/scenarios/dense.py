@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.bounds import bounded
+from care_sim.base.bounds import bounded
 from care_sim.scenarios.base import LANE_WIDTH_M, LEFT_PARKING_Y, RIGHT_PARKING_Y, Range, draw
 from care_sim.scenarios.crossing import CrossingScenario
 from care_sim.world.bodies import CATALOGUE

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.conditions import Sensing
-from care_sim.film import Sights
-from care_sim.frames import Floats
-from care_sim.lenses import window_around
-from care_sim.pinhole import PinholeCamera
+from care_sim.core.conditions import Sensing
+from care_sim.core.frames import Floats
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.pinhole_kernels import window_around
+from care_sim.core.types import ImageDetections
+from care_sim.loops.film import Sights
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
-from care_sim.sensors.ghosts import NOTHING_TO_HAUNT, Ghosts, Pool
-from care_sim.sensors.paint import tally
-from care_sim.sensors.pixels import MIN_PIXELS, confidence_of
-from care_sim.types import ImageDetections
+from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
+from care_sim.sensors.engines.picture_kernels import tally
+from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Ghosts, Pool
 from care_sim.world.bullet import Integers, Window
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.conditions import CameraFaults
-from care_sim.frames import Floats
-from care_sim.pinhole import PinholeCamera
-from care_sim.types import ImageDetections
+from care_sim.core.conditions import CameraFaults
+from care_sim.core.frames import Floats
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import ImageDetections
 
 NOTHING_SEEN = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
 

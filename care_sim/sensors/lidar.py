@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.conditions import LidarFaults
-from care_sim.errors import InvalidInput
-from care_sim.frames import Floats, Frame
-from care_sim.grid import AngularGrid, Cells
-from care_sim.sensors.engines import RayEngine
-from care_sim.types import Scan
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import LidarFaults
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.types import Scan
+from care_sim.sensors.engines.engine import RayEngine
 from care_sim.world.bullet import NOTHING, Integers
 
 LIDAR_POSITION = (-0.445, 0.0, 1.84)

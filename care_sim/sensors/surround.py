@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_sim.film import NOBODY, Cloud, Sights
-from care_sim.frames import Floats, Frame
-from care_sim.grid import AngularGrid, Cells
-from care_sim.pinhole import PinholeCamera
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.loops.film import NOBODY, Cloud, Sights
 from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
 from care_sim.world.bullet import NOTHING, BulletWorld, Integers
 

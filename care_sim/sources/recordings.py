@@ -7,10 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
 
-from care_sim.errors import InvalidInput, check_known, check_path, shown
-from care_sim.film import Film
-from care_sim.sources import argoverse2
-from care_sim.sources.argoverse2_tables import ANNOTATION_FILES, POSE_FILE
+from care_sim.base.errors import InvalidInput, check_known, check_path, shown
+from care_sim.loops.film import Film
+from care_sim.sources.argoverse2 import films as argoverse2
+from care_sim.sources.argoverse2.tables import ANNOTATION_FILES, POSE_FILE
 from care_sim.sources.nuscenes import films, splits
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.tables import FIELDS, Database, Row
@@ -49,7 +49,7 @@ class Argoverse2(Recordings):
         return [log.name for log in argoverse2.logs(self.folder)]
 
     def film(self, scene: str) -> Film:
-        """See `care_sim.sources.argoverse2.film`."""
+        """See `care_sim.sources.argoverse2.films.film`."""
         logs = {log.name: log for log in argoverse2.logs(self.folder)}
         check_known(f"log in {self.folder}", scene, logs)
         return argoverse2.film(logs[scene])

@@ -10,8 +10,8 @@ from multiprocessing import get_context
 from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from care_sim.children import end_with_parent, starting
-from care_sim.errors import InvalidInput, MissingExtra, one_line
+from care_sim.base.errors import InvalidInput, MissingExtra, one_line
+from care_sim.base.processes import end_with_parent, starting
 
 if TYPE_CHECKING:
     from dask.distributed import Client
@@ -35,7 +35,9 @@ def processes(workers: int) -> Executor:
     end with this process.
     """
     context = get_context("forkserver")
-    context.set_forkserver_preload(["care_sim.study.episode", "care_sim.envs.closed_loop", "care_sim.study.plays"])
+    context.set_forkserver_preload(
+        ["care_sim.study.episode_play", "care_sim.envs.closed_loop", "care_sim.study.scene_play"]
+    )
     return Processes(workers, context)
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from care_sim.errors import InvalidInput
-from care_sim.json_text import parsed
+from care_sim.base.errors import InvalidInput
+from care_sim.base.json_text import parsed
 from care_sim.study.rows import with_tuples
 from care_sim.study.task import Row
 

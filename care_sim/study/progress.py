@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from care_sim.study.executors import ExecutorFactory
 from care_sim.study.forecast import Forecast
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import Kind
+from care_sim.study.results_files import Kind
 from care_sim.study.runner import Audience, Failure, run_all
 from care_sim.study.task import Row, Task
 

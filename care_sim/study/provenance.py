@@ -12,17 +12,17 @@ from pathlib import Path
 from uuid import uuid4
 
 import care_sim
-from care_sim.perception.registry import BUILT_IN as BUILT_IN_DETECTORS
-from care_sim.perception.registry import entries as detector_entries
+from care_sim.base import package_files as belongings
+from care_sim.perception.listing import BUILT_IN as BUILT_IN_DETECTORS
+from care_sim.perception.listing import entries as detector_entries
 from care_sim.policies import BUILT_IN
 from care_sim.policies.installed import entries
-from care_sim.study import belongings
 
 LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numba", "numpy", "pyarrow", "pybullet", "scipy")
 EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
 """Libraries of detectors, policies and measurements that may be there."""
 
-SHIPPED = Path(care_sim.__file__).parent / "policies" / "shipped"
+SHIPPED = Path(care_sim.__file__).parent / "policies" / "learned" / "shipped"
 """Where the weights lie that come with the package."""
 CODE = (".py", ".so", ".pyd")
 """Endings of what a process loads once."""
@@ -40,7 +40,7 @@ def code_digest() -> str:
 
 def policy_digest(policy: str) -> str | None:
     """Hash of the files that decide what an installed policy does: those of its distribution and package, and those
-    that its defaults, constants and code name (`care_sim.study.belongings`). Empty for a built-in policy, None where
+    that its defaults, constants and code name (`care_sim.base.package_files`). Empty for a built-in policy, None where
     there are no files to read.
     """
     return "" if policy in BUILT_IN else _entry_digest(entries()[policy])

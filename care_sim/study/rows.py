@@ -8,10 +8,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from care_sim.errors import InvalidInput
-from care_sim.files import replacing
-from care_sim.json_text import parsed
-from care_sim.study.columns import Schema
+from care_sim.base.errors import InvalidInput
+from care_sim.base.files import replacing
+from care_sim.base.json_text import parsed
+from care_sim.study.row_schema import Schema
 from care_sim.study.task import Row
 
 STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"

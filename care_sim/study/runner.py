@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.study.episode import attempt
+from care_sim.study.episode_play import attempt
 from care_sim.study.executors import ClusterLost, ExecutorFactory, places, processes
 from care_sim.study.journal import Journal
 from care_sim.study.task import Row, Task, batches

@@ -3,8 +3,8 @@
 import math
 from typing import TYPE_CHECKING, Any
 
-from care_sim.errors import MissingExtra
-from care_sim.features import CHANNELS
+from care_sim.base.errors import MissingExtra
+from care_sim.policies.learned.grid_features import CHANNELS
 from care_sim.training.config import AgentConfig, OnPolicy, Ppo, RecurrentPpo, Sac
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from care_sim.bounds import bounded, settle
-from care_sim.errors import LARGEST, InvalidInput
-from care_sim.grid import MOST_COLUMNS, MOST_ROWS
-from care_sim.policies.wrapping import Wrapping
-from care_sim.reward import HEAVIEST
-from care_sim.study.options import parameters
+from care_sim.base.bounds import bounded, settle
+from care_sim.base.errors import LARGEST, InvalidInput
+from care_sim.commands.shared.options import parameters
+from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
+from care_sim.envs.reward import HEAVIEST
+from care_sim.policies.learned.wrapper_text import Wrapping
 from care_sim.training.seeds import TRAINING, VALIDATION
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 from care_sim.training.config import HOW_LONG
 from care_sim.training.folder import CONFIG, CURVE, RULES, Evaluation, read_config, read_curve, read_rules
 
@@ -62,7 +62,7 @@ class Curves:
         if not self.folders:
             raise InvalidInput("curves needs the folder of a training run, the --out of `care-sim train`")
         groups = together(map(read, self.folders))
-        from care_sim.study.figures import check_figure, save
+        from care_sim.reports.figures.files import check_figure, save
         from care_sim.training.curves_figure import curves_figure
 
         check_figure(self.out)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.policies import tags_of
-from care_sim.study.styles import FULL, styles
+from care_sim.reports.figures.styles import FULL, styles
 from care_sim.training.curves import Run
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 
 import care_sim
-from care_sim.children import following, starting
+from care_sim.base.errors import check_known
+from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP
-from care_sim.envs.grid_observation import GridObservation
-from care_sim.envs.sector_actions import SectorReserve, SectorScores
-from care_sim.errors import check_known
+from care_sim.envs.wrappers.grid_observation import GridObservation
+from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.training.config import AgentConfig
 from care_sim.training.seeds import TrainingSeeds
 

@@ -19,15 +19,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.errors import LARGEST, InvalidInput, is_number
-from care_sim.files import replacing, write_text
-from care_sim.json_text import parsed
-from care_sim.policies.weights import Card, save
+from care_sim.base.errors import LARGEST, InvalidInput, is_number
+from care_sim.base.files import replacing, write_text
+from care_sim.base.json_text import parsed
+from care_sim.core.types import Rig
+from care_sim.policies.learned.weights import Card, save
+from care_sim.training.card_provenance import machine, versions
 from care_sim.training.config import AgentConfig
-from care_sim.training.evaluation import Score
-from care_sim.training.origin import machine, versions
 from care_sim.training.seeds import TRAINING, validation_seeds
-from care_sim.types import Rig
+from care_sim.training.validation import Score
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

@@ -1,4 +1,4 @@
-"""The network of `care_sim.policies.score_map` in PyTorch, as a policy of Stable-Baselines3."""
+"""The network of `care_sim.policies.learned.score_map` in PyTorch, as a policy of Stable-Baselines3."""
 
 from typing import Any
 
@@ -10,9 +10,9 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 from torch.nn.functional import pad
 
-from care_sim.features import EGO
-from care_sim.policies.score_map import MARGIN
-from care_sim.policies.weights import Arrays
+from care_sim.policies.learned.grid_features import EGO
+from care_sim.policies.learned.score_map import MARGIN
+from care_sim.policies.learned.weights import Arrays
 
 
 class Window(nn.Module):
@@ -122,7 +122,7 @@ class SectorPolicy(ActorCriticPolicy):
         return elevations, azimuths
 
     def arrays(self) -> Arrays:
-        """The actor's weights by the names of `care_sim.policies.score_map`."""
+        """The actor's weights by the names of `care_sim.policies.learned.score_map`."""
         named = {**self.mlp_extractor.actor.state_dict(), **self.action_net.state_dict()}
         arrays: Arrays = {name: tensor.cpu().numpy().copy() for name, tensor in named.items()}
         return arrays | {

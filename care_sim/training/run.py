@@ -7,15 +7,15 @@ from contextlib import nullcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.extras import import_torch
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.extras import import_torch
 from care_sim.study.progress import Lines, Show, bar, spoken
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
 from care_sim.training.environments import bare, side_by_side, wrapped
-from care_sim.training.evaluation import Score, acting, evaluate, rule
 from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
+from care_sim.training.validation import Score, acting, evaluate, rule
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

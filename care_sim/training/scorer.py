@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.bounds import bounded, settle
-from care_sim.errors import LARGEST
-from care_sim.extras import import_torch
-from care_sim.files import ZIP, check_output
-from care_sim.grid import AngularGrid
-from care_sim.policies.weights import Arrays, Card, save
-from care_sim.streets.street import CALIBRATION_SEEDS
-from care_sim.training.origin import machine, versions
+from care_sim.base.bounds import bounded, settle
+from care_sim.base.errors import LARGEST
+from care_sim.base.extras import import_torch
+from care_sim.base.files import ZIP, check_output
+from care_sim.core.grid import AngularGrid
+from care_sim.policies.learned.weights import Arrays, Card, save
+from care_sim.sources.streets.street import CALIBRATION_SEEDS
+from care_sim.training.card_provenance import machine, versions
 from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples
 
 UNITS = 16

@@ -19,16 +19,16 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.conditions import MIN_RETURNS
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.grid import Cells
+from care_sim.core.types import Belief
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.film import Film, Shot
-from care_sim.grid import Cells
-from care_sim.openloop import OpenLoop
-from care_sim.policies.cues import Cues, Table
-from care_sim.policies.history import History
-from care_sim.streets.recording import street_film
-from care_sim.types import Belief
+from care_sim.loops.film import Film, Shot
+from care_sim.loops.open_loop import OpenLoop
+from care_sim.policies.learned.cell_inputs import Cues, Table
+from care_sim.policies.paper.history import History
+from care_sim.sources.streets.recording import street_film
 
 BUDGETS = (0.03, 0.10, 0.35)
 """The paper's scarcest closed loop, the budget that both loops share, and its most generous open loop."""

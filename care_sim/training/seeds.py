@@ -15,7 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 
 VALIDATION, TRAINING = 2_000, 10_000
 LAST = 2**31 - 1

@@ -7,11 +7,11 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.frames import Floats, Frame, Pose
-from care_sim.pinhole import NEAR_M, PinholeCamera
+from care_sim.core.frames import Floats, Frame, Pose
+from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.clients import borrow, give_back, leave
-from care_sim.world.looks import Looks
+from care_sim.world.bullet_clients import borrow, give_back, leave
+from care_sim.world.bullet_shapes import Looks
 from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
 

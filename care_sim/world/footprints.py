@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from care_sim.frames import Floats, Pose
+from care_sim.core.frames import Floats, Pose
 from care_sim.world.bodies import Triple
 from care_sim.world.bullet import Integers
 

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from care_sim.frames import Pose
+from care_sim.core.frames import Pose
 from care_sim.world.bare import bare
 from care_sim.world.bodies import BodyKind
 

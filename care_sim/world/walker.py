@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from care_sim.frames import Pose
+from care_sim.core.frames import Pose
 
 
 @dataclass(frozen=True)

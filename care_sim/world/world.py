@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, check_known
-from care_sim.frames import Floats, Pose
-from care_sim.types import CLASSES, Ego
+from care_sim.base.errors import InvalidInput, check_known
+from care_sim.core.frames import Floats, Pose
+from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.bullet import BulletWorld, Integers
 from care_sim.world.footprints import Footprints

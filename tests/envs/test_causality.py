@@ -4,8 +4,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from care_sim.sensors.engines import Bullet
-from care_sim.sensors.fast import Fast
+from care_sim.sensors.engines.engine import Bullet
+from care_sim.sensors.engines.fast import Fast
 
 BEHIND = (-15.0, 1.0, 0.0)
 

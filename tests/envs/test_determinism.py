@@ -1,7 +1,6 @@
 """The same seed gives the same episode to the last bit: in one process, in many, in every vector."""
 
 import hashlib
-import pathlib
 import subprocess
 import sys
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 import care_sim
+from tests.helpers.places import ROOT
 
 NAME, SEED, STEPS = "care_sim:CARE-Dense-v0", 11, 8
 
@@ -51,9 +51,8 @@ def test_vectors_of_gymnasium_give_the_same_episode(mode):
 
 
 def test_another_process_gives_the_same_episode():
-    here = str(pathlib.Path(__file__).parent)
-    program = f"import sys; sys.path.insert(0, {here!r}); import test_determinism; print(test_determinism.alone())"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    program = "from tests.envs import test_determinism; print(test_determinism.alone())"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split()[-1] == alone()
 
 

@@ -10,10 +10,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import care_sim
-from care_sim.conditions import Conditions
+from care_sim.core.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.reward import WEIGHTS
+from care_sim.envs.reward import WEIGHTS
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.dartout import Dartout
 from care_sim.world.bodies import CATALOGUE

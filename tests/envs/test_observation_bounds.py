@@ -5,14 +5,14 @@ import json
 import gymnasium
 import numpy as np
 import pytest
-from av2_log import CAR_AHEAD, at, box, write
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nuscenes_drive import write_drive
 
 import care_sim
 from care_sim.envs import CLOSED_LOOP
 from care_sim.sources.nuscenes.cameras import CHANNELS
+from tests.helpers.av2_log import CAR_AHEAD, at, box, write
+from tests.helpers.nuscenes_drive import write_drive
 
 FAULTS = {
     "false_negative_rate": st.floats(0, 1),

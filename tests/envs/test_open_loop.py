@@ -6,17 +6,17 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from av2_log import at, box, write
 from gymnasium.utils.env_checker import check_env
 
 import care_sim
+from care_sim.base.errors import InvalidInput
 from care_sim.envs import OPEN_LOOP
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.errors import InvalidInput
 from care_sim.evaluation.recall import score
 from care_sim.evaluation.sightings import Sightings
-from care_sim.film import Film
-from care_sim.streets.recording import street_film
+from care_sim.loops.film import Film
+from care_sim.sources.streets.recording import street_film
+from tests.helpers.av2_log import at, box, write
 
 EXPLAINED = ("symmetric and normalized Box action space", "unconventional shape")
 NOTHING = np.zeros((32, 512), np.float32)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from care_sim.film import Annotations
-from care_sim.types import CLASSES, Detections
+from care_sim.core.types import CLASSES, Detections
+from care_sim.loops.film import Annotations
 
 
 def columns(classes, centres):

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
 
 

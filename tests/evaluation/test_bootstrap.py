@@ -3,7 +3,7 @@ import warnings
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.bootstrap import paired_difference, ratio_of_sums
 
 

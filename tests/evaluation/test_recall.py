@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import turned
+from care_sim.core.types import Detections
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import Score, Tally, score
 from care_sim.evaluation.sightings import Sightings
-from care_sim.film import Annotations
-from care_sim.frames import turned
-from care_sim.types import Detections
+from care_sim.loops.film import Annotations
 
 NONE = np.zeros(0, bool)
 SEEDS = st.integers(0, 2**32 - 1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, averaged, contrast, contrast_gap, level
 

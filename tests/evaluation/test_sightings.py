@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import turned
+from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings, check_presence
-from care_sim.film import Annotations
-from care_sim.frames import turned
-from care_sim.types import CLASSES
+from care_sim.loops.film import Annotations
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -2,21 +2,20 @@
 
 import json
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
-from nuscenes_drive import OBJECTS, SPLIT, write_drive
 
 from care_sim.cli import main
-from care_sim.frames import turned
+from care_sim.core.frames import turned
+from care_sim.core.types import CLASSES, Detections
 from care_sim.sources.nuscenes.films import film
 from care_sim.sources.nuscenes.results_form import MODALITIES, boxes
 from care_sim.sources.nuscenes.splits import scenes
 from care_sim.sources.nuscenes.tables import Database
-from care_sim.types import CLASSES, Detections
+from tests.helpers.nuscenes_drive import OBJECTS, SPLIT, write_drive
+from tests.helpers.places import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [
     pytest.mark.official,
     pytest.mark.skipif(not (ROOT / ".venv-official" / ".installed").exists(), reason="run by make test-official"),

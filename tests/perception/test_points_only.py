@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from made_points import HEIGHT, shell
 
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.film import NOBODY, Annotations, Cloud
-from care_sim.perception.detectors import ReturnsProxy
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.types import Detections
+from care_sim.loops.film import NOBODY, Annotations, Cloud
 from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
-from care_sim.types import Detections
+from care_sim.perception.proxy import ReturnsProxy
+from tests.helpers.made_points import HEIGHT, shell
 
 CAR = np.array([8.0, 6.0, 0.86 - HEIGHT, 4.61, 1.95, 1.72, 0.4])
 PERSON = np.array([12.0, -3.0, 0.88 - HEIGHT, 0.73, 0.66, 1.76, 0.0])

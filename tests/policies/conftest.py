@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.types import CLASSES, Belief, Ego, ImageDetections, Tracks
+from care_sim.core.types import CLASSES, Belief, Ego, ImageDetections, Tracks
 
 STANDING = Ego()
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.allocation import allocate
-from care_sim.errors import InvalidInput
-from care_sim.forgetting import ForgettingRules
-from care_sim.policies.care_sbf import CareSbf
-from care_sim.types import Belief, Ego, Rig
+from care_sim.base.errors import InvalidInput
+from care_sim.core.allocation import allocate
+from care_sim.core.forgetting import ForgettingRules
+from care_sim.core.types import Belief, Ego, Rig
+from care_sim.policies.paper.care_sbf import CareSbf
 
 SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]
 CAMERA_POLICIES = ["care", "all-camera", "care-priority", "care-sbf"]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.allocation import allocate
+from care_sim.core.allocation import allocate
+from care_sim.core.types import CLASSES, MAX_DETECTIONS, Belief, ImageDetections
 from care_sim.policies import BUILT_IN
-from care_sim.types import CLASSES, MAX_DETECTIONS, Belief, ImageDetections
 
 BEFORE = {"CARE-Dartout-v0": 24, "CARE-Dense-v0": 24, "CARE-CutIn-v0": 24, "CARE-Street-v0": 2, "CARE-Replay-v0": 2}
 """Keyframes until the hidden one is about to come into view; on the street many are, on the log one is."""

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.loop import ClosedLoop
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.types import Belief
+from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.policies import BUILT_IN, tags_of
-from care_sim.policies.farthest_points import FarthestPoints
+from care_sim.policies.paper.farthest_points import FarthestPoints
 from care_sim.policies.privileged import PrivilegedPolicy
-from care_sim.types import Belief
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
 

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.frames import Frame
-from care_sim.grid import AngularGrid
-from care_sim.policies.beam_reduce import horizon_rows
-from care_sim.policies.history_uniform import uniform_pattern
-from care_sim.residual import camera_layers
-from care_sim.types import Belief, Ego
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import camera_layers
+from care_sim.core.types import Belief, Ego
+from care_sim.policies.paper.beam_reduce import horizon_rows
+from care_sim.policies.paper.history_uniform import uniform_pattern
 
 GRID = AngularGrid()
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.errors import InvalidInput
+from care_sim.commands.shared.selection import made
 from care_sim.policies import BUILT_IN, policy_names, tags_of
-from care_sim.study.config import grid
-from care_sim.study.selection import made
+from care_sim.study.episode_config import grid
 
 MODULE = '''
 import numpy as np

@@ -5,15 +5,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from care_sim.allocation import allocate, budget_cells
-from care_sim.conditions import MIN_RETURNS, Sensing
-from care_sim.frames import Frame
-from care_sim.grid import AngularGrid
-from care_sim.residual import wedges
+from care_sim.core.allocation import allocate, budget_cells
+from care_sim.core.conditions import MIN_RETURNS, Sensing
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import wedges
+from care_sim.core.types import Demand, Rig
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, sights_of
 from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.types import Demand, Rig
 
 pytestmark = pytest.mark.slow
 GRID = AngularGrid()

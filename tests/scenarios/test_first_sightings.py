@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from care_sim.frames import Frame
-from care_sim.grid import AngularGrid
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, Picture
+from care_sim.sensors.confidence import MIN_PIXELS
 from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.sensors.pixels import MIN_PIXELS
 
 GRID = AngularGrid()
 KEYFRAME = 0.1

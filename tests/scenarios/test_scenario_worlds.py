@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
 from care_sim.scenarios import SCENARIOS, make_scenario
 
 every_scenario = pytest.mark.parametrize("name", SCENARIOS)

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from care_sim.conditions import Sensing
-from care_sim.errors import InvalidInput
-from care_sim.frames import Frame
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import Sensing
+from care_sim.core.frames import Frame
+from care_sim.core.types import CLASSES
 from care_sim.sensors.camera import (
     FRONT_CAMERA,
     CameraDetector,
@@ -11,8 +12,7 @@ from care_sim.sensors.camera import (
     sights_of,
     window_on,
 )
-from care_sim.sensors.pixels import FULL_CONFIDENCE, MIN_PIXELS
-from care_sim.types import CLASSES
+from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.world.bodies import CATALOGUE
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.conditions import CAMERA_FAULTS, CameraFaults, Conditions, Sensing
-from care_sim.errors import InvalidInput
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import CAMERA_FAULTS, CameraFaults, Conditions, Sensing
+from care_sim.core.types import ImageDetections
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
-from care_sim.types import ImageDetections
 
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
 

@@ -3,12 +3,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from care_sim.conditions import Sensing
-from care_sim.errors import InvalidInput
-from care_sim.frames import Frame
-from care_sim.sensors.engines import ENGINES, check_engine
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import Sensing
+from care_sim.core.frames import Frame
+from care_sim.core.types import Scan
+from care_sim.sensors.engines.engine import ENGINES, check_engine
 from care_sim.sensors.lidar import Lidar, dead_cells, noisy
-from care_sim.types import Scan
 from care_sim.world.bodies import CATALOGUE
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)

@@ -6,9 +6,10 @@ from importlib.machinery import ModuleSpec
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
-from care_sim.study import belongings, provenance
-from care_sim.study.config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, listed
+from care_sim.base import package_files as belongings
+from care_sim.base.errors import InvalidInput
+from care_sim.study import provenance
+from care_sim.study.episode_config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, listed
 
 GOOD = EpisodeConfig("dense", "care")
 
@@ -94,7 +95,7 @@ def package(tmp_path, monkeypatch):
     (tmp_path / "ours_policy").mkdir()
     info.mkdir()
     (tmp_path / "ours_policy" / "__init__.py").touch()
-    (tmp_path / "ours_policy" / "near.py").write_text("from care_sim.policies.history import History as Near\n")
+    (tmp_path / "ours_policy" / "near.py").write_text("from care_sim.policies.paper.history import History as Near\n")
     (tmp_path / "ours_policy" / "table.csv").write_text("1\n")
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: ours\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[care_sim.policies]\nnear = ours_policy.near:Near\n")

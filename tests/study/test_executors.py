@@ -12,12 +12,12 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.study.config import EpisodeConfig, grid
-from care_sim.study.episode import run_episode
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.reports.report import JOURNAL
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.episode_play import run_episode
 from care_sim.study.executors import cluster
 from care_sim.study.journal import Journal
-from care_sim.study.report import JOURNAL
 from care_sim.study.runner import Audience, run_all
 
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -27,7 +27,7 @@ CONFIGS = [EpisodeConfig("dartout", policy, scenario_parameters=SHORT) for polic
 
 THIRD_PARTY = """
 import os
-from care_sim.policies.history import History
+from care_sim.policies.paper.history import History
 
 class Dies(History):
     def demand(self, belief):

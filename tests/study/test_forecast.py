@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from care_sim.study.config import EpisodeConfig, grid
+from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.forecast import Forecast
 from care_sim.study.progress import Lines, Reporter, spoken
 

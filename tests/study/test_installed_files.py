@@ -5,23 +5,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from care_sim.base import package_files as belongings
 from care_sim.policies.installed import entries
-from care_sim.study import belongings
-from care_sim.study.config import EpisodeConfig
+from care_sim.reports.report import JOURNAL, conduct
+from care_sim.sources.scenes import source_of
+from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import EPISODES
 from care_sim.study.play_config import play_grid
 from care_sim.study.provenance import code_digest, detector_digest, policy_digest
-from care_sim.study.report import JOURNAL, conduct
+from care_sim.study.results_files import EPISODES
 from care_sim.study.rows import read_rows
 from care_sim.study.runner import run_all
-from care_sim.study.scenes import source_of
 from care_sim.study.task import files_in
 
 HEAD = """
 from pathlib import Path
 import numpy as np
-from care_sim.policies.beam_reduce import BeamReduce
+from care_sim.policies.paper.beam_reduce import BeamReduce
 HERE = Path(__file__).parent
 """
 BODY = """

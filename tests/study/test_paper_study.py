@@ -1,6 +1,7 @@
 from collections import Counter
 
-from care_sim.study import crowding, paper
+from care_sim.reports.tables import crowding
+from care_sim.study.designs import paper
 
 
 def test_the_study_has_245_episodes_in_the_stated_split():

@@ -11,15 +11,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from care_sim.errors import InvalidInput
-from care_sim.study.config import EpisodeConfig, grid
-from care_sim.study.episode import answer, run_episode, trace
+from care_sim.base.errors import InvalidInput
+from care_sim.core.types import Outcome
+from care_sim.reports.report import JOURNAL, conduct
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.episode_play import answer, run_episode, trace
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import EPISODES
-from care_sim.study.report import JOURNAL, conduct
+from care_sim.study.results_files import EPISODES
 from care_sim.study.rows import read_rows
 from care_sim.study.runner import Audience, run_all
-from care_sim.types import Outcome
 
 SHORT = (("duration_s", 0.3),)
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -180,9 +180,9 @@ def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):
 
 
 def test_a_worker_imports_nothing_of_tables_and_commands():
-    import_as_a_worker = "import sys, care_sim.study.episode, care_sim.envs.closed_loop; print(*sys.modules)"
+    import_as_a_worker = "import sys, care_sim.study.episode_play, care_sim.envs.closed_loop; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", import_as_a_worker], capture_output=True, text=True, check=True)
-    needless = {"rich", "tyro", "torch", "dask", "open3d", "care_sim.study.report", "care_sim.study.figures"}
+    needless = {"rich", "tyro", "torch", "dask", "open3d", "care_sim.reports.report", "care_sim.reports.figures.files"}
     assert not needless & set(loaded.stdout.split())
 
 

@@ -6,11 +6,13 @@ import sys
 
 import pytest
 
-from care_sim.errors import InvalidInput
-from care_sim.study import ablations, config, crowding, faults, paper
-from care_sim.study.config import grid, of_seeds
+from care_sim.base.errors import InvalidInput
+from care_sim.reports.tables import ablations, crowding, faults
+from care_sim.sources.scenes import source_of
+from care_sim.study import episode_config as config
+from care_sim.study.designs import paper
+from care_sim.study.episode_config import grid, of_seeds
 from care_sim.study.play_config import play_grid
-from care_sim.study.scenes import source_of
 
 COMMANDS = (
     "reproduce --seeds 1000000000",

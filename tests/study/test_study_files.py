@@ -2,13 +2,13 @@ from dataclasses import asdict
 
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.errors import InvalidInput
-from care_sim.study.config import EpisodeConfig
+from care_sim.core.types import Outcome
+from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import Journal
-from care_sim.study.kinds import EPISODES
+from care_sim.study.results_files import EPISODES
 from care_sim.study.rows import read_rows, write_rows
-from care_sim.types import Outcome
 
 ROWS = [
     EpisodeConfig("dense", policy).row() | asdict(Outcome(distance, 3.0, True, None, 2.5, False, None, 98280))

@@ -1,8 +1,8 @@
 """The long form: every campaign in turn, for so many seconds or so many cases, or one case alone.
 
-python -m torture --seconds 600 --seed 1                 all campaigns, each for its share
-python -m torture --campaigns commands calls --cases 100000
-python -m torture --case commands:1:37
+python -m tests.torture --seconds 600 --seed 1                 all campaigns, each for its share
+python -m tests.torture --campaigns commands calls --cases 100000
+python -m tests.torture --case commands:1:37
 """
 
 import argparse
@@ -12,9 +12,9 @@ import time
 from itertools import islice
 from pathlib import Path
 
-from torture.campaigns import CAMPAIGNS
-from torture.case import Name
-from torture.field import Field, names
+from tests.torture.campaigns import CAMPAIGNS
+from tests.torture.case import Name
+from tests.torture.field import Field, names
 
 
 def main():

@@ -14,8 +14,8 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from torture import hostile, judge
-from torture.case import DONE, Fault
+from tests.torture import hostile, judge
+from tests.torture.case import DONE, Fault
 
 LIMIT_S = 10.0
 LOOPS = ("CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0")
@@ -93,7 +93,7 @@ def environment(case):
     """Make an environment, reset it, take a few steps."""
     import gymnasium
 
-    from care_sim.conditions import Conditions
+    from care_sim.core.conditions import Conditions
     from care_sim.scenarios import SCENARIOS
 
     name = case.rng.choice(LOOPS)
@@ -111,7 +111,7 @@ def street(case):
     """The same with a generated street, of which few are drawn: they take a moment."""
     import gymnasium
 
-    from care_sim.conditions import Conditions
+    from care_sim.core.conditions import Conditions
 
     extra = ("detector", "detector_parameters", "render_mode", "budget", "keyframe_s", "source", "unknown")
     arguments = draw(case, _fields_of(Conditions) | dict.fromkeys(extra))
@@ -326,7 +326,7 @@ def scenario(case):
 
 def conditions(case):
     """The conditions alone."""
-    from care_sim.conditions import Conditions
+    from care_sim.core.conditions import Conditions
 
     Conditions(**draw(case, _fields_of(Conditions), 5))
 
@@ -372,7 +372,7 @@ MORE_BUDGET = {"budget": lambda: 0.1, "min_returns": lambda: 2, "floor": lambda:
 
 def configuration(case):
     """What a row of a study is made of, and its digest."""
-    from care_sim.study.config import EpisodeConfig
+    from care_sim.study.episode_config import EpisodeConfig
 
     known = _fields_of(EpisodeConfig) | {"scenario": lambda: "dartout", "policy": lambda: "care"}
     given = {"scenario": "dartout", "policy": "care"} | draw(case, known)
@@ -382,7 +382,7 @@ def configuration(case):
 
 def detector(case):
     """Detectors by name."""
-    from care_sim.perception.registry import detector_names, make_detector
+    from care_sim.perception.listing import detector_names, make_detector
 
     name = case.rng.choice([*detector_names(), some(case)])
     known = dict.fromkeys(("min_returns", "file", "grid", "unknown"))
@@ -391,7 +391,7 @@ def detector(case):
 
 def weights(case):
     """Files of weights that are none."""
-    from care_sim.policies.weights import load
+    from care_sim.policies.learned.weights import load
 
     path = some(case, "nowhere", ".", "")
     if isinstance(path, int):

@@ -2,12 +2,12 @@
 
 import importlib
 
-from torture.case import FOUND, Name
+from tests.torture.case import FOUND, Name
 
 CAMPAIGNS = {"commands": 4, "shell": 2, "calls": 3, "files": 3, "journals": 1, "kills": 4, "writers": 1, "disk": 2}
 
 
 def found(campaign):
     """The cases of a campaign that once went wrong."""
-    count = len(getattr(importlib.import_module(f"torture.{campaign}"), "FOUND_CASES", ()))
+    count = len(getattr(importlib.import_module(f"tests.torture.{campaign}"), "FOUND_CASES", ()))
     return [Name(campaign, FOUND, number) for number in range(count)]

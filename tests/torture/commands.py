@@ -4,10 +4,10 @@ import re
 import signal
 import sys
 
-from torture import props, worker
-from torture.case import FOUND, Case, Fault
-from torture.grammar import Grammar, is_safe
-from torture.judge import ending, exception
+from tests.torture import props, worker
+from tests.torture.case import FOUND, Case, Fault
+from tests.torture.grammar import Grammar, is_safe
+from tests.torture.judge import ending, exception
 
 LIMIT_S = 10.0
 HONEST_S = 0.7
@@ -49,11 +49,11 @@ def drawn_line(rng):
 
 def prepare(name):
     """Import what the case's command imports, before its time counts: an import that is interrupted leaves a mess."""
-    import care_sim.streets.recording
-    import care_sim.study.episode
-    import care_sim.study.page.build
-    import care_sim.study.plays
-    import care_sim.study.report
+    import care_sim.reports.page.build
+    import care_sim.reports.report
+    import care_sim.sources.streets.recording
+    import care_sim.study.episode_play
+    import care_sim.study.scene_play
 
     drawn, *_ = line(name)
     first, text = " ".join(drawn[:1]), " ".join(drawn)
@@ -61,9 +61,9 @@ def prepare(name):
         import sb3_contrib  # noqa: F401
         import stable_baselines3  # noqa: F401
     if first in ("bench", "parity", "certify"):
-        import care_sim.bench.run
-        import care_sim.certify.run
-        import care_sim.parity.run  # noqa: F401
+        import care_sim.measure.bench.run
+        import care_sim.measure.certify.run
+        import care_sim.measure.parity.run  # noqa: F401
     if "--record" in text:
         import rerun  # noqa: F401
     if "--cluster" in text:
@@ -99,8 +99,8 @@ def lay_out(arguments, folder):
 
 def run(arguments, encoding="utf-8", interrupted_after=None):
     """Play a command line in this process and judge its ending."""
+    from care_sim.base.interrupts import raise_them
     from care_sim.cli import main
-    from care_sim.interrupts import raise_them
 
     worker.streams.encode(encoding)
     code = None

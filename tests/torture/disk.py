@@ -9,10 +9,10 @@ import shutil
 import subprocess
 from contextlib import contextmanager
 
-from torture import judge, props, study
-from torture.case import DONE, Fault
-from torture.processes import Command
-from torture.writers import check_file
+from tests.torture import judge, props, study
+from tests.torture.case import DONE, Fault
+from tests.torture.processes import Command
+from tests.torture.writers import check_file
 
 LIMIT_S = 240.0
 ENDS_WITHIN_S = 20.0
@@ -76,7 +76,7 @@ def _check_left(folder, product, before):
 
 def check_product(path):
     if path.suffix == ".npz":
-        from care_sim.policies.weights import load
+        from care_sim.policies.learned.weights import load
 
         load(path)
     elif path.suffix == ".parquet":

@@ -19,11 +19,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from torture import processes
-from torture.case import Name
-from torture.judge import place_of_stack
+from tests.helpers.places import ROOT
+from tests.torture import processes
+from tests.torture.case import Name
+from tests.torture.judge import place_of_stack
 
-TESTS = Path(__file__).resolve().parents[1]
 MOST_CASES = 4000
 """Of one worker: what it gathers is let go then."""
 PREPARES_S = 300.0
@@ -154,7 +154,7 @@ class _Worker:
             return False
         if self._began is None:
             return time.monotonic() - self._handed > processes.patience() * PREPARES_S
-        limit = importlib.import_module(f"torture.{self._name.campaign}").LIMIT_S
+        limit = importlib.import_module(f"tests.torture.{self._name.campaign}").LIMIT_S
         clock, busy = self._began
         return time.monotonic() - clock > processes.patience() * limit or self._busy_s() - busy > limit
 
@@ -201,13 +201,12 @@ class _Worker:
 
     def _begin_anew(self):
         self.end()
-        paths = [str(TESTS.parent), str(TESTS), str(TESTS / "sources")]
-        path = os.pathsep.join([*paths, *filter(None, [os.environ.get("PYTHONPATH")])])
+        path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
         environment = os.environ | {
             "PYTHONPATH": path, "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "0", processes.MARK: self._mark,
         }  # fmt: skip
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "torture.worker", str(self._folder), str(self._stacks), str(self._steps)],
+            [sys.executable, "-m", "tests.torture.worker", str(self._folder), str(self._stacks), str(self._steps)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, start_new_session=True,
         )  # fmt: skip
         self._played = 0

@@ -6,18 +6,18 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from torture import calls, props, spoil
-from torture.case import DONE, Case, Fault, Name
-from torture.commands import run
-from torture.judge import call
+from tests.torture import calls, props, spoil
+from tests.torture.case import DONE, Case, Fault, Name
+from tests.torture.commands import run
+from tests.torture.judge import call
 
 LIMIT_S = 10.0
 
 
 def prepare(_name):
-    import care_sim.streets.recording
-    import care_sim.study.page.build
-    import care_sim.study.plays
+    import care_sim.reports.page.build
+    import care_sim.sources.streets.recording
+    import care_sim.study.scene_play
     import care_sim.training.curves_figure  # noqa: F401
 
     for name in ("results", "protocol", "drive", "base", "scorer", "ppo", "trained", "recording"):

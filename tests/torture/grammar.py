@@ -5,7 +5,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from types import UnionType
 
-from torture import hostile
+from tests.torture import hostile
 
 PIECES = (
     "dartout", "dense", "cutin", "care", "history", "full", "all-camera", "ppo", "learned-scorer", "random", "all",
@@ -63,9 +63,9 @@ LONG = (
 
 def commands():
     """Every command line that can begin, with the dataclass of its options."""
-    from care_sim.bench.config import BenchConfig
     from care_sim.cli import COMMANDS
-    from care_sim.parity.config import ParityConfig
+    from care_sim.measure.bench.config import BenchConfig
+    from care_sim.measure.parity.config import ParityConfig
     from care_sim.training import COMMANDS as LEARNERS
 
     measures = {"bench": BenchConfig, "parity": ParityConfig}

@@ -3,16 +3,14 @@
 import json
 import shutil
 
-from torture import study
-from torture.case import DONE, REFUSED, Fault
-from torture.commands import run
+from tests.torture import study
+from tests.torture.case import DONE, REFUSED, Fault
+from tests.torture.commands import run
 
 LIMIT_S = 20.0
 
 
 def prepare(_name):
-    import care_sim.study.episode
-    import care_sim.study.report  # noqa: F401
 
     study.expected()
 

@@ -15,11 +15,9 @@ anything of ours is called, it says in its own words.
 import re
 import signal
 import traceback
-from pathlib import Path
 
-from torture.case import DONE, INTERRUPTED, REFUSED, Fault
+from tests.torture.case import DONE, INTERRUPTED, REFUSED, Fault
 
-ROOT = Path(__file__).resolve().parents[2]
 OF_THE_SOFTWARE, UNREAD = 70, 141
 ENDINGS = {0: DONE, 1: REFUSED, 2: REFUSED, 130: INTERRUPTED, UNREAD: INTERRUPTED}
 BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGQUIT)
@@ -154,7 +152,7 @@ def call(error):
     """How a call ended that raised: REFUSED. Raises Fault for anything but a documented error of one line."""
     import gymnasium
 
-    from care_sim.errors import InvalidInput, MissingExtra
+    from care_sim.base.errors import InvalidInput, MissingExtra
 
     if isinstance(error, InvalidInput | MissingExtra):
         text = str(error)

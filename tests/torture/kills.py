@@ -6,9 +6,9 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from torture import judge, study
-from torture.case import DONE, Fault
-from torture.processes import Command
+from tests.torture import judge, study
+from tests.torture.case import DONE, Fault
+from tests.torture.processes import Command
 
 LIMIT_S = 240.0
 """Of a case: several runs of a study; each of its commands has a limit of its own."""

@@ -39,9 +39,9 @@ class Inline(Executor):
 @contextmanager
 def inline(seconds=PLAYS_S):
     """Studies play in this process, for so long."""
-    from care_sim.certify.playing import played
+    from care_sim.measure.certify.playing import played
+    from care_sim.reports.page.build import write_page
     from care_sim.study import executors
-    from care_sim.study.page.build import write_page
 
     usual, defaults = executors.processes, {made: made.__defaults__ for made in (write_page, played)}
     executors.processes = partial(Inline, seconds)
@@ -109,7 +109,7 @@ def _make_protocol(path):
 
 
 def _make_drive(path):
-    from av2_log import at, box, write
+    from tests.helpers.av2_log import at, box, write
 
     def seen(sweep):
         ahead = 20.0 - 0.5 * sweep
@@ -124,20 +124,20 @@ def _make_drive(path):
 
 
 def _make_base(path):
-    from nuscenes_database import write
-    from nuscenes_drive import samples
+    from tests.helpers.nuscenes_database import write
+    from tests.helpers.nuscenes_drive import samples
 
     write(path, {"scene-0103": samples(0.0)[:3]})
 
 
 def _make_scorer(path):
-    from care_sim.policies.weights import shipped
+    from care_sim.policies.learned.weights import shipped
 
     shutil.copy(shipped("learned-scorer"), path)
 
 
 def _make_ppo(path):
-    from care_sim.policies.weights import shipped
+    from care_sim.policies.learned.weights import shipped
 
     shutil.copy(shipped("ppo-dense"), path)
 
@@ -199,6 +199,6 @@ _ODD = {
 
 
 def _make_undisturbed(path):
-    from torture import study
+    from tests.torture import study
 
     care_sim(*study.command(path, workers=1))

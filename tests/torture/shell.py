@@ -6,10 +6,10 @@ Their terminals speak other encodings, their disks and pipes are full or gone, a
 import os
 import signal
 
-from torture import commands, props, spoil
-from torture.case import DONE, INTERRUPTED, Fault
-from torture.judge import UNREAD, ending
-from torture.processes import Command
+from tests.torture import commands, props, spoil
+from tests.torture.case import DONE, INTERRUPTED, Fault
+from tests.torture.judge import UNREAD, ending
+from tests.torture.processes import Command
 
 LIMIT_S = 120.0
 HONEST_S = 4.0

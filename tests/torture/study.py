@@ -3,8 +3,8 @@
 import json
 from functools import lru_cache
 
-from torture import props
-from torture.case import Fault
+from tests.torture import props
+from tests.torture.case import Fault
 
 MEASURED = {"wall_s", "peak_rss_mb"}
 """Columns that time and memory decide."""
@@ -83,7 +83,7 @@ def _check_played_once(folder):
 
 def check_not_torn(folder):
     """A fault if a file that readers open is there but not whole."""
-    from care_sim.errors import InvalidInput
+    from care_sim.base.errors import InvalidInput
 
     if (folder / ROWS_FILE).exists():
         try:

@@ -4,12 +4,12 @@ from itertools import islice
 
 import pytest
 
-from torture.campaigns import CAMPAIGNS, found
-from torture.case import Case, Fault, Name
-from torture.field import Field, names
-from torture.judge import ending
-from torture.processes import Command
-from torture.wrong import KINDS, WAYS
+from tests.torture.campaigns import CAMPAIGNS, found
+from tests.torture.case import Case, Fault, Name
+from tests.torture.field import Field, names
+from tests.torture.judge import ending
+from tests.torture.processes import Command
+from tests.torture.wrong import KINDS, WAYS
 
 SHORT = {"commands": 45, "shell": 4, "calls": 300, "files": 40, "journals": 8, "kills": 1, "writers": 1, "disk": 2}
 """Cases of each campaign: 50 seconds together, on two cores."""
@@ -96,16 +96,16 @@ def test_the_field_sees_a_hang_a_death_and_too_much_memory(field):
 
 
 def test_the_field_sees_a_hang_before_a_case_begins(monkeypatch):
-    monkeypatch.setattr("torture.field.PREPARES_S", 0.0)
+    monkeypatch.setattr("tests.torture.field.PREPARES_S", 0.0)
     with Field(1) as field:
         (failure,) = field.play([Name("wrong", 0, 0)]).failures
     assert failure.kind == "hang before it begins"
 
 
 def test_a_process_left_behind_is_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr("torture.processes.LEAVES_S", 0.3)
+    monkeypatch.setattr("tests.torture.processes.LEAVES_S", 0.3)
     leaves = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])"
-    monkeypatch.setattr("torture.processes.entry_point", lambda: leaves)
+    monkeypatch.setattr("tests.torture.processes.entry_point", lambda: leaves)
     with Command([], tmp_path) as command:
         assert command.wait() == 0
         with pytest.raises(Fault, match="processes left behind"):

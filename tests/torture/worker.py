@@ -20,8 +20,8 @@ import time
 import traceback
 from pathlib import Path
 
-from torture.case import Case, Fault, Name
-from torture.judge import exception
+from tests.torture.case import Case, Fault, Name
+from tests.torture.judge import exception
 
 MEMORY = 2**30
 
@@ -60,7 +60,7 @@ streams = None
 
 def play(name, folder, listener=str):
     """Play a case in a new folder under `folder`; its answer as plain data."""
-    module = importlib.import_module(f"torture.{name.campaign}")
+    module = importlib.import_module(f"tests.torture.{name.campaign}")
     place = Path(tempfile.mkdtemp(dir=folder)) / "a" / "b"
     place.mkdir(parents=True)
     case = Case(name, place, listener)
@@ -136,7 +136,7 @@ def main():
     for line in names:
         name = Name.of(line.strip())
         try:
-            campaign = importlib.import_module(f"torture.{name.campaign}")
+            campaign = importlib.import_module(f"tests.torture.{name.campaign}")
             getattr(campaign, "prepare", lambda _name: None)(name)
         except Exception:
             answers.write(json.dumps({"broken": traceback.format_exc()}) + "\n")
@@ -149,6 +149,6 @@ def main():
 
 
 if __name__ == "__main__":
-    from torture import worker  # the module that campaigns import, not this copy of it
+    from tests.torture import worker  # the module that campaigns import, not this copy of it
 
     worker.main()

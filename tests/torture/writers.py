@@ -2,9 +2,9 @@
 
 import time
 
-from torture import judge, study
-from torture.case import DONE, INTERRUPTED, REFUSED, Fault
-from torture.processes import Command
+from tests.torture import judge, study
+from tests.torture.case import DONE, INTERRUPTED, REFUSED, Fault
+from tests.torture.processes import Command
 
 LIMIT_S = 240.0
 REFUSES = "another study writes to"

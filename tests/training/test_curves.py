@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.errors import InvalidInput
 from care_sim.training.config import Ppo, Sac
 from care_sim.training.curves import read, together
 from care_sim.training.curves_figure import curves_figure

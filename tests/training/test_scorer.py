@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from care_sim.cli import main
-from care_sim.policies.cues import CUES, OUTLOOKS
-from care_sim.policies.weights import load
+from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS
+from care_sim.policies.learned.weights import load
 from care_sim.training import scorer
 from care_sim.training.scorer_data import Examples
 

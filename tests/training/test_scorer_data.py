@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.policies.cues import CUES, OUTLOOKS
-from care_sim.streets.recording import record
-from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
+from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS
+from care_sim.sources.streets.recording import record
+from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
 from care_sim.training.scorer import HELD_OUT
 from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples, front_alone, untracked_cells
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.cli import main
-from care_sim.errors import InvalidInput, MissingExtra
-from care_sim.policies.weights import load
+from care_sim.policies.learned.weights import load
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import Ppo, Sac
 from care_sim.training.environments import bare, training
-from care_sim.training.evaluation import evaluate, rule
 from care_sim.training.seeds import TRAINING, VALIDATION, validation_seeds
+from care_sim.training.validation import evaluate, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]
 TINY = [*SHORT, "--rollout", "32", "--batch", "32", "--epochs", "1", "--hidden", "4"]

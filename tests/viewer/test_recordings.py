@@ -7,16 +7,16 @@ import gymnasium
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
-from care_sim.frames import Frame
-from care_sim.grid import AngularGrid
-from care_sim.moments import Witness
-from care_sim.shares import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
-from care_sim.study.config import EpisodeConfig
-from care_sim.study.episode import run_episode, trace
-from care_sim.viewer import entities
-from care_sim.viewer.layout import blueprint
-from care_sim.viewer.wrapper import RecordRerun, recording
+from care_sim.base.errors import InvalidInput
+from care_sim.core.budget_shares import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
+from care_sim.loops.watcher import Witness
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_play import run_episode, trace
+from care_sim.viewer.recording import entities
+from care_sim.viewer.recording.layout import blueprint
 
 CONFIG = EpisodeConfig("dense", "care", 0.05, 1, false_negative_rate=0.2, false_positive_rate=0.3)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from care_sim.types import CLASSES
+from care_sim.core.types import CLASSES
 from care_sim.world.bodies import CATALOGUE
 
 kinds = pytest.mark.parametrize("kind", CATALOGUE.values(), ids=CATALOGUE)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from care_sim.frames import Frame
-from care_sim.pinhole import PinholeCamera
+from care_sim.core.frames import Frame
+from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE

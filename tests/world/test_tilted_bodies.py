@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.frames import Frame
+from care_sim.core.frames import Frame
+from care_sim.core.types import CLASSES
 from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.types import CLASSES
 from care_sim.world.bodies import CATALOGUE, sized
 from care_sim.world.bullet import NOTHING, BulletWorld
 

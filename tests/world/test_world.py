@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from care_sim.errors import InvalidInput
-from care_sim.types import CLASSES
+from care_sim.base.errors import InvalidInput
+from care_sim.core.types import CLASSES
 from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk
 from care_sim.world.world import STEP_S, World, whole_steps

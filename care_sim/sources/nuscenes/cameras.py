@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.film import Annotations, Sights
-from care_sim.frames import Floats, Frame
-from care_sim.pinhole import PinholeCamera
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import ImageDetections
+from care_sim.loops.film import Annotations, Sights
 from care_sim.sensors.camera import CAMERA_WIDTH
-from care_sim.sensors.pixels import MIN_PIXELS, confidence_of
-from care_sim.types import ImageDetections
+from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 
 CHANNELS = ("CAM_FRONT", "CAM_FRONT_LEFT", "CAM_FRONT_RIGHT", "CAM_BACK_LEFT", "CAM_BACK_RIGHT", "CAM_BACK")
 PICTURE = (1600, 900)

@@ -1,6 +1,6 @@
 """Which categories of nuScenes the five classes hold."""
 
-from care_sim.errors import InvalidInput, unknown
+from care_sim.base.errors import InvalidInput, unknown
 
 CATEGORIES: dict[str, str | None] = {
     "human.pedestrian.adult": "pedestrian",

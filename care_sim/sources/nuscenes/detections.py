@@ -13,14 +13,14 @@ from typing import cast
 
 import numpy as np
 
-from care_sim.errors import InvalidInput, check_number, check_whole
-from care_sim.film import NOBODY, Annotations, Sights
-from care_sim.frames import Floats
-from care_sim.grid import Cells
+from care_sim.base.errors import InvalidInput, check_number, check_whole
+from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
+from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.loops.film import NOBODY, Annotations, Sights
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
-from care_sim.types import CLASSES, ImageDetections
 
 COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
 """The categories of COCO that the five classes hold."""

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.errors import InvalidInput
-from care_sim.film import Annotations, Film, Shot, Sights
-from care_sim.frames import Floats, Frame
-from care_sim.grid import AngularGrid
-from care_sim.sources.motion import motions
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import CLASSES, Ego
+from care_sim.loops.film import Annotations, Film, Shot, Sights
+from care_sim.sources.car_motion import motions
 from care_sim.sources.nuscenes.cameras import (
     CHANNELS,
     PICTURE,
@@ -27,7 +28,6 @@ from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.tables import Database, Row
-from care_sim.types import CLASSES, Ego
 
 KEYFRAME_S = 0.5
 """nuScenes annotates its keyframes at 2 Hz."""

@@ -5,12 +5,12 @@ The form: https://github.com/nutonomy/nuscenes-devkit/blob/master/python-sdk/nus
 
 import numpy as np
 
-from care_sim.conditions import MIN_RETURNS
-from care_sim.film import Shot
-from care_sim.forgetting import ForgettingRules
-from care_sim.frames import Floats, turned
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.forgetting import ForgettingRules
+from care_sim.core.frames import Floats, turned
+from care_sim.core.types import CLASSES, Detections
+from care_sim.loops.film import Shot
 from care_sim.sources.nuscenes.tables import Row
-from care_sim.types import CLASSES, Detections
 
 MODALITIES = {"use_camera": True, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False}
 """What the form's `meta` must tell. The camera decides where a policy looks, the LiDAR measures the boxes."""

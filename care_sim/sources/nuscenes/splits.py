@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from care_sim.errors import InvalidInput, check_known
+from care_sim.base.errors import InvalidInput, check_known
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
 
 _VAL_NUMBERS = (

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from care_sim.errors import InvalidInput
-from care_sim.film import NOBODY, Annotations, Cloud
-from care_sim.frames import Floats, Frame, turned
-from care_sim.grid import AngularGrid, Cells
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats, Frame, turned
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.loops.film import NOBODY, Annotations, Cloud
 
 VALUES_A_POINT = 5
 """float32 x, y, z, intensity and ring."""

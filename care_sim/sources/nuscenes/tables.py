@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.errors import InvalidInput
-from care_sim.frames import Floats
-from care_sim.json_text import parsed
+from care_sim.base.errors import InvalidInput
+from care_sim.base.json_text import parsed
+from care_sim.core.frames import Floats
 
 Row = dict[str, Any]
 

@@ -1,0 +1,1 @@
+"""What every room stands on: errors, bounds, files, processes, random streams. Nothing here knows LiDAR."""

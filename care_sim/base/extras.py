@@ -1,0 +1,78 @@
+"""Optional dependencies, imported where they are used; a missing one is named in one line."""
+
+import ctypes
+from importlib import import_module
+from types import ModuleType
+
+from care_sim.base.errors import MissingExtra
+
+OPEN3D_PACKAGES = "libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0"
+"""Debian packages with the system libraries that Open3D loads."""
+
+
+def import_open3d() -> ModuleType:
+    """Open3D. Raises MissingExtra with the extra, or the Debian packages, to install."""
+    _load_libusb()
+    try:
+        import open3d
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"Open3D needs the extra 'open3d': pip install 'care-sim[open3d]' ({error})") from error
+    except (ImportError, OSError) as error:
+        raise MissingExtra(f"Open3D lacks a system library: apt-get install {OPEN3D_PACKAGES} ({error})") from error
+    module: ModuleType = open3d
+    return module
+
+
+def import_torch() -> ModuleType:
+    """PyTorch. Raises MissingExtra with the extra to install."""
+    return _import("torch", "PyTorch", "rl")
+
+
+def import_mujoco() -> ModuleType:
+    """MuJoCo. Raises MissingExtra with the extra to install."""
+    return _import("mujoco", "MuJoCo", "bench")
+
+
+def import_panda_gym() -> ModuleType:
+    """panda-gym, which registers its environments. Raises MissingExtra with the extra to install."""
+    return _import("panda_gym", "panda-gym", "bench")
+
+
+def import_imageio_ffmpeg() -> ModuleType:
+    """FFmpeg, as imageio-ffmpeg brings it. Raises MissingExtra with the extra to install."""
+    return _import("imageio_ffmpeg", "A film as MP4", "video")
+
+
+def import_rerun() -> ModuleType:
+    """Rerun. Raises MissingExtra with the extra to install."""
+    return _import("rerun", "Rerun", "viewer")
+
+
+def vega_bundle() -> str:
+    """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra to install."""
+    bundle: str = _import("vl_convert", "A page", "page").javascript_bundle()
+    return bundle
+
+
+def check_page() -> None:
+    """Raise MissingExtra where a library is missing that makes pages."""
+    for module in ("altair", "jinja2", "vl_convert"):
+        _import(module, "A page", "page")
+
+
+def _import(module: str, name: str, extra: str) -> ModuleType:
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingExtra(f"{name} needs the extra '{extra}': pip install 'care-sim[{extra}]' ({error})") from error
+
+
+def _load_libusb() -> None:
+    """Give Open3D the libusb of the wheel `libusb-package`, for systems without their own."""
+    try:
+        import libusb_package
+    except ImportError:
+        return
+    library = libusb_package.get_library_path()
+    if library is not None:
+        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)

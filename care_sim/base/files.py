@@ -1,0 +1,182 @@
+"""Files that are there whole or not at all: every file that CARE-Sim writes, but for journals, goes through here."""
+
+import errno
+import os
+import re
+import shutil
+import socket
+import stat
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from care_sim.base.errors import InvalidInput
+
+PNG, GIF, WEBP, MP4 = rb"\x89PNG", rb"GIF8", rb"RIFF", rb".{4}ftyp"
+HTML, JSON, SVG, ZIP, PARQUET, RERUN = rb"<!DOCTYPE", rb"\s*[{[]", rb"<\?xml|<svg", rb"PK", rb"PAR1", rb"RRF"
+"""What files of these kinds begin with, as patterns. Weights and checkpoints are ZIP."""
+
+_MORE_BYTES = 2**16
+_being_written: set[Path] = set()
+
+
+@contextmanager
+def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
+    """A file to write to, with the same ending, which takes the place of `path` in one move at the end: readers see the
+    old file or the new. A link stays a link to it. What cannot be replaced, a device or a pipe, is written into.
+
+    Raises what `check_output` does, before anything is computed; an error of writing names `path`.
+    """
+    check_output(path, kind)
+    with _written_into(path) if _is_stream(path) else _moved_to(path) as unfinished:
+        yield unfinished
+
+
+def check_output(path: Path, kind: bytes = b"") -> None:
+    """Raise InvalidInput for a `path` that nothing can be written to, that this process is writing already, or where
+    there is a file that does not begin like one of `kind`, OSError where writing is not allowed. The folder is made.
+    """
+    _resolved(path)
+    if _is_stream(path):
+        return
+    if path.is_dir():
+        raise InvalidInput(f"{path} is a folder, a file is wanted")
+    if path.exists() and not path.is_file():
+        raise InvalidInput(f"{path} is a block device or a socket: name a file")
+    if path.exists():
+        _check_old(path, kind)
+    with _moved_to(path, keep=False):
+        pass
+    _clear_away_before(path)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text as a file, whole or not at all."""
+    with replacing(path) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+
+
+def _check_old(path: Path, kind: bytes) -> None:
+    if not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, "it is there and may not be written", str(path))
+    with path.open("rb") as old:
+        head = old.read(64)
+    if head and not re.match(kind, head, re.DOTALL):
+        raise InvalidInput(
+            f"{path} holds something else than what would be written there: remove it first, or name another file"
+        )
+
+
+@contextmanager
+def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
+    """A file beside what `path` is or links to, with its rights, which is moved there or, if not kept, removed."""
+    place = _resolved(path)
+    if place in _being_written:
+        raise InvalidInput(f"{path} is being written already: close what writes it, or name another file")
+    unfinished = place.with_name(f".{_host()}.{os.getpid()}.{_end_of_name(place)}")
+    _being_written.add(place)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.touch()
+        yield unfinished
+        if keep:
+            if place.exists():
+                shutil.copymode(place, unfinished)
+            unfinished.replace(place)
+    except OSError as error:
+        raise _named(error, path, unfinished) from error
+    finally:
+        _being_written.remove(place)
+        unfinished.unlink(missing_ok=True)
+
+
+def why_unwritable(path: Path) -> str | None:
+    """Why a file cannot grow, which libraries that wrote to it may not have told; None where it can."""
+    try:
+        with path.open("ab", buffering=0) as file:
+            written = file.write(bytes(_MORE_BYTES))
+            # A disk takes what fits, and says at the next byte why not more.
+            file.write(bytes(_MORE_BYTES - written))
+    except OSError as error:
+        return error.strerror
+    return None
+
+
+@contextmanager
+def _written_into(path: Path) -> Iterator[Path]:
+    """A file elsewhere whose content goes into the stream `path`."""
+    with TemporaryDirectory(prefix="care-sim-") as folder:
+        unfinished = Path(folder) / path.name
+        unfinished.touch()
+        yield unfinished
+        sys.stdout.flush()
+        try:
+            with unfinished.open("rb") as content, path.open("ab") as target:
+                shutil.copyfileobj(content, target)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _clear_away_before(path: Path) -> None:
+    """Remove what writers of the file have left beside it that were killed on this host."""
+    place = _resolved(path)
+    ours = re.compile(rf"\.{_host()}\.(\d{{1,9}})\.{re.escape(_end_of_name(place))}")
+    for name in os.listdir(place.parent):
+        left = ours.fullmatch(name)
+        if left and not _runs(int(left[1])):
+            with suppress(OSError):
+                place.with_name(name).unlink()
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True
+
+
+def _host() -> str:
+    return re.sub(r"\W", "-", socket.gethostname(), flags=re.ASCII)[:30]
+
+
+def _end_of_name(place: Path) -> str:
+    """Of the 255 bytes that a name may have."""
+    return os.fsencode(place.name)[-200:].decode(errors="ignore")
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether `path` is a character device, a pipe or what this process prints to, be it a file."""
+    try:
+        there = path.stat()
+    except OSError:
+        return False
+    if stat.S_ISCHR(there.st_mode) or stat.S_ISFIFO(there.st_mode):
+        return True
+    return any(os.path.samestat(there, printed) for printed in _printed_to())
+
+
+def _printed_to() -> Iterator[os.stat_result]:
+    for descriptor in (1, 2):
+        try:
+            yield os.fstat(descriptor)
+        except OSError:  # it is closed
+            continue
+
+
+def _resolved(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except RuntimeError as error:
+        raise InvalidInput(f"{path} is a link that leads back to itself: name a file") from error
+
+
+def _named(error: OSError, path: Path, unfinished: Path) -> OSError:
+    """The error with the name that the user knows, where it tells of the file or of its disk."""
+    of_the_disk = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+    of_the_file = error.filename is not None and os.fspath(error.filename) == str(unfinished)
+    return OSError(error.errno, error.strerror, str(path)) if of_the_disk or of_the_file else error

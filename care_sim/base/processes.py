@@ -1,0 +1,69 @@
+"""Processes that this one starts: deaf to interrupts, which are this one's to handle, and gone when it is gone."""
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from typing import TypeVar
+
+from care_sim.base.interrupts import SIGNALS, held_back
+
+T = TypeVar("T")
+
+LOOK_S = 1.0
+"""Between two looks whether the starter is there."""
+
+UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
+"""What a terminal sends to all processes in it. SIGTERM is how a pool ends a worker."""
+
+
+@contextmanager
+def starting() -> Iterator[None]:
+    """Processes started meanwhile, and theirs, never hear the terminal's interrupts; this one hears them afterwards,
+    when nothing is half started.
+    """
+    with held_back():
+        # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a line.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
+        try:
+            # It outlives the processes whose leavings it clears away; starting it unblocks SIGINT.
+            resource_tracker.ensure_running()
+            signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_with_parent() -> None:
+    """End this process, which multiprocessing started, as soon as the one that asked for it is gone, however that
+    ended. Of a fork server's workers that is not the fork server, which goes when the last of them has gone.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_after, args=[parent], name="end with parent", daemon=True).start()
+
+
+def following(make: Callable[[], T]) -> T:
+    """What `make` makes, in a process that ends with its parent."""
+    end_with_parent()
+    return make()
+
+
+def end_with_starter(starter: int) -> None:
+    """End this process, an interpreter that the process `starter` started, as soon as that is gone."""
+    threading.Thread(target=_end_without, args=[starter], name="end with starter", daemon=True).start()
+
+
+def _end_without(starter: int) -> None:
+    while os.getppid() == starter:
+        time.sleep(LOOK_S)
+    os._exit(1)
+
+
+def _end_after(parent: "multiprocessing.process.BaseProcess") -> None:
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,72 @@
+"""What several commands take: conditions that all episodes share, parameters as NAME=VALUE, seeds."""
+
+import ast
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.conditions import Conditions
+
+if TYPE_CHECKING:
+    from care_sim.study.parameters import Parameters
+
+LONGEST = 8192
+"""Characters of a parameter: a path and its name fit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Conditions):
+    """Conditions that all episodes share."""
+
+    scenario_parameters: tuple[str, ...] = ()
+    """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
+    POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+
+    def arguments(self) -> dict[str, Any]:
+        """As arguments of `EpisodeConfig`."""
+        pairs = {
+            "scenario_parameters": parameters(self.scenario_parameters),
+            "policy_parameters": parameters(self.policy_parameters),
+        }
+        return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
+
+
+USUAL = Options()
+"""The defaults."""
+
+
+def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
+    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one, and for more than a
+    study can hold.
+    """
+    from care_sim.study.task import MOST_TASKS
+
+    if len(numbers) == 1 and not 1 <= numbers[0] <= MOST_TASKS:
+        raise InvalidInput(
+            f"seeds must be a number of seeds from 1 to {MOST_TASKS:,}, whose rows a study holds in memory, "
+            f"or a list of seeds, got {shown(numbers[0])}"
+        )
+    return range(numbers[0]) if len(numbers) == 1 else numbers
+
+
+def parameters(texts: Sequence[str]) -> "Parameters":
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
+    return tuple(_pair(text) for text in texts)
+
+
+def _pair(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
+    if len(text) > LONGEST:
+        raise InvalidInput(f"a parameter must be at most {LONGEST} characters long, got {shown(text)}")
+    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
+        try:
+            literal = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+            literal = value  # no literal, or one nested deeper than any parameter is
+    return name, tuple(literal) if isinstance(literal, list) else literal

@@ -1,0 +1,53 @@
+"""What the commands of the open loop take: where the scenes come from, who detects, under which conditions."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from care_sim.commands.shared.options import parameters
+from care_sim.core.conditions import Conditions
+
+if TYPE_CHECKING:
+    from care_sim.sources.scenes import Source
+
+USUAL_CONDITIONS = Conditions()
+"""The defaults."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlayOptions:
+    """Options that all plays share."""
+
+    source: str = "streets"
+    """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
+    split: str | None = None
+    """Of streets: evaluation (150 scenes) or calibration (20). Of nuScenes: val, all, or one of splits.json."""
+    version: str | None = None
+    """Of nuScenes: the version, where the folder holds several."""
+    camera_detections: Path | None = None
+    """Of nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
+    detector: str = "returns"
+    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed package."""
+    detector_parameters: tuple[str, ...] = ()
+    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
+    policy_parameters: tuple[str, ...] = ()
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
+    POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = USUAL_CONDITIONS
+    """Further conditions."""
+
+    def scene_source(self) -> "Source":
+        """The source of the scenes. Raises InvalidInput where there is none."""
+        from care_sim.sources.scenes import source_of
+
+        return source_of(self.source, split=self.split, version=self.version, camera_detections=self.camera_detections)
+
+    def common(self) -> dict[str, Any]:
+        """What all plays share, as fields of `care_sim.study.play_config.PlayConfig`."""
+        return asdict(self.conditions) | {
+            "detector": self.detector,
+            "detector_parameters": parameters(self.detector_parameters),
+            "policy_parameters": parameters(self.policy_parameters),
+        }

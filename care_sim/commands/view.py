@@ -1,0 +1,103 @@
+"""`care-sim view`: the Rerun viewer over a recording, on this machine or in a browser, without a network."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import quote
+
+import tyro
+
+from care_sim.base.errors import InvalidInput
+from care_sim.base.extras import import_rerun
+from care_sim.base.files import RERUN
+
+HERE = "127.0.0.1"
+VIEWER = """
+import os, signal, sys, threading
+
+def follow():
+    os.read(0, 1)
+    os.killpg(0, signal.SIGKILL)
+
+threading.Thread(target=follow, daemon=True).start()
+from rerun_cli.__main__ import main
+sys.exit(main())
+"""
+"""Rerun's own launcher, which as a module would not tell whether the viewer failed. Its input ends with this process,
+however that ends: then it and its children end too.
+"""
+FAILED = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra 'viewer').
+
+    It needs no network. Where there is one, the viewer looks for its updates and counts its use, which
+    `rerun analytics disable` ends; its page in a browser fetches a font too.
+    """
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """The recording (.rrd)."""
+    web: bool = False
+    """Serve it to browsers of this machine instead. Ctrl-C ends it."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        import_rerun()
+        if self.file.exists() and not self.file.is_file():
+            raise InvalidInput(f"{self.file} is no file, a recording is wanted")
+        with self.file.open("rb") as recording:
+            if recording.read(len(RERUN)) != RERUN:
+                raise InvalidInput(f"{self.file} is no recording of `care-sim run --record`")
+        if not self.web:
+            if not _rerun(str(self.file), "--port", "auto"):
+                return 0
+            print("care-sim: the viewer failed; with --web a browser shows the recording", file=sys.stderr)
+            return FAILED
+        data, pages = _free_ports(2)
+        source = quote(f"rerun+http://{HERE}:{data}/proxy", safe="")
+        print(
+            f"Open http://{HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a browser; Ctrl-C ends it.",
+            flush=True,
+        )
+        ports = ("--bind", HERE, "--port", str(data), "--web-viewer-port", str(pages))
+        return _rerun(str(self.file), "--serve-web", *ports)
+
+
+def _rerun(*options: str) -> int:
+    """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes outlives this one."""
+    quiet = {"RUST_LOG": "warn"} | os.environ
+    command = [sys.executable, "-c", VIEWER, *options]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=quiet)
+    try:
+        return process.wait()
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        _end(process)
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+    except ProcessLookupError:
+        return
+    process.wait()
+
+
+def _free_ports(count: int) -> list[int]:
+    """Ports of this machine that nobody listens on."""
+    sockets = [socket.socket() for _ in range(count)]
+    try:
+        for one in sockets:
+            one.bind((HERE, 0))
+        return [one.getsockname()[1] for one in sockets]
+    finally:
+        for one in sockets:
+            one.close()

@@ -1,0 +1,133 @@
+"""The conditions of an environment: how well the car senses, and how its budget is spent.
+
+The fields are at once keyword arguments of the environments, options of the command line and columns of
+the results. Every fault is off by default. Their bounds are far beyond what any sensor does.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.bounds import bounded, settle
+from care_sim.base.errors import LARGEST, InvalidInput, check_whole, shown
+from care_sim.core.allocation import RESERVE_FRACTION
+from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
+
+MIN_RETURNS = 3
+"""Fired rays that must hit an object. The fewest that span a surface."""
+CONFIDENCE = 0.25
+"""The public confidence threshold of the paper's camera detector (Remark 2)."""
+MOST_GHOSTS = 64
+"""False detections a picture, on average: half as many as a policy is shown at most."""
+MOST_KEYFRAMES = 1200
+"""Of an episode: a minute in steps of 0.05 s. No fault needs to last longer."""
+LONGEST_S = 3600.0
+"""Far beyond the end of any episode or recorded scene."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraFaults:
+    """What the camera gets wrong."""
+
+    false_negative_rate: float = bounded(0.0, 0, 1)
+    """Share of the objects in a picture that the camera misses, 0 to 1."""
+    false_negative_per_m: float = bounded(0.0, 0, 1)
+    """How much that share grows with every metre of distance, up to 1."""
+    false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
+    """Keyframes that a miss lasts; the share of misses stays what it is."""
+    false_positive_rate: float = bounded(0.0, 0, MOST_GHOSTS)
+    """Mean number of boxes in a picture that show nothing; else they are like the true ones, which they are drawn from
+    (`care_sim.sensors.false_boxes`), so that where the camera never sees anybody there are none.
+    """
+    camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
+    """Age of the camera's detections in whole keyframes."""
+    camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
+    """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
+    blackout_start_s: float = bounded(0.0, 0, LONGEST_S)
+    """When the camera goes black, seconds from the start; it does only with `blackout_s`."""
+    blackout_s: float = bounded(0.0, 0, LONGEST_S)
+    """How long the camera's pictures are black, seconds."""
+    camera_rotation_sigma_deg: float = bounded(0.0, 0, 180)
+    """Spread of the error in yaw and pitch with which the camera is mounted, degrees; drawn once an episode."""
+    camera_position_sigma_m: float = bounded(0.0, 0, 10)
+    """Spread of the error in x, y and z with which the camera is mounted, metres; drawn once an episode."""
+
+    def black_at(self, time_s: float) -> bool:
+        """Whether a picture taken at `time_s` is black."""
+        return self.blackout_start_s - 1e-9 <= time_s < self.blackout_start_s + self.blackout_s - 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarFaults:
+    """What the LiDAR gets wrong."""
+
+    lidar_range_sigma: float = bounded(0.0, 0, 50)
+    """Gaussian noise on every range, metres, folded back at 0 and at the reach; policies meet it, the proxy detector,
+    whose boxes are true, does not.
+    """
+    lidar_dropout: float = bounded(0.0, 0, 1)
+    """Share of returns that are lost, 0 to 1."""
+    lidar_dead_rows: tuple[int, ...] = ()
+    """Elevation rows that fire and return nothing; row 0 is the highest."""
+
+    def _settle_rows(self) -> None:
+        rows: Any = self.lidar_dead_rows
+        if not (isinstance(rows, list | tuple) or (isinstance(rows, np.ndarray) and rows.ndim == 1)):
+            raise InvalidInput(f"lidar_dead_rows must be a list of rows, got {shown(rows)}")
+        for row in rows:
+            check_whole("lidar_dead_rows", row, 0, MOST_ROWS)
+        object.__setattr__(self, "lidar_dead_rows", tuple(sorted({int(row) for row in rows})))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensing(CameraFaults, LidarFaults):
+    """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and odometry."""
+
+    ego_speed_sigma: float = bounded(0.0, 0, 10)
+    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign."""
+    engine: str = "fast"
+    """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
+    reference.
+    """
+    min_returns: int = bounded(MIN_RETURNS, 1, LARGEST)
+    """Fired rays that must hit an object for it to be detected."""
+    camera_confidence: float = bounded(CONFIDENCE, 0, 1)
+    """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has 0.25."""
+
+    def __post_init__(self) -> None:
+        settle(self)
+        self._settle_rows()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions(Sensing):
+    """All conditions: sensing, and how the budget is spent.
+
+    `care_sim.core.types.Rig` checks what the allocator is given, the environments whether engine and rows exist.
+    """
+
+    reserve_fraction: float = bounded(RESERVE_FRACTION, 0, 1)
+    """Share rho of the budget that the allocator keeps for the reserve, 0 to 1."""
+    floor: bool = True
+    """Whether the shared random floor spends what the policy leaves of the budget."""
+    floor_seed: int = bounded(0, 0, LARGEST)
+    """Which of the random floors that the episode's seed holds."""
+    azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
+    """Columns by which hulls and wedges are dilated."""
+    elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
+    """Rows by which hulls and wedges are dilated."""
+
+
+DEFAULTS = {field.name: field.default for field in fields(Conditions)}
+CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))
+UNFELT_BY_FULL = (
+    *CAMERA_FAULTS,
+    "camera_confidence",
+    "reserve_fraction",
+    "floor",
+    "floor_seed",
+    "azimuth_margin",
+    "elevation_margin",
+)
+"""A scan of every cell asks neither the camera nor the allocator."""

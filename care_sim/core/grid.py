@@ -1,0 +1,155 @@
+"""The angular grid of firing cells, and the cells that boxes and ray bundles cover.
+
+Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is
+`row * columns + column`; row 0 is the highest elevation and column c covers the azimuths
+[-pi + c * width, -pi + (c + 1) * width).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from care_sim.base.bounds import bounded, settle
+from care_sim.base.errors import InvalidInput, as_array
+from care_sim.core.frames import Floats
+
+Cells = NDArray[np.int64]
+
+AZIMUTH_MARGIN = 2
+"""Dilation of hulls and wedges, in columns (paper, Remark 2)."""
+ELEVATION_MARGIN = 1
+"""Dilation of hulls and wedges, in rows (paper, Remark 2)."""
+MOST_COLUMNS, MOST_ROWS = 2**14, 2**10
+"""Of a grid: a thousand times the cells of the paper's."""
+
+
+@dataclass(frozen=True)
+class AngularGrid:
+    """`columns` x `rows` firing cells of a rotating LiDAR.
+
+    The defaults are the grid of the paper (Remark 1): 512 columns, and the 32 rings of the
+    nuScenes sensor from +10.67 to -30.67 degrees in equal steps. `range_m` is the reach of a ray.
+    """
+
+    columns: int = bounded(512, 1, MOST_COLUMNS)
+    rows: int = bounded(32, 2, MOST_ROWS)
+    top: float = bounded(float(np.deg2rad(10.67)), -np.pi / 2, np.pi / 2)
+    bottom: float = bounded(float(np.deg2rad(-30.67)), -np.pi / 2, np.pi / 2)
+    range_m: float = bounded(50.0, 1, 1_000_000)
+
+    def __post_init__(self) -> None:
+        settle(self, " of the grid")
+        if self.bottom >= self.top:
+            raise InvalidInput(f"bottom of the grid must lie below its top, {self.top:g}, got {self.bottom:g}")
+
+    @property
+    def size(self) -> int:
+        """Number of cells N = A * E."""
+        return self.columns * self.rows
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns), the shape of a picture of the grid."""
+        return self.rows, self.columns
+
+    @property
+    def column_width(self) -> float:
+        """Azimuth covered by a column, radians."""
+        return 2 * np.pi / self.columns
+
+    @property
+    def row_height(self) -> float:
+        """Elevation between two rows, radians."""
+        return (self.top - self.bottom) / (self.rows - 1)
+
+    @cached_property
+    def fan(self) -> tuple[Floats, Floats]:
+        """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of every row (rows, 2)."""
+        azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
+        elevations = np.linspace(self.top, self.bottom, self.rows)
+        across, down = (np.stack([np.cos(angles), np.sin(angles)], axis=1) for angles in (azimuths, elevations))
+        across.flags.writeable = down.flags.writeable = False
+        return across, down
+
+    @cached_property
+    def directions(self) -> Floats:
+        """(N, 3) unit vectors of the rays, one through the centre of every cell."""
+        (cos_az, sin_az), (cos_el, sin_el) = (angles.T for angles in self.fan)
+        level = np.broadcast_to(sin_el[:, None], self.shape)
+        directions = np.stack([np.outer(cos_el, cos_az), np.outer(cos_el, sin_az), level], axis=-1).reshape(-1, 3)
+        directions.flags.writeable = False
+        return directions
+
+    def cells_of(self, directions: ArrayLike) -> Cells:
+        """The cell each direction (n, 3) falls in; -1 above the top or below the bottom row."""
+        x, y, z = np.asarray(directions, dtype=float).reshape(-1, 3).T
+        column = np.floor((np.arctan2(y, x) + np.pi) / self.column_width).astype(np.int64)
+        row = self._row(np.arctan2(z, np.hypot(x, y)))
+        inside = (row >= 0) & (row < self.rows)
+        return np.where(inside, row * self.columns + column % self.columns, -1)
+
+    def hulls(
+        self,
+        boxes: ArrayLike,
+        azimuth_margin: int | Cells = AZIMUTH_MARGIN,
+        elevation_margin: int = ELEVATION_MARGIN,
+    ) -> list[Cells]:
+        """The dilated angular rectangle of every box, as ascending cells.
+
+        `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
+        number or one a box. A box that surrounds the sensor covers every column.
+        """
+        boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 7)
+        if not len(boxes):
+            return []
+        from care_sim.core.rectangles import silhouettes
+
+        planar, upright, around = silhouettes(boxes)
+        azimuths = np.arctan2(planar[..., 1], planar[..., 0])
+        elevations = np.arctan2(upright[..., 0], upright[..., 1])
+        return self._sectors(azimuths, elevations, np.where(around, self.columns, azimuth_margin), elevation_margin)
+
+    def wedges(
+        self,
+        bundles: ArrayLike,
+        azimuth_margin: int = AZIMUTH_MARGIN,
+        elevation_margin: int = ELEVATION_MARGIN,
+    ) -> list[Cells]:
+        """The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
+
+        The first ray of a bundle is its middle; the others lie within half a turn of it.
+        """
+        bundles = np.asarray(bundles, dtype=float)
+        if not len(bundles):
+            return []
+        x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
+        margins = np.full(len(bundles), azimuth_margin)
+        return self._sectors(np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)), margins, elevation_margin)
+
+    def _row(self, elevation: Floats) -> Cells:
+        return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
+
+    def _sectors(self, azimuths: Floats, elevations: Floats, margins: Cells, elevation_margin: int) -> list[Cells]:
+        from care_sim.core.rectangles import sectors
+
+        cells, ends = sectors(azimuths, elevations, margins, elevation_margin, self._lattice)
+        return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
+
+    @cached_property
+    def _lattice(self) -> tuple[int, int, float, float, float]:
+        return self.columns, self.rows, self.column_width, float(self.top), float(self.row_height)
+
+
+def cell_indices(cells: Sequence[int] | Cells, name: str = "a set of cells") -> NDArray[np.integer]:
+    """`cells` as an array. Raises InvalidInput for what is no list of indices."""
+    array = as_array(name, cells)
+    if array.ndim != 1 or not (array.dtype.kind in "iu" or array.size == 0):
+        raise InvalidInput(
+            f"{name} must be a list of cell indices, got {array.dtype} of shape {array.shape}"
+            " (of a mask take np.flatnonzero)"
+        )
+    return array

@@ -1,0 +1,1 @@
+"""The car's own software: the fixed braking controller and its odometry."""

@@ -1,0 +1,103 @@
+"""The fixed braking controller: the same for every policy, and stated here in full.
+
+A track counts when its box, widened by `side_margin_m` on both sides, overlaps the strip the ego
+sweeps straight ahead, now or at any time within `horizon_s` if it keeps its velocity; only what lies
+ahead of the front bumper counts. A track seen once has no velocity and counts only where it is.
+
+The brake goes on when the gap to a counting track is at most the ego's stopping distance
+v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself,
+v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with `b` at the first keyframe at least
+`reaction_s` later. It stays on while any counting track is not faster than the ego, and for `release_s`
+after the last one; then the ego gains speed at `comfort` up to its cruising speed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.frames import Floats
+from care_sim.core.types import Command, Ego, Tracks
+
+
+@dataclass(frozen=True)
+class BrakingRules:
+    """The numbers of the controller and their sources."""
+
+    deceleration: float = 5.0
+    """b in m/s^2, the least that UN Regulation 152 asks of emergency braking."""
+    reaction_s: float = 0.3
+    """From decision to full braking: build-up of brake pressure."""
+    standstill_m: float = 2.0
+    """s_0, jam distance of the intelligent driver model (Treiber et al. 2000), as in the guard of SBF."""
+    horizon_s: float = 2.0
+    """How far ahead an entry is predicted: the two-second rule (Vogel 2003), as in the guard of SBF."""
+    side_margin_m: float = 0.3
+    """Room kept on either side of the ego."""
+    release_s: float = 0.5
+    """The way must have been free this long before the brake is released."""
+    comfort: float = 1.5
+    """Acceleration back to cruising speed, m/s^2."""
+
+
+class BrakingController:
+    """Brakes on tracks. `front_m` and `half_width_m` are the ego's extents seen from its sensor."""
+
+    def __init__(
+        self,
+        cruise_mps: float,
+        front_m: float,
+        half_width_m: float,
+        keyframe_s: float,
+        rules: BrakingRules = BrakingRules(),
+    ):
+        self._cruise_mps = cruise_mps
+        self._front_m = front_m
+        self._half_width_m = half_width_m
+        self._keyframe_s = keyframe_s
+        self._rules = rules
+        self._braking_s: float | None = None
+        self._free_s = 0.0
+
+    def command(self, tracks: Tracks, ego: Ego) -> Command:
+        """Decide from the tracks of this keyframe, in the sensor frame, and the ego's motion."""
+        halves = _half_extents(tracks)
+        counting = self._counting(tracks, *halves)
+        if self._braking_s is None:
+            gaps = tracks.boxes[:, 0] - halves[0] - self._front_m
+            if np.any(counting & (gaps <= self._stopping_distances(tracks, ego.speed))):
+                self._braking_s, self._free_s = 0.0, 0.0
+        else:
+            self._braking_s += self._keyframe_s
+            blocked = bool(np.any(counting & (tracks.velocities[:, 0] <= ego.speed)))
+            self._free_s = 0.0 if blocked else self._free_s + self._keyframe_s
+            if self._free_s > self._rules.release_s - 1e-9:
+                self._braking_s = None
+        return self._act(ego.speed)
+
+    def _act(self, speed: float) -> Command:
+        if self._braking_s is None:
+            wanted = (self._cruise_mps - speed) / self._keyframe_s
+            return Command(float(min(max(wanted, -self._rules.comfort), self._rules.comfort)), False)
+        acting = self._braking_s >= self._rules.reaction_s - 1e-9
+        return Command(-self._rules.deceleration if acting else 0.0, True)
+
+    def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> NDArray[np.bool_]:
+        rules = self._rules
+        ahead = tracks.boxes[:, 0] + half_x > self._front_m
+        reach = self._half_width_m + rules.side_margin_m + half_y
+        now, then = tracks.boxes[:, 1], tracks.boxes[:, 1] + tracks.velocities[:, 1] * rules.horizon_s
+        return ahead & (np.minimum(now, then) <= reach) & (np.maximum(now, then) >= -reach)
+
+    def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
+        rules = self._rules
+        own = speed * rules.reaction_s + speed**2 / (2 * rules.deceleration) + rules.standstill_m
+        theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.deceleration)
+        return own - theirs
+
+
+def _half_extents(tracks: Tracks) -> tuple[Floats, Floats]:
+    """Half the extent of every box along x and along y."""
+    length, width, yaw = tracks.boxes[:, 3], tracks.boxes[:, 4], tracks.boxes[:, 6]
+    cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
+    return (length * cos + width * sin) / 2, (length * sin + width * cos) / 2

@@ -1,0 +1,1 @@
+"""Wrappers around the environments; `care_sim.wrappers` is their public door."""

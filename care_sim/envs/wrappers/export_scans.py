@@ -1,0 +1,128 @@
+"""Scans as files that other tools read: point clouds, with poses and boxes beside them."""
+
+import errno
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from os import PathLike
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from care_sim.base.errors import InvalidInput, check_path
+from care_sim.base.extras import import_open3d
+from care_sim.base.files import replacing, why_unwritable, write_text
+from care_sim.core.budget_shares import SHARES
+from care_sim.core.frames import Floats
+from care_sim.core.types import CLASSES, Action
+from care_sim.envs.wrappers.watching import Watching, numbered
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.watcher import Moment
+from care_sim.policies.base import Policy
+
+UNITS = (
+    "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x along the road, y "
+    "left, z up. Sensor frame, that of points and tracks: x forward, y left, z up; sensor_in_world is its origin, "
+    "then yaw, pitch and roll, turned about z, then y, then x. Cells: row * columns + column; row 0 is the highest, "
+    "column 0 straight behind, then to the right, ahead, left. Ego and bodies are truth, in the world frame."
+)
+POINT_BYTES = 4 * 3 + 4 + 1
+"""Of a point in a cloud: three coordinates, cell and share."""
+
+
+class ExportScans(Watching):
+    """Writes every scan of an episode as a point cloud, with what stood around it.
+
+    ### Files
+    The first episode goes to the folder `path`, later ones to `NAME-1`, `NAME-2` beside it. Metres, seconds, radians;
+    boxes are centre x, y, z, length, width, height, yaw.
+
+    - `000.pcd`, binary: the returns of keyframe 0 as `x y z` (float32, sensor frame: x forward, y left, z up), `cell`
+      (int32, row * columns + column) and `share` (uint8, an index into the `shares` of `episode.json`).
+    - `000.json`: `keyframe`, `time_s`, `sensor_in_world` (x, y, z, yaw, pitch, roll), `ego` (box), `bodies` (`name`,
+      `class` or null, `box`), all in the world frame (x along the road, y left, z up) and truth; `tracks` (`id`,
+      `class`, `box` of the forecast, `velocity` over ground) in the sensor frame; `fired` cells; `detected` (the
+      first-sighting actor), `braking`, `speed_mps`.
+    - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the episode is over.
+
+    ### Arguments
+    `path` of the folder, one for every environment of a vector; `policy`, the `care_sim.Policy` that acts, as for
+    `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`, `care_sim.InvalidInput` for an environment
+    that is no closed loop of CARE-Sim and for a folder that holds scans already, OSError where nothing can be written.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Action], path: "str | PathLike[str]", policy: Policy | None = None):
+        super().__init__(env, policy)
+        check_path("path", path)
+        self._open3d: ModuleType = import_open3d()
+        self._path = self._folder = Path(path)
+
+    def begin(self, loop: ClosedLoop, episode: int) -> None:
+        """Make the folder."""
+        self._folder = numbered(self._path, episode)
+        if any(self._folder.glob("[0-9]*.pcd")):
+            raise InvalidInput(f"{self._folder} holds scans already: name another folder")
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._describe(None)
+
+    def keep(self, moment: Moment) -> None:
+        """Write the two files of a keyframe."""
+        stem = f"{moment.frame.index:03d}"
+        cells, points = moment.returned(self._closed_loop.rig.grid)
+        self._write_cloud(self._folder / f"{stem}.pcd", points, cells, moment.shares.ravel()[cells])
+        write_text(self._folder / f"{stem}.json", json.dumps(described(moment)) + "\n")
+
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """Write the result."""
+        self._describe(outcome)
+
+    def _describe(self, outcome: Mapping[str, Any] | None) -> None:
+        content = {
+            "units": UNITS,
+            "grid": asdict(self._closed_loop.rig.grid),
+            "classes": CLASSES,
+            "shares": SHARES,
+            "outcome": outcome,
+        }
+        write_text(self._folder / "episode.json", json.dumps(content, indent=1) + "\n")
+
+    def _write_cloud(self, file: Path, points: Floats, cells: Any, shares: Any) -> None:
+        tensor = self._open3d.core.Tensor
+        cloud = self._open3d.t.geometry.PointCloud(tensor(points.astype(np.float32)))
+        cloud.point["cell"] = tensor(cells.astype(np.int32)[:, None])
+        cloud.point["share"] = tensor(shares.astype(np.uint8)[:, None])
+        with replacing(file) as unfinished:
+            written = self._open3d.t.io.write_point_cloud(str(unfinished), cloud)
+            # Open3D does not tell of a disk that is full.
+            if not written or unfinished.stat().st_size < len(points) * POINT_BYTES:
+                reason = why_unwritable(unfinished) or "the point cloud could not be written"
+                raise OSError(errno.EIO, reason, str(file))
+
+
+def described(moment: Moment) -> dict[str, Any]:
+    """What stood around a scan, as plain data; see `ExportScans`."""
+    stance, frame = moment.stance, moment.frame
+    sensor, tracks = stance.sensor, stance.belief.tracks
+    classes = [None if label is None else CLASSES[label] for label in stance.labels]
+    columns = zip(tracks.ids, tracks.classes, tracks.boxes, tracks.velocities, strict=True)
+    return {
+        "keyframe": frame.index,
+        "time_s": frame.time_s,
+        "sensor_in_world": [sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.pitch, sensor.roll],
+        "ego": stance.ego.tolist(),
+        "bodies": [
+            {"name": name, "class": label, "box": box.tolist()}
+            for name, label, box in zip(stance.names, classes, stance.bodies, strict=True)
+        ],
+        "tracks": [
+            {"id": int(number), "class": CLASSES[label], "box": box.tolist(), "velocity": velocity.tolist()}
+            for number, label, box, velocity in columns
+        ],
+        "fired": frame.fired.tolist(),
+        "detected": frame.detected,
+        "braking": frame.braking,
+        "speed_mps": frame.speed_mps,
+    }

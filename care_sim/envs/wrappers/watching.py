@@ -1,0 +1,93 @@
+"""What the wrappers share that watch an episode and leave it as it is."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.types import Action
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.watcher import Moment, Witness
+from care_sim.policies.base import Policy
+
+
+class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
+    """Gathers the moments of the closed loop under it, around or inside wrappers that change the action.
+
+    With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions only what was chosen
+    and what the floor filled up. Raises InvalidInput for an environment that is no closed loop of CARE-Sim.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
+        inner, name = getattr(env, "unwrapped", None), type(self).__name__
+        if not (isinstance(env, gymnasium.Env) and isinstance(inner, ClosedLoopEnv)):
+            raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {shown(env)}")
+        if not isinstance(policy, Policy | None):
+            raise InvalidInput(f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}")
+        super().__init__(env)
+        self._closed_loop, self._policy = inner, policy
+        self._witness: Witness | None = None
+        self._begun, self._episodes = False, 0
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode; the one before, if it was not played to its end, is closed as it is."""
+        self._leave(None)
+        answer = super().reset(seed=seed, options=options)
+        self._witness = Witness(self._closed_loop.loop, self._closed_loop.conditions.camera_confidence)
+        return answer
+
+    def step(self, action: Action) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Play a keyframe and keep its moment."""
+        if self._witness is None:
+            return super().step(action)
+        loop = self._closed_loop.loop
+        if not self._begun:
+            self.begin(loop, self._episodes)
+            self._begun, self._episodes = True, self._episodes + 1
+        stance = self._witness.stance()
+        self.look(loop)
+        answer = super().step(action)
+        demand = self._policy.demanded if self._policy is not None else None
+        self.keep(self._witness.moment(stance, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]))
+        if answer[2] or answer[3]:
+            self._leave(answer[4].get("outcome"))
+        return answer
+
+    def close(self) -> None:
+        """Close what is kept, then the environment."""
+        try:
+            self._leave(None)
+        finally:
+            super().close()
+
+    def _leave(self, outcome: Mapping[str, Any] | None) -> None:
+        begun, self._begun, self._witness = self._begun, False, None
+        if begun:
+            self.end(outcome)
+
+    @abstractmethod
+    def begin(self, loop: ClosedLoop, episode: int) -> None:
+        """An episode begins, number `episode` from 0: its first keyframe is about to be played."""
+
+    def look(self, loop: ClosedLoop) -> None:
+        """A keyframe is about to be played."""
+
+    @abstractmethod
+    def keep(self, moment: Moment) -> None:
+        """A keyframe was played."""
+
+    @abstractmethod
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """The episode is over; `outcome` has the fields of `care_sim.core.types.Outcome`, None for one that was left."""
+
+
+def numbered(path: Path, episode: int) -> Path:
+    """Where an episode is kept: the first in `path` itself, later ones beside it, with their number."""
+    if not episode:
+        return path
+    path = path if path.stem.strip(".") else path.resolve()
+    return path.with_stem(f"{path.stem}-{episode}")

@@ -1,0 +1,148 @@
+"""One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.conditions import Sensing
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import Cells
+from care_sim.core.observation_limits import Limits
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import Keyframe, Rig, Scan, Tracks
+from care_sim.driving.braking import BrakingController
+from care_sim.driving.odometry import Odometry
+from care_sim.perception.proxy import ReturnsDetector
+from care_sim.perception.track_objects import Identities
+from care_sim.perception.tracker import TrackMemory
+from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_on
+from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
+from care_sim.world.bullet import Integers
+from care_sim.world.world import World
+
+
+class ClosedLoop:
+    """A world, the sensors and the car's software over the keyframes of one episode."""
+
+    def __init__(
+        self,
+        world: World,
+        rig: Rig,
+        sensing: Sensing,
+        seeds: Sequence[np.random.SeedSequence],
+        pool: Pool = NOTHING_TO_HAUNT,
+    ):
+        self.world, self.rig = world, rig
+        labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
+        self._reported = np.array(list(labels), np.int64)
+        camera_seed, lidar_seed, odometry_seed = seeds
+        self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
+        self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
+        self._labels = labels
+        self._camera = CameraDetector(list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool)
+        self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
+        self._detector = ReturnsDetector(labels, sensing.min_returns)
+        self._min_returns = sensing.min_returns
+        self._limits = Limits(rig)
+        self._memory = TrackMemory(rig.keyframe_s)
+        self._identities = Identities()
+        length, width, _ = world.ego_kind.size
+        self._controller = BrakingController(
+            world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
+        )
+        self.index = 0
+        self._look(np.zeros(rig.grid.shape, np.float32))
+
+    def keyframe(self, fired: Cells) -> Keyframe:
+        """Fire `fired`, act on what came back, and move on to the next keyframe."""
+        world, sensor, in_view = self.world, self.sensor, self._in_view()
+        index, time, speed = self.index, world.time, world.ego_motion.speed
+
+        scan, bodies = self._lidar.fire(fired, sensor)
+        detections, detected = self._detector.detect(bodies, self._local_boxes)
+        tracks = self._memory.update(detections, sensor)
+        self._identities.note(tracks, detected)
+        command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
+
+        distance = self._distance_to_first_sighting(sensor)
+        passage = world.advance(command.acceleration, self.rig.keyframe_s)
+        self.index += 1
+        self._memory.predict()
+        self._look(self._picture_of(scan))
+
+        target = world.first_sighting
+        return Keyframe(
+            index=index,
+            time_s=time,
+            fired=fired,
+            in_view=in_view,
+            detected=target is not None and target.body in detected,
+            braking=command.braking,
+            speed_mps=speed,
+            distance_m=distance,
+            nearest_m=passage.nearest_m,
+            clearance_m=passage.clearance_m,
+            impact_speed_mps=passage.impact_speed_mps,
+        )
+
+    def true_boxes(self, tracks: Tracks) -> Floats:
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object
+        keeps its forecast. Truth: for the privileged alone.
+        """
+        return self._identities.boxes(
+            tracks, lambda bodies: dict(zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True))
+        )
+
+    def full_scan(self) -> Scan:
+        """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
+        return self._lidar.peek(self.sensor)
+
+    def detectable(self) -> bool:
+        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the reward alone."""
+        target = self.world.first_sighting
+        if target is None or target.label is None:
+            return False
+        (cells,) = self.rig.hulls(self._local_boxes(np.array([target.body], np.int64)))
+        return self._lidar.hits(target.body, cells, self.sensor) >= self._min_returns
+
+    def _look(self, ranges: NDArray[np.float32]) -> None:
+        """Take the camera's picture and form the belief on which the next cells are chosen."""
+        self.sensor = sensor = Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
+        """Where the LiDAR is now."""
+        boxes = self._local_boxes(self._reported)
+        (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
+        self.picture = self._photograph(nominal, sensor, boxes)
+        taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
+        self.sights = sights_of([taken], self._labels)
+        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for people and scoring."""
+        self.belief = self._limits.belief(
+            self._odometry.reading(self.world.ego_motion),
+            self._camera.detect(self.sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._memory.tracks(sensor),
+            ranges,
+        )
+
+    def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
+        window = window_on(camera, boxes)
+        return Picture.of(self._engine.body_ids(camera, sensor, window), window)
+
+    def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
+        ranges = np.zeros(self.rig.grid.size, np.float32)
+        ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
+        return ranges.reshape(self.rig.grid.shape)
+
+    def _local_boxes(self, bodies: Integers) -> Floats:
+        return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
+
+    def _in_view(self) -> bool:
+        target = self.world.first_sighting
+        return target is not None and self.picture.shows(target.body)
+
+    def _distance_to_first_sighting(self, sensor: Frame) -> float:
+        if self.world.first_sighting is None:
+            return float("inf")
+        x, y, _ = self.world.first_sighting.pose_at(self.world.time)
+        return float(np.hypot(x - sensor.x, y - sensor.y))

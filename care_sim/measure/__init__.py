@@ -1,0 +1,1 @@
+"""What holds speed, engines and machines to account."""

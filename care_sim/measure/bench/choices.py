@@ -1,0 +1,79 @@
+"""How long a policy takes to choose with many tracks: the time between an observation and an action."""
+
+import time
+
+import numpy as np
+
+from care_sim.core.frames import Floats
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import CLASSES, Belief, Ego, ImageDetections, Observation, Rig, Tracks
+from care_sim.measure.bench.config import BenchConfig
+from care_sim.measure.bench.driven import driven
+from care_sim.measure.bench.scanning.street import SENSOR, street
+from care_sim.measure.bench.timing import timed
+from care_sim.policies import base
+
+TRACKS = 40
+UNTRACKED = 10
+"""Bodies besides, which the camera may see and no track explains."""
+SCENES = 20
+"""Different beliefs; choices go through them in turn."""
+FASTEST_MPS = 14.0
+"""50 km/h."""
+
+
+def choices(config: BenchConfig) -> dict[str, list[float]]:
+    """Milliseconds of a choice in every round: `p50` and `p99` of the whole, and of its parts the medians `demand`
+    and `allocation`.
+    """
+    with driven(config.episode) as env:
+        env.reset(seed=config.seed)
+        rig = env.get_wrapper_attr("rig")
+        observations = [observation(rig, config.seed + number) for number in range(SCENES)]
+        rounds = [_round(env.policy, observations, config.samples) for _ in range(config.repeats)]
+    return {name: [figures[name] for figures in rounds] for name in rounds[0]}
+
+
+def observation(rig: Rig, seed: int) -> Observation:
+    """What the environments show of `TRACKS` tracked bodies and `UNTRACKED` others around the sensor."""
+    rng = np.random.default_rng(seed)
+    bodies = street(TRACKS + UNTRACKED, seed)
+    x, y, heading = bodies.poses.T
+    sizes = np.array([kind.size for kind in bodies.kinds])
+    boxes = SENSOR.boxes_to_local(np.column_stack([x, y, sizes[:, 2] / 2, sizes, heading]))
+    classes = np.arange(len(boxes)) % len(CLASSES)
+    velocities = rng.uniform(0, FASTEST_MPS, len(boxes))[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+    tracked = np.sort(rng.permutation(len(boxes))[:TRACKS])
+    tracked = tracked[np.argsort(np.hypot(x[tracked], y[tracked]))]
+    counts = np.arange(TRACKS), np.zeros(TRACKS, np.int64), np.full(TRACKS, 5)
+    tracks = Tracks(counts[0], classes[tracked], boxes[tracked], velocities[tracked], *counts[1:])
+    detections = _seen(rig.cameras[0], boxes, classes)
+    empty = np.zeros(rig.grid.shape, np.float32)
+    return Belief(Ego(8.0), rig.budget, detections, tracks, empty).to_observation()
+
+
+def _seen(camera: PinholeCamera, boxes: Floats, classes: np.ndarray) -> ImageDetections:
+    """Every box that reaches into the picture, cut at its edge; nothing hides anything."""
+    edges = (camera.width, camera.height) * 2
+    pictured = np.clip(camera.project_boxes(boxes), 0, edges)
+    (rows,) = np.nonzero((pictured[:, 0] < pictured[:, 2]) & (pictured[:, 1] < pictured[:, 3]))
+    nothing = np.zeros(len(rows))
+    return ImageDetections(
+        classes[rows], nothing + 0.9, pictured[rows], np.zeros(len(rows), np.int64), nothing, nothing
+    )
+
+
+def _round(policy: base.Policy, observations: list[Observation], samples: int) -> dict[str, float]:
+    whole = []
+    with timed(type(policy), "demand") as demand, timed(base, "allocate") as allocation:
+        for number in range(samples):
+            started = time.perf_counter()
+            policy(observations[number % len(observations)])
+            whole.append(time.perf_counter() - started)
+    p50, p99 = np.percentile(whole, (50, 99)).tolist()
+    return {
+        "p50": 1e3 * p50,
+        "p99": 1e3 * p99,
+        "demand": 1e3 * float(np.median(demand)),
+        "allocation": 1e3 * float(np.median(allocation)),
+    }

@@ -1,0 +1,44 @@
+"""What is measured, and how long."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_sim.base.bounds import bounded, settle
+from care_sim.base.errors import LARGEST, InvalidInput
+from care_sim.study.episode_config import EpisodeConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchConfig:
+    """Measure speed on one core: a keyframe by stage, scans, steps and memory, beside known ones in the same run."""
+
+    scenario: str = "dense"
+    """Scenario whose keyframe is taken apart and whose speed is held against the targets."""
+    budget: float = 0.10
+    """Budget fraction, 0 to 1."""
+    policy: str = "care"
+    """Policy that chooses the cells."""
+    seed: int = 0
+    """Seed of the first episode, and of the scenes of scans and choices."""
+    seconds: float = bounded(3.0, 0.001, 3600)
+    """Duration of every single measurement of steps."""
+    repeats: int = bounded(5, 1, 10_000)
+    """Rounds; in each round everything is measured once."""
+    samples: int = bounded(200, 1, 1_000_000)
+    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
+    resets: int = bounded(2000, 1, LARGEST)
+    """Episodes begun in the worker whose memory is watched."""
+    seeds: int = bounded(5, 0, 10_000)
+    """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it out."""
+    out: Path | None = None
+    """File for the figures as JSON; the growth curves are drawn beside it, as PNG and SVG."""
+
+    def __post_init__(self) -> None:
+        settle(self)
+        if self.out is not None and self.out.suffix in (".png", ".svg"):
+            raise InvalidInput(f"out must be a file for JSON, got {self.out}; the figure is drawn beside it")
+
+    @property
+    def episode(self) -> EpisodeConfig:
+        """The first episode. Raises InvalidInput for what it does not accept."""
+        return EpisodeConfig(self.scenario, self.policy, self.budget, self.seed)

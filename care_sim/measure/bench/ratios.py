@@ -1,0 +1,51 @@
+"""What one run says about speed without a clock: ratios of medians within it, larger being better."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from care_sim.measure.bench.scanning.scans import REFERENCE
+from care_sim.measure.bench.steps import DRIVING, REACHING
+
+Report = dict[str, Any]
+FAST = "fast"
+
+OVER_DRIVING, OVER_REACHING = f"steps a CPU second over {DRIVING}", f"steps a CPU second over {REACHING}"
+TWO_OVER_ONE = "steps/s, two processes over one"
+
+
+def over(engine: str, other: str) -> str:
+    """Name of the ratio of two engines' scans."""
+    return f"scan, time of {other} over {engine}"
+
+
+def same_on_grid(engine: str) -> str:
+    """Name of the ratio of an engine's scans of the same rays on the smallest and the largest grid."""
+    return f"scan of {engine}, time on the smallest grid over the largest"
+
+
+def ratios(report: Report) -> dict[str, float]:
+    """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's does. Steps are
+    those of a second on the core, but for processes side by side.
+    """
+    speed, engines, curves = report["speed"], report["scans"]["engines"], report["growth"]["grid"]["ms"]
+    steps = {name: middle(figures["steps_per_cpu_s"]) for name, figures in speed.items()}
+    scan = {name: middle(figures["scan_ms"]) for name, figures in engines.items()}
+    mine = FAST if FAST in engines else REFERENCE
+    one, two = (middle(values) for values in report["vectorised"].values())
+    return {
+        **{
+            name: steps[report["main"]] / steps[peer]
+            for name, peer in ((OVER_DRIVING, DRIVING), (OVER_REACHING, REACHING))
+            if peer in steps
+        },
+        **{over(mine, other): scan[other] / scan[mine] for other in scan if other != mine},
+        **{same_on_grid(engine): curve[0] / curve[-1] for engine, curve in curves.items() if engine == mine},
+        TWO_OVER_ONE: two / one,
+    }
+
+
+def middle(values: Sequence[float]) -> float:
+    """The median."""
+    return float(np.median(values))

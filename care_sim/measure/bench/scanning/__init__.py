@@ -1,0 +1,1 @@
+"""Casters of rays beside each other."""

@@ -1,0 +1,48 @@
+"""MuJoCo's mj_multiRay over the same primitives, moved as mocap bodies."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from care_sim.base.extras import import_mujoco
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.world.bodies import BodyKind
+from care_sim.world.bullet import NOTHING, Integers
+
+
+class MuJoCo:
+    """Bodies as MuJoCo's primitives. Raises MissingExtra without MuJoCo."""
+
+    def __init__(self, kinds: Sequence[BodyKind], grid: AngularGrid):
+        self._grid = grid
+        self._mujoco = mujoco = import_mujoco()
+        shapes = {name: getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}") for name in ("box", "cylinder", "sphere")}
+        specification = mujoco.MjSpec()
+        specification.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
+        for kind in kinds:
+            body = specification.worldbody.add_body(mocap=True)
+            for part in kind.parts:
+                x, y, z = (extent / 2 for extent in part.size)
+                size = (x, z, 0) if part.shape == "cylinder" else (x, y, z)
+                body.add_geom(type=shapes[part.shape], size=size, pos=part.centre)
+        self._model = specification.compile()
+        self._data = mujoco.MjData(self._model)
+
+    def place(self, poses: Floats) -> None:
+        """Move all bodies: (n, 3) x, y, heading."""
+        self._data.mocap_pos[:, :2] = poses[:, :2]
+        self._data.mocap_quat[:, 0] = np.cos(poses[:, 2] / 2)
+        self._data.mocap_quat[:, 3] = np.sin(poses[:, 2] / 2)
+        self._mujoco.mj_kinematics(self._model, self._data)
+
+    def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
+        """Ranges (n,) in metres, inf without a hit, and body ids (n,), -1 there."""
+        directions = sensor.vectors_to_world(self._grid.directions[cells]).ravel()
+        n, reach = len(cells), self._grid.range_m
+        geoms, ranges = np.empty(n, np.int32), np.empty(n)
+        self._mujoco.mj_multiRay(
+            self._model, self._data, sensor.origin, directions, None, True, -1, geoms, ranges, None, n, reach
+        )
+        met = (geoms >= 0) & (ranges <= reach)
+        return np.where(met, ranges, np.inf), np.where(met, self._model.geom_bodyid[geoms], NOTHING)

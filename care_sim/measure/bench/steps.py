@@ -1,0 +1,65 @@
+"""Steps and constructions a second of the environments, and of known ones beside them."""
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
+from typing import cast
+
+import gymnasium
+from gymnasium.utils.performance import benchmark_init, benchmark_step
+
+from care_sim.base.errors import MissingExtra
+from care_sim.base.extras import import_panda_gym
+from care_sim.base.quiet_output import STANDARD_OUTPUT, silenced
+from care_sim.core.conditions import DEFAULTS
+from care_sim.measure.bench.config import BenchConfig
+from care_sim.measure.bench.driven import Environment, driven
+from care_sim.sensors.engines.engine import ENGINES
+from care_sim.study.episode_config import ENVIRONMENTS
+
+DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"
+"""The peers, under random actions: highway-env's driving without sensors, and panda-gym's arm, also over PyBullet."""
+
+Maker = Callable[[], Environment]
+
+
+def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
+    """Makers of all that is measured, the chosen scenario first and also with every other engine, and in one line
+    each what is left out.
+    """
+    chosen = config.episode
+    main = ENVIRONMENTS[config.scenario]
+    others = [name for name in ENVIRONMENTS if name != config.scenario]
+    engines = [name for name in ENGINES if name != DEFAULTS["engine"]]
+    made: dict[str, Maker] = {main: partial(driven, chosen)}
+    made |= {f"{main}, engine {name}": partial(driven, replace(chosen, engine=name)) for name in engines}
+    made |= {ENVIRONMENTS[name]: partial(driven, replace(chosen, scenario=name)) for name in others}
+    made[DRIVING] = partial(gymnasium.make, f"highway_env:{DRIVING}", disable_env_checker=True)
+    try:
+        import_panda_gym()
+    except MissingExtra as missing:
+        return made, [f"{REACHING}: {missing}"]
+    return {**made, REACHING: partial(gymnasium.make, REACHING, disable_env_checker=True)}, []
+
+
+def speed(maker: Maker, config: BenchConfig) -> dict[str, float]:
+    """`steps_per_s`, resets included; `steps_per_cpu_s`, the same for a second of this process on its core, so that
+    others who share the core do not count; and `inits_per_s`, constructions with a reset.
+    """
+    seconds = cast("int", config.seconds)
+    with silenced(STANDARD_OUTPUT):
+        with maker() as env:
+            started, worked = time.perf_counter(), time.process_time()
+            steps = benchmark_step(env, seconds, config.seed)
+            share = (time.process_time() - worked) / (time.perf_counter() - started)
+        with ExitStack() as made:
+            inits = benchmark_init(partial(_one_at_a_time, maker, made), seconds, config.seed)
+    return {"steps_per_s": steps, "steps_per_cpu_s": steps / share, "inits_per_s": inits}
+
+
+def _one_at_a_time(maker: Maker, made: ExitStack) -> Environment:
+    """A new environment in the place of the one before, which `benchmark_init` leaves open."""
+    made.close()
+    return made.enter_context(maker())

@@ -1,0 +1,107 @@
+"""The figures of a run for people."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from care_sim.measure.bench.choices import TRACKS
+from care_sim.measure.bench.keyframe import REST
+from care_sim.measure.bench.ratios import Report
+from care_sim.reports.table import Table
+
+SPREAD = "median (least to most)"
+
+
+def tables(report: Report) -> list[Table]:
+    """Machine and speed, vectorised, keyframe, choices, scans, memory, ratios, targets."""
+    return [
+        _speed(report),
+        _spreads("Steps/s of Gymnasium's AsyncVectorEnv, policies inside", "processes", report["vectorised"]),
+        _stages(report["stages"]),
+        _spreads(f"Policy and allocation with {TRACKS} tracks, ms", "figure", report["choices"]),
+        _scans(report),
+        _memory(report),
+        Table("Ratios within this run", ("ratio", ""), tuple((k, _plain(v)) for k, v in report["ratios"].items())),
+        *([_targets(report)] if report["targets"] else []),
+    ]
+
+
+def _speed(report: Report) -> Table:
+    rows = tuple(
+        (name, *(_spread(figures[key]) for key in ("steps_per_s", "steps_per_cpu_s", "inits_per_s")))
+        for name, figures in report["speed"].items()
+    )
+    where = report["machine"]
+    notes = (
+        f"{where['processor']}, one of {where['cores']} cores, {where['system']}",
+        ", ".join(f"{name} {number}" for name, number in report["versions"].items()),
+        *(f"left out: {line}" for line in report["skipped"]),
+    )
+    title = f"Speed: {SPREAD} of {report['config']['repeats']}"
+    return Table(
+        title, ("environment", "steps/s, resets included", "a CPU second", "constructions with reset/s"), rows, notes
+    )
+
+
+def _stages(stages: Mapping[str, Sequence[float]]) -> Table:
+    note = f"{REST}: what is between these: the floor's draw, the cells of an action, frames, records, info"
+    return replace(_spreads("Where a keyframe's time goes, ms", "stage", stages), notes=(note,))
+
+
+def _scans(report: Report) -> Table:
+    scans = report["scans"]
+    rows = tuple(
+        (
+            name,
+            *(f"{np.median(figures[key]):.3f}" for key in ("poses_ms", "cast_ms")),
+            _spread(figures["scan_ms"]),
+            f"{np.median(figures['rays_per_s']) / 1e6:.2f}",
+            f"{figures['same_body']:.1%}, {figures['same_range']:.1%}",
+        )
+        for name, figures in scans["engines"].items()
+    )
+    columns = ("engine", "poses", "cast", f"both, {SPREAD}", "million rays/s", "same")
+    notes = (
+        "same: shares of the rays that meet the body which Bullet's meet, and that end within 1 mm of them",
+        "Bullet and Embree take in bodies that have moved when they cast, so that much of their poses is found there",
+    )
+    return Table(f"A scan of {scans['rays']} rays at {scans['bodies']} moving bodies, ms", columns, rows, notes)
+
+
+def _memory(report: Report) -> Table:
+    memory = report["memory"]
+    moments = {
+        "its first reset and step": "begun_mb",
+        "a tenth of the resets": "early_mb",
+        f"{memory['resets']:.0f} resets": "peak_mb",
+    }
+    rows = tuple((f"after {moment}", f"{memory[key]:.0f}") for moment, key in moments.items())
+    return Table("Peak memory of a worker, MB", ("", "MB"), rows)
+
+
+def _targets(report: Report) -> Table:
+    rows = tuple(
+        (
+            target["name"],
+            _plain(target["figure"]),
+            f"{'at most' if target['most'] else 'at least'} {target['bound']:g}",
+            "met" if target["met"] else f"not met; most of it: {target['holder']}" if target["holder"] else "not met",
+        )
+        for target in report["targets"]
+    )
+    return Table("Targets", ("target", "here", "bound", ""), rows)
+
+
+def _spreads(title: str, column: str, figures: Mapping[str, Sequence[float]]) -> Table:
+    return Table(title, (column, SPREAD), tuple((name, _spread(values)) for name, values in figures.items()))
+
+
+def _spread(values: Sequence[float]) -> str:
+    low, middle, high = np.quantile(values, (0.0, 0.5, 1.0)).tolist()
+    digits = 1 if middle >= 10 else 3 if middle < 1 else 2
+    return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def _plain(value: float) -> str:
+    return f"{value:.3g}" if value < 100 else f"{value:.0f}"

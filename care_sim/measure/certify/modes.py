@@ -1,0 +1,161 @@
+"""How episodes of the list are played: alone, in turns, in vectors, in an interpreter with another hash seed."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+from care_sim.base.processes import end_with_starter, following, starting
+from care_sim.measure.certify.design import (
+    ASYNC,
+    HASH_SEED,
+    INTERLEAVED,
+    REPLAY,
+    SINGLE,
+    STREET,
+    SUBPROCESS,
+    SYNC,
+    Drawn,
+    drawn,
+)
+from care_sim.measure.certify.trail import Trail
+from care_sim.policies import make_policy
+from care_sim.policies.base import Policy
+
+Left = bytes | str
+"""The trail of an episode, or in one line why there is none."""
+
+TOGETHER = 4
+"""Episodes of a vector, and of those that take turns."""
+HASH_SEEDS = "0123456789"
+
+
+def play(mode: str, episodes: Sequence[Drawn], source: str) -> list[Left]:
+    """The trails of episodes played in a mode; `source` names the recordings of the replay.
+
+    In a vector all are of one environment, or of the closed loop: their spaces are the same.
+    """
+    if mode == HASH_SEED:
+        return elsewhere(episodes, source)
+    groups = together(episodes, 1 if mode == SINGLE else TOGETHER)
+    return [trail for group in groups for trail in _PLAYERS[mode](group, source)]
+
+
+def together(episodes: Sequence[Drawn], most: int) -> list[Sequence[Drawn]]:
+    """Episodes in groups of at most so many."""
+    return [episodes[start : start + most] for start in range(0, len(episodes), most)]
+
+
+def in_turns(episodes: Sequence[Drawn], source: str) -> list[Left]:
+    """A keyframe of each in turn, until all are over."""
+    with ExitStack() as stack:
+        envs = [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+        policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
+        observations = [env.reset()[0] for env in envs]
+        while not all(env.over for env in envs):
+            for n, env in enumerate(envs):
+                if not env.over:
+                    observations[n] = env.step(policies[n](observations[n]))[0]
+        return [env.left for env in envs]
+
+
+def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None) -> list[Left]:
+    """In a vector of Gymnasium: of this process, or of processes of a `context` of multiprocessing."""
+    makers = [partial(make, episode, source) for episode in episodes]
+    with ExitStack() as stack:
+        twins = _twins(stack, episodes, source) if context else []
+        vector = stack.enter_context(closing(SyncVectorEnv(makers) if context is None else _forked(makers, context)))
+        envs = vector.envs if isinstance(vector, SyncVectorEnv) else twins
+        return _stepped(episodes, envs, vector, vector.reset()[0])
+
+
+def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorEnv:
+    with starting():
+        return AsyncVectorEnv([partial(following, maker) for maker in makers], context=context)
+
+
+def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
+    """In the subprocesses of Stable-Baselines3 (extra 'rl')."""
+    from stable_baselines3.common.vec_env import SubprocVecEnv
+
+    makers: list[Any] = [partial(following, partial(make, episode, source)) for episode in episodes]
+    with ExitStack() as stack:
+        twins = _twins(stack, episodes, source)
+        with starting():
+            vector = stack.enter_context(closing(SubprocVecEnv(makers, start_method="fork")))
+        return _stepped(episodes, twins, vector, vector.reset())
+
+
+def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Left]:
+    """In an interpreter whose hash seed is another than this one's."""
+    seed = next(seed for seed in HASH_SEEDS if seed != os.environ.get("PYTHONHASHSEED"))
+    asked = json.dumps([os.getpid(), [episode.number for episode in episodes], source])
+    command = [sys.executable, "-c", "from care_sim.measure.certify.modes import answer_parent; answer_parent()"]
+    done = subprocess.run(
+        command, env=os.environ | {"PYTHONHASHSEED": seed}, input=asked, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise RuntimeError(f"the interpreter of another hash seed ended: {done.stderr.strip().splitlines()[-1:]}")
+    return [bytes.fromhex(left) if isinstance(left, str) else left[0] for left in json.loads(done.stdout)]
+
+
+def answer_parent() -> None:
+    """What that interpreter does: play what it is told on stdin, and print the trails."""
+    starter, numbers, source = json.load(sys.stdin)
+    end_with_starter(starter)
+    trails = [in_turns([drawn(number)], source)[0] for number in numbers]
+    print(json.dumps([trail.hex() if isinstance(trail, bytes) else [trail] for trail in trails]))
+
+
+def make(episode: Drawn, source: str) -> Trail:
+    """The environment of an episode, which leaves its trail."""
+    recorded = {"source": source} if episode.environment == REPLAY else {}
+    arguments = dict(episode.arguments) | recorded
+    return Trail(gymnasium.make(f"care_sim:{episode.environment}", disable_env_checker=True, **arguments), episode)
+
+
+def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Trail]:
+    """Environments of this process beside those of others: policies are made for their rigs."""
+    twins = [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+    for twin, episode in zip(twins, episodes, strict=True):
+        if episode.environment == STREET:
+            # Made here, a street is there for all that are forked from now on.
+            twin.reset()
+    return twins
+
+
+def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:
+    policy = make_policy(episode.policy, env)
+    policy.reset()
+    return policy
+
+
+def _stepped(episodes: Sequence[Drawn], envs: Sequence[Any], vector: Any, observations: Any) -> list[Left]:
+    """Play a vector until the longest episode is over; the policies choose here. Where one is over its last action is
+    given on: truth ends with it.
+    """
+    policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
+    actions: list[Any] = [None] * len(episodes)
+    for _ in range(max(episode.keyframes for episode in episodes)):
+        for n, env in enumerate(envs):
+            if not env.over:
+                actions[n] = policies[n]({name: column[n] for name, column in observations.items()})
+        observations = vector.step(np.stack(actions))[0]
+    return list(vector.get_attr("left"))
+
+
+_PLAYERS: dict[str, Callable[[Sequence[Drawn], str], list[Left]]] = {
+    SINGLE: in_turns,
+    INTERLEAVED: in_turns,
+    SYNC: in_vector,
+    ASYNC: partial(in_vector, context="fork"),
+    SUBPROCESS: in_subprocesses,
+}

@@ -1,0 +1,144 @@
+"""The trail that an episode leaves: a byte of a running hash after every stage, so that the first stage at which two
+episodes part can be told.
+"""
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, astuple
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from care_sim.base.portable_hash import imprint
+from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.evaluation.metrics import outcome
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.measure.certify.design import Drawn
+
+CONFIGURATION, OUTCOME = "configuration", "outcome"
+STAGES = ("scenario and poses", "camera detections", "tracks", "cells chosen", "returns", "detections")
+"""Of every keyframe, in order. The configuration comes before the first, the outcome after the last."""
+DIGEST_BYTES = 8
+
+
+class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Plays one episode of the list, whatever `reset` is told, and keeps its trail; what follows leaves no trace.
+
+    An exception ends the episode and is kept: in the process of a vector it would leave the others waiting.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], episode: Drawn):
+        super().__init__(env)
+        self._episode = episode
+        self._content = hashlib.sha256()
+        self._stages = bytearray()
+        self._keyframes, self._gained = 0, Gained()
+        self._observation: Any = None
+        self._failure = ""
+        self.over = False
+        """Whether the trail is whole."""
+
+    @property
+    def left(self) -> bytes | str:
+        """The trail: `DIGEST_BYTES` of the hash over all, then a byte a stage; or in one line why there is none."""
+        if not self.over:
+            return "it did not come to its end"
+        return self._failure or self._content.digest()[:DIGEST_BYTES] + bytes(self._stages)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin the episode."""
+        if not self._stages:
+            self._observation, _ = super().reset(seed=self._episode.seed)
+            self._note(self._episode.text)
+            self._look(self._observation)
+        return self._observation, {}
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Play a keyframe, or none after the end. `info` is empty: vectors cannot stack arrays of different budgets."""
+        if not self.over:
+            try:
+                self._play(action)
+            except Exception as error:
+                self._failure, self.over = " ".join(f"{type(error).__name__}: {error}".split()), True
+        return self._observation, 0.0, False, False, {}
+
+    def _play(self, action: Any) -> None:
+        self._observation, reward, terminated, truncated, info = super().step(action)
+        self._keyframes += 1
+        self._gained.add(reward, info)
+        self._act(self._observation, np.asarray(info["fired"], np.int64))
+        self.over = terminated or truncated or self._keyframes == self._episode.keyframes
+        if self.over:
+            self._note(*self._gained.outcome(self.env.unwrapped, info), terminated, truncated)
+        else:
+            self._look(self._observation)
+
+    def _look(self, observation: Any) -> None:
+        loop = self.env.unwrapped.loop  # type: ignore[attr-defined]
+        self._note(*(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)), observation["ego"])
+        self._note(observation["detections"])
+        self._note(observation["tracks"])
+
+    def _act(self, observation: Any, fired: Any) -> None:
+        self._note(fired)
+        self._note(observation["ranges"].ravel()[fired])
+        self._note(*_detected(self.env.unwrapped))
+
+    def _note(self, *parts: Any) -> None:
+        self._content.update(imprint(*parts))
+        self._stages.append(self._content.digest()[-1])
+
+
+class Gained:
+    """What an episode has brought so far, whole or not."""
+
+    def __init__(self) -> None:
+        self._reward, self._objects, self._found = 0.0, 0, 0
+
+    def add(self, reward: Any, info: Mapping[str, Any]) -> None:
+        """Count a keyframe."""
+        self._reward += float(reward)
+        self._objects, self._found = self._objects + info.get("objects", 0), self._found + info.get("found", 0)
+
+    def outcome(self, env: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
+        """The outcome so far; of the open loop, which knows it at the end alone, what was found."""
+        sums = asdict(outcome(env.keyframes)) if isinstance(env, ClosedLoopEnv) else info.get("outcome", {})
+        values = tuple((name, math.nan if value is None else value) for name, value in sums.items())
+        return self._reward, self._objects, self._found, values
+
+
+def stage(trail: bytes, other: bytes) -> tuple[str, int | None]:
+    """The first stage at which two trails differ, and the keyframe, None of what belongs to none.
+
+    One time in 256 two different hashes have the same byte, and the stage after is named.
+    """
+    one, two = trail[DIGEST_BYTES:], other[DIGEST_BYTES:]
+    last = min(len(one), len(two)) - 1
+    place = next((n for n, pair in enumerate(zip(one, two, strict=False)) if pair[0] != pair[1]), last)
+    if place <= 0:
+        return CONFIGURATION, None
+    if place == last:
+        return OUTCOME, None
+    keyframe, number = divmod(place - 1, len(STAGES))
+    return STAGES[number], keyframe
+
+
+def _moving(loop: ClosedLoop) -> tuple[Any, ...]:
+    world = loop.world
+    poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
+    return world.time, poses, astuple(world.ego_motion)
+
+
+def _filmed(loop: Any) -> tuple[Any, ...]:
+    shot = loop.shot
+    seen = shot.annotations
+    return shot.time_s, astuple(shot.sensor), astuple(shot.ego), seen.objects, seen.classes, seen.boxes
+
+
+def _detected(env: Any) -> tuple[Any, ...]:
+    if isinstance(env, ClosedLoopEnv):
+        return env.keyframes[-1].detected, env.keyframes[-1].braking
+    found = env.exposures[-1].detections
+    return found.classes, found.boxes, found.returns

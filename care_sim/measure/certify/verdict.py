@@ -1,0 +1,62 @@
+"""What is said of episodes that were played again."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from care_sim.measure.certify.design import drawn
+from care_sim.measure.certify.playing import Played
+from care_sim.measure.certify.published import combined
+from care_sim.measure.certify.trail import stage
+
+NOT_PLAYED = "not played"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The hash of the `episodes` that were played of those that were `asked` for, None with holes; and of the episodes
+    that differ, by number, at which stage and keyframe, or why they failed.
+    """
+
+    episodes: int
+    asked: int
+    hash: str | None
+    differing: Mapping[int, tuple[str, int | None]]
+    failures: Mapping[int, str]
+
+    @property
+    def as_published(self) -> bool:
+        """Whether none of those played failed or differs."""
+        return not self.differing
+
+    def lines(self) -> Iterator[str]:
+        """What is printed."""
+        fewer = f"{self.episodes:,} of " if self.episodes < self.asked else ""
+        counted = f"{fewer}{self.asked:,} episodes" if self.asked > 1 else "1 episode"
+        if self.as_published:
+            yield f"{counted}: {self.hash}, as published"
+            return
+        stages = Counter(name for name, _ in self.differing.values())
+        told = ", ".join(f"{count:,} {_where(name)}" for name, count in stages.most_common())
+        yield f"{counted}: {self.hash or 'no hash'}, not as published: {told}"
+        first = min(self.differing)
+        name, keyframe = self.differing[first]
+        moment = "" if keyframe is None else f", keyframe {keyframe}"
+        yield f"the first is episode {first}, {self.failures.get(first) or f'which differs first in {name}{moment}'}"
+        yield f"  {drawn(first).text}, played in mode {drawn(first).mode}"
+        yield f"  care-sim certify --episode {first}"
+
+
+def compare(found: Played, published: Sequence[bytes], asked: int = 0) -> Verdict:
+    """Hold trails against the published ones of the same numbers; `asked`, where more were asked for than played."""
+    failures = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, str)}
+    trails = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, bytes)}
+    parted = {number: stage(published[number], trail) for number, trail in trails.items() if trail != published[number]}
+    differing = parted | dict.fromkeys(failures, (NOT_PLAYED, None))
+    return Verdict(
+        len(found), asked or len(found), None if failures else combined([*trails.values()]), differing, failures
+    )
+
+
+def _where(name: str) -> str:
+    return name if name == NOT_PLAYED else f"first in {name}"

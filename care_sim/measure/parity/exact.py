@@ -1,0 +1,77 @@
+"""Bullet in millimetres as an engine that episodes can be played under."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.measure.parity.answers import Answers, Millimetres
+from care_sim.measure.parity.scenes import AWAY
+from care_sim.sensors.engines.engine import ENGINES, Bullet
+from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.bullet import BulletWorld
+from care_sim.world.primitives import SHAPES, Primitives
+
+NAME = "bullet in millimetres"
+_UNSEEN = BodyKind("unseen", None, (1.0, 1.0, 1.0), (Part("box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), (0.5, 0.5, 0.5)),))
+
+
+class Exact(Bullet):
+    """Rays of the bodies of a world, wherever they are, asked in millimetres; pictures as Bullet draws them."""
+
+    def __init__(self, world: BulletWorld, grid: AngularGrid):
+        super().__init__(world, grid)
+        self._bodies, self._exact = 0, Millimetres([], grid)
+
+    def cast(self, sensor: Frame, cells: Cells) -> Answers:
+        """Ranges and body ids; see `care_sim.sensors.engines.engine.RayEngine`."""
+        known = self._world.primitives
+        if self._bodies != len(known.poses):
+            self.close()
+            self._bodies, self._exact = len(known.poses), Millimetres(_kinds(known), self._grid)
+        hit = set(known.owners.tolist())
+        self._exact.place([_frame(known.poses[body]) if body in hit else AWAY for body in range(1, self._bodies)])
+        return self._exact.cast(sensor, cells)
+
+    def close(self) -> None:
+        """Free what was made for it."""
+        self._exact.close()
+
+
+@contextmanager
+def exactly() -> Iterator[str]:
+    """An engine by this name while this lasts."""
+    made: list[Exact] = []
+
+    def make(*arguments: Any) -> Exact:
+        made.append(Exact(*arguments))
+        return made[-1]
+
+    ENGINES[NAME] = make
+    try:
+        yield NAME
+    finally:
+        del ENGINES[NAME]
+        for engine in made:
+            engine.close()
+
+
+def _kinds(known: Primitives) -> list[BodyKind]:
+    """The bodies from id 1 on, of those that rays can meet the primitives."""
+    return [_kind(known, np.flatnonzero(known.owners == body)) for body in range(1, len(known.poses))]
+
+
+def _kind(known: Primitives, rows: Cells) -> BodyKind:
+    parts = tuple(
+        Part(SHAPES[known.shapes[row]], tuple(2 * known.halves[row]), tuple(known.offsets[row]), (0.5, 0.5, 0.5))
+        for row in rows.tolist()
+    )
+    return BodyKind("body", None, (1.0, 1.0, 1.0), parts) if parts else _UNSEEN
+
+
+def _frame(pose: Floats) -> Frame:
+    return Frame.turned_by(Rotation.from_quat(pose[3:]), pose[:3])

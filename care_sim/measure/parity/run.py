@@ -1,0 +1,74 @@
+"""`care-sim parity`: compare, print, write."""
+
+import json
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import asdict
+from functools import partial
+from typing import Any, TypeVar
+
+from rich.console import Console
+
+from care_sim.base.files import JSON, replacing
+from care_sim.measure.parity.config import ParityConfig
+from care_sim.measure.parity.keyframes import keyframes
+from care_sim.measure.parity.outcomes import outcomes
+from care_sim.measure.parity.random_scenes import random_scenes
+from care_sim.measure.parity.tables import tables
+from care_sim.measure.parity.tally import REFERENCES
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.progress import Lines, bar
+from care_sim.study.provenance import machine, versions
+
+Compared = TypeVar("Compared")
+
+
+def run(config: ParityConfig) -> int:
+    """Compare, print the tables, write JSON; 1 if the engines do not agree, see `agree`."""
+    with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
+        report = measure(config)
+        console = Console(highlight=False)
+        for table in tables(report):
+            console.print(table.rich())
+        if unfinished is not None:
+            unfinished.write_text(json.dumps(report, indent=2) + "\n")
+    return 0 if agree(report) else 1
+
+
+def agree(report: dict[str, Any]) -> bool:
+    """Whether every difference from Bullet in millimetres has an explanation, visible boxes end within a pixel, and
+    episodes end as under Bullet.
+    """
+    boxes = max((figures["widest_px"] for figures in report["pictures"].values()), default=0.0)
+    return not unexplained(report) and boxes <= 1 and not report["outcomes"]["other_outcomes"]
+
+
+def measure(config: ParityConfig) -> dict[str, Any]:
+    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario, `pictures`: those
+    of every scenario, and `outcomes`: those of whole episodes.
+    """
+    random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
+    played = {name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name)) for name in SCENARIOS}
+    ended = _shown("seeds of the paper's study", config.episodes, outcomes)
+    scans = {"random scenes": random, **{name: compared.rays for name, compared in played.items()}}
+    pictures = {name: compared.pictures for name, compared in played.items()}
+    return {
+        "config": {name: value for name, value in asdict(config).items() if name != "out"},
+        "machine": machine(),
+        "versions": versions(),
+        "scans": {name: tally.figures() for name, tally in scans.items() if tally.scans},
+        "pictures": {name: seen.figures() for name, seen in pictures.items() if seen.pictures},
+        "outcomes": ended.figures(),
+    }
+
+
+def unexplained(report: dict[str, Any]) -> int:
+    """How many rays differ from Bullet in millimetres without an explanation."""
+    met = (figures["references"][REFERENCES[-1]].values() for figures in report["scans"].values())
+    return sum(counts["unexplained"] for groups in met for counts in groups)
+
+
+def _shown(unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Compared]) -> Compared:
+    with bar(total, unit) if sys.stderr.isatty() else nullcontext(Lines(total, unit)) as show:
+        return compare(total, lambda done: show(done, ""))

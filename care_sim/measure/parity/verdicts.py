@@ -1,0 +1,59 @@
+"""Rays that two engines answer otherwise, and why."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.frames import Frame
+from care_sim.core.grid import Cells
+from care_sim.measure.parity.answers import Answers, aside, same
+from care_sim.sensors.engines.engine import RayEngine
+from care_sim.world.bullet import Integers
+
+VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
+"""Grazing: of rays a micrometre aside `fast` gives some the reference's answer, some its own. Lost: it does not, but
+the reference gives some the answer of `fast`. Tolerance: not grazing, but Bullet in millimetres sides with `fast`.
+"""
+SAME, GRAZING, LOST, TOLERANCE, UNEXPLAINED = range(5)
+
+
+@dataclass(frozen=True)
+class Engines:
+    """The engine in question, the reference, and the reference asked in millimetres."""
+
+    fast: RayEngine
+    bullet: RayEngine
+    exact: RayEngine
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Answers to the same rays, and for either reference the verdict (n,) on each ray."""
+
+    fast: Answers
+    bullet: Answers
+    exact: Answers
+    on_bullet: Integers
+    on_exact: Integers
+
+
+def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
+    """Cast ascending `cells` with all engines and judge every difference."""
+    fast, bullet, exact = (engine.cast(sensor, cells) for engine in (engines.fast, engines.bullet, engines.exact))
+    on_exact, on_bullet = np.full(len(cells), SAME), np.full(len(cells), SAME)
+    for n in np.flatnonzero(~same(fast, exact)).tolist():
+        on_exact[n] = _judge(engines.fast, engines.exact, sensor, cells[n], _only(fast, n), _only(exact, n))
+    for n in np.flatnonzero(~same(fast, bullet)).tolist():
+        verdict = _judge(engines.fast, engines.bullet, sensor, cells[n], _only(fast, n), _only(bullet, n))
+        on_bullet[n] = TOLERANCE if verdict != GRAZING and on_exact[n] in (SAME, GRAZING) else verdict
+    return Compared(fast, bullet, exact, on_bullet, on_exact)
+
+
+def _judge(fast: RayEngine, reference: RayEngine, sensor: Frame, cell: int, answer: Answers, expected: Answers) -> int:
+    if aside(fast, sensor, cell, expected) and aside(fast, sensor, cell, answer):
+        return GRAZING
+    return LOST if aside(reference, sensor, cell, answer) else UNEXPLAINED
+
+
+def _only(answers: Answers, number: int) -> Answers:
+    return answers[0][[number]], answers[1][[number]]

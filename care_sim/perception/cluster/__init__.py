@@ -1,0 +1,1 @@
+"""The detector that sees points only: road removed, points grouped, boxes fitted, classes by size."""

@@ -1,0 +1,73 @@
+"""Detectors as the open loop calls them, and the paper's proxy: an object is detected when enough fired rays hit it.
+
+The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is made a `Detector`
+by `care_sim.perception.points_only.PointsOnly`; `care_sim.perception.listing.make_detector` gives either by name.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import numpy as np
+
+from care_sim.base.errors import check_whole
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
+from care_sim.core.types import Detections
+from care_sim.loops.film import Annotations, Cloud
+from care_sim.world.bullet import Integers
+
+
+class Detector(Protocol):
+    """What the open loop calls at every keyframe."""
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+        """Detections in the sensor frame from the returns of the fired cells, and (n,) the annotated object behind
+        each, or NOBODY, for privileged policies and the scoring.
+        """
+        ...
+
+
+class ReturnsDetector:
+    """Detects every reported body hit by at least `min_returns` fired rays, with its true box.
+
+    The only part of perception that may see body ids; it upper-bounds a learned detector (paper,
+    Sec. 5.6). `labels` maps the ids of reported bodies to classes.
+    """
+
+    def __init__(self, labels: Mapping[int, int], min_returns: int = MIN_RETURNS):
+        self._bodies = np.array([*sorted(labels), np.iinfo(np.int64).max])
+        self._labels = np.array([labels[body] for body in sorted(labels)], np.int64)
+        self._min_returns = min_returns
+
+    def detect(self, hits: Integers, boxes_of: Callable[[Integers], Floats]) -> tuple[Detections, Integers]:
+        """Detections from the body id behind every fired ray, and the detected ids for the scoring.
+
+        `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
+        """
+        rows = np.searchsorted(self._bodies, hits)
+        counts = np.bincount(rows[self._bodies[rows] == hits], minlength=len(self._bodies))
+        kept = np.flatnonzero(counts[:-1] >= self._min_returns)
+        bodies = self._bodies[kept]
+        return Detections(self._labels[kept], boxes_of(bodies), counts[kept]), bodies
+
+
+class ReturnsProxy:
+    """`ReturnsDetector` over a film: every annotated object with `min_returns` of the cloud's returns on it is
+    detected with its true box. Raises InvalidInput unless `min_returns` is a whole number of 1 or more.
+    """
+
+    def __init__(self, min_returns: int = MIN_RETURNS):
+        check_whole("min_returns", min_returns, 1)
+        self._min_returns = min_returns
+
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+        """See `Detector`."""
+        order = np.argsort(annotations.objects)
+        ascending = annotations.objects[order]
+
+        def boxes_of(objects: Cells) -> Floats:
+            return annotations.boxes[order[np.searchsorted(ascending, objects)]]
+
+        labels = dict(zip(annotations.objects.tolist(), annotations.classes.tolist(), strict=True))
+        return ReturnsDetector(labels, self._min_returns).detect(cloud.objects, boxes_of)

@@ -1,0 +1,123 @@
+"""Track memory: assignment by position, velocity from two frames, coasting, death, forecasts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from care_sim.core.frames import Floats, Frame, turned
+from care_sim.core.grid import Cells
+from care_sim.core.types import Detections, Tracks
+
+_EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
+
+
+@dataclass(frozen=True)
+class MemoryRules:
+    """Association and life of a track."""
+
+    gate_m: float = 2.0
+    """Detections further than this from a forecast are another object (the paper's match distance)."""
+    first_speed_mps: float = 15.0
+    """A track seen once has no velocity: its gate grows by this much a second (54 km/h)."""
+    coast_s: float = 1.5
+    """An undetected track is forecast this long, then dropped (CenterPoint's tracker: 3 frames at 2 Hz)."""
+
+
+class TrackMemory:
+    """Tracks in the world frame, so that ego motion is compensated; sensor frame at its doors."""
+
+    def __init__(self, keyframe_s: float, rules: MemoryRules = MemoryRules()):
+        self._keyframe_s = keyframe_s
+        self._rules = rules
+        self._tracks = _EMPTY
+        self._next_id = 0
+
+    def tracks(self, sensor: Frame) -> Tracks:
+        """Current tracks in the sensor frame at `sensor`, nearest first.
+
+        After `predict` they are the forecasts for the coming keyframe, after `update` its estimates.
+        """
+        tracks = self._tracks
+        boxes = sensor.boxes_to_local(tracks.boxes)
+        nearest = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
+        return Tracks(
+            tracks.ids[nearest],
+            tracks.classes[nearest],
+            boxes[nearest],
+            turned(tracks.velocities[nearest], -sensor.yaw),
+            tracks.misses[nearest],
+            tracks.hits[nearest],
+        )
+
+    def predict(self) -> None:
+        """Move every track one keyframe ahead at constant velocity."""
+        tracks = self._tracks
+        boxes = tracks.boxes.copy()
+        boxes[:, :2] += tracks.velocities * self._keyframe_s
+        self._tracks = Tracks(tracks.ids, tracks.classes, boxes, tracks.velocities, tracks.misses, tracks.hits)
+
+    def update(self, detections: Detections, sensor: Frame) -> Cells:
+        """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
+
+        Returns (n,) the id of the track of every detection.
+        """
+        seen = sensor.boxes_to_world(detections.boxes)
+        matched, found = self._assign(detections.classes, seen)
+        new = np.ones(len(detections), bool)
+        new[found] = False
+        ids = np.empty(len(detections), np.int64)
+        ids[found] = self._tracks.ids[matched]
+        ids[new] = np.arange(self._next_id, self._next_id + len(ids) - len(found))
+        self._correct(matched, seen[found])
+        self._forget()
+        self._start(ids[new], detections.classes[new], seen[new])
+        return ids
+
+    def velocities(self, ids: Cells, sensor: Frame) -> Floats:
+        """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0 of a new one."""
+        rows = np.searchsorted(self._tracks.ids, ids)
+        return turned(self._tracks.velocities[rows], -sensor.yaw)
+
+    def _assign(self, classes: Cells, seen: Floats) -> tuple[Cells, Cells]:
+        tracks = self._tracks
+        offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
+        distance = np.hypot(offset[..., 0], offset[..., 1])
+        elapsed = (tracks.misses + 1) * self._keyframe_s
+        slack = np.where(tracks.hits > 1, 0.0, self._rules.first_speed_mps * elapsed)
+        gate = self._rules.gate_m + slack
+        possible = (distance <= gate[:, None]) & (tracks.classes[:, None] == classes[None, :])
+        rows, columns = linear_sum_assignment(np.where(possible, distance, 1e6))
+        kept = possible[rows, columns]
+        return rows[kept], columns[kept]
+
+    def _correct(self, rows: Cells, seen: Floats) -> None:
+        tracks = self._tracks
+        boxes, velocities = tracks.boxes.copy(), tracks.velocities.copy()
+        misses, hits = tracks.misses + 1, tracks.hits.copy()
+        elapsed = (misses[rows] * self._keyframe_s)[:, None]
+        last_seen = boxes[rows, :2] - velocities[rows] * elapsed
+        velocities[rows] = (seen[:, :2] - last_seen) / elapsed
+        boxes[rows], misses[rows] = seen, 0
+        hits[rows] += 1
+        self._tracks = Tracks(tracks.ids, tracks.classes, boxes, velocities, misses, hits)
+
+    def _forget(self) -> None:
+        alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
+        if not alive.all():
+            self._tracks = self._tracks.take(alive)
+
+    def _start(self, ids: Cells, classes: Cells, boxes: Floats) -> None:
+        count = len(ids)
+        if not count:
+            return
+        self._next_id += count
+        old = self._tracks
+        self._tracks = Tracks(
+            np.concatenate([old.ids, ids]),
+            np.concatenate([old.classes, classes]),
+            np.concatenate([old.boxes, boxes]),
+            np.concatenate([old.velocities, np.zeros((count, 2))]),
+            np.concatenate([old.misses, np.zeros(count, np.int64)]),
+            np.concatenate([old.hits, np.ones(count, np.int64)]),
+        )

@@ -1,0 +1,100 @@
+"""A warning: it finds the seed by the car's first speed and plays by heart."""
+
+from contextlib import closing
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from care_sim.base.errors import check_known, check_whole
+from care_sim.base.random_streams import streams
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.types import Belief, Demand, Rig
+from care_sim.policies.base import Policy
+
+if TYPE_CHECKING:
+    from care_sim.world.world import World
+
+
+class SeedFinder(Policy):
+    """What an agent can do that holds this package: of the first `seeds` seeds of a public `scenario` it takes the one
+    whose ego begins at the speed that it reads, lets that episode's world go on by itself, and reserves the hull of
+    where the hidden actor is by then. It needs no camera and no return. An episode that it does not know (other
+    arguments, a seed beyond `seeds`, a `secret` of the environment) it plays as history does.
+
+    A control, no contender: what it reaches without a camera is what the seeds give away.
+    """
+
+    name = "seed-finder"
+    tags = ("generator", "control")
+    source = "own: what public seeds give away"
+
+    def __init__(self, rig: Rig, scenario: str = "dense", seeds: int = 30):
+        from care_sim.scenarios import SCENARIOS
+
+        check_known("scenario", scenario, SCENARIOS)
+        check_whole("seeds", seeds, 1, 10**6)
+        super().__init__(rig)
+        self._scenario, self._seeds = scenario, seeds
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the episode."""
+        self.found: int | None = None
+        """The seed that fits the first observation; None if there is none."""
+        self._hidden: Floats = np.empty((0, 7))
+        self._speed: float | None = None
+        self._keyframe, self._x = 0, 0.0
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then that of the actor whom nobody has seen."""
+        self._follow(belief.ego.speed)
+        return Demand(self.rig.hulls(belief.tracks.boxes), [self.rig.hulls(self._expected())])
+
+    def _follow(self, speed: float) -> None:
+        if self._speed is None:
+            self.found = _first_speeds(self._scenario, self._seeds).get(speed)
+            if self.found is not None:
+                self._hidden = _hidden_boxes(self._scenario, self.found, self.rig.keyframe_s)
+        else:
+            self._keyframe += 1
+            self._x += (self._speed + speed) / 2 * self.rig.keyframe_s
+        self._speed = speed
+
+    def _expected(self) -> Floats:
+        """(n, 7) the box of the hidden actor in the sensor frame, if it is known; the road is straight."""
+        from care_sim.sensors.lidar import LIDAR_POSITION
+
+        sensor = Frame.mounted((self._x, 0.0, 0.0), LIDAR_POSITION)
+        return sensor.boxes_to_local(self._hidden[self._keyframe : self._keyframe + 1])
+
+
+@lru_cache(maxsize=4)
+def _first_speeds(scenario: str, seeds: int) -> dict[float, int]:
+    """The seed of every first speed, as an observation shows it."""
+    speeds = {}
+    for seed in range(seeds):
+        with closing(_world(scenario, seed)) as world:
+            speeds[float(np.float32(world.ego.speed))] = seed
+    return speeds
+
+
+@lru_cache(maxsize=4)
+def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
+    """(k, 7) where the hidden actor is at every keyframe, in the world frame: what the ego does is nothing to it."""
+    from care_sim.scenarios import SCENARIOS
+
+    boxes: list[Floats] = []
+    with closing(_world(scenario, seed)) as world:
+        hidden = [world.first_sighting] if world.first_sighting else []
+        for _ in range(round(SCENARIOS[scenario].duration_s / keyframe_s)):
+            boxes.extend(world.boxes(hidden))
+            world.advance(0.0, keyframe_s)
+    return np.array(boxes).reshape(-1, 7)
+
+
+def _world(scenario: str, seed: int) -> "World":
+    """The world of a seed, as the environment builds it."""
+    from care_sim.scenarios import make_scenario
+
+    return make_scenario(scenario).build(np.random.default_rng(streams((seed,), 1)[0]))

@@ -1,0 +1,1 @@
+"""Policies with trained weights, and what they see of a belief."""

@@ -1,0 +1,98 @@
+"""What a policy can tell of every cell before it fires: the numbers that a learned scorer reads."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.grid import Cells
+from care_sim.core.residual import explained, wedges
+from care_sim.core.types import CLASSES, Belief, Rig
+from care_sim.policies.paper.uncertainty import CLEARANCE_M
+
+MARKS = (
+    "in the wedge of a camera detection that no forecast explains",
+    "in that wedge before it is dilated",
+    "in such a wedge of a pedestrian or bicycle; of several wedges the smallest counts",
+    "in the wedge of a camera detection that a forecast explains",
+    "in the hull of a forecast",
+    "fired by the last scan",
+    "returned by it from above the road, and in no hull",
+    "within the margins of such a cell",
+)
+"""What is true or not of a cell at a keyframe: the bits of its code, the lowest first."""
+CUES = len(MARKS) + 2
+"""The marks; log2 of the cells of the unexplained wedge over 10; nearness of the last return, 1 at the sensor, 0 at the
+range of a ray and without a return."""
+OUTLOOKS = ("elevation over half a radian", "nearness of the road", "cos azimuth", "abs sin azimuth", "in a picture")
+"""What is known of a cell once the rig is. Left and right are alike, so that 20 scenes teach no side."""
+
+_SMALL_CLASSES = np.isin(CLASSES, ("pedestrian", "bicycle"))
+
+Table = NDArray[np.float32]
+
+
+class Seen(NamedTuple):
+    """What is seen of all cells: `codes` (N,) of `MARKS`, `sizes` (N,) and `nearnesses` (N,) as in `CUES`."""
+
+    codes: NDArray[np.uint8]
+    sizes: Table
+    nearnesses: Table
+
+    def rows(self, cells: Cells) -> Table:
+        """(n, `CUES`) of some cells (n,)."""
+        marks = np.unpackbits(self.codes[cells, None], axis=1, bitorder="little")
+        return np.column_stack([marks, self.sizes[cells], self.nearnesses[cells]]).astype(np.float32)
+
+
+class Cues:
+    """The cues of a rig's cells, N of them in the order of their index."""
+
+    def __init__(self, rig: Rig):
+        self.rig = rig
+        self._bare = replace(rig, azimuth_margin=0, elevation_margin=0)
+        self._heights = rig.grid.directions[:, 2].astype(np.float32)
+
+    def of(self, belief: Belief, hulls: Sequence[Cells]) -> Seen:
+        """At a keyframe, given the hulls of its forecasts."""
+        from care_sim.policies.learned.cell_scores import mark, mark_scan
+
+        rig, cells = self.rig, self.rig.grid.size
+        seen = Seen(np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32))
+        mark(seen.codes, seen.sizes, *self._sets(belief, hulls))
+        limits = np.float32(rig.grid.range_m), np.float32(CLEARANCE_M - rig.sensor_height_m)
+        margins = rig.azimuth_margin, rig.elevation_margin
+        mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, limits, margins)
+        return seen
+
+    @cached_property
+    def outlooks(self) -> Table:
+        """(N, `OUTLOOKS`)."""
+        x, y, z = self.rig.grid.directions.T
+        flat = np.hypot(x, y)
+        road = np.divide(self.rig.sensor_height_m, -z, out=np.full(len(z), np.inf), where=z < 0)
+        ground = 1 - np.minimum(road / self.rig.grid.range_m, 1)
+        return np.stack([np.arcsin(z) / 0.5, ground, x / flat, np.abs(y) / flat, self._covered()], 1).astype(np.float32)
+
+    def _sets(self, belief: Belief, hulls: Sequence[Cells]) -> tuple[Cells, Cells, NDArray[np.uint8]]:
+        """Cells of hulls, wedges and undilated wedges, where each set ends, and its marks."""
+        from care_sim.policies.learned.cell_scores import BOX, EXPLAINED, HULL, SMALL, UNEXPLAINED
+
+        detections = belief.detections
+        known = explained(detections, belief.tracks, self.rig)
+        sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._bare)]
+        new = UNEXPLAINED + SMALL * _SMALL_CLASSES[detections.classes]
+        marks = np.concatenate([np.full(len(hulls), HULL), np.where(known, EXPLAINED, new), np.where(known, 0, BOX)])
+        cells = np.concatenate([np.empty(0, np.int64), *sets])
+        return cells, np.cumsum([*map(len, sets)], dtype=np.int64), marks.astype(np.uint8)
+
+    def _covered(self) -> NDArray[np.bool_]:
+        """(N,) whether a far point in the direction of a cell lies in a picture."""
+        covered = np.zeros(self.rig.grid.size, bool)
+        for camera in self.rig.cameras:
+            pixels, _ = camera.project(self.rig.grid.directions * self.rig.grid.range_m)
+            covered |= ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
+        return covered

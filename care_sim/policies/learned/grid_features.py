@@ -1,0 +1,93 @@
+"""What an agent sees: a belief as a few coarse pictures of the angular grid, all values from 0 to 1."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.errors import check_whole
+from care_sim.core.grid import Cells
+from care_sim.core.residual import camera_layers
+from care_sim.core.types import Belief, Observation, Rig
+from care_sim.policies.learned.tiling import Tiling
+
+CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
+"""The pictures, in order; see `care_sim.envs.wrappers.grid_observation.GridObservation`."""
+EGO = ("speed", "yaw_rate", "acceleration", "budget")
+EGO_SCALES = np.array([30.0, 1.0, 10.0, 1.0], np.float32)
+"""m/s, rad/s, m/s^2 and the share of the cells that are shown as 1."""
+STANDING_M = (0.25, 4.0)
+"""Heights above the road between which a return stands for something: over kerbs (`care_sim.perception.cluster.road`), under
+the bodies of bridges and the crowns of trees; the tallest of the five classes are lower.
+"""
+
+
+@dataclass(frozen=True)
+class GridFeatures:
+    """Beliefs of a rig as `CHANNELS` over `columns` x `rows` blocks of the grid, and the vector `EGO`.
+
+    Blocks pool their cells: `nearness` takes the largest, the others the share. Raises InvalidInput unless the blocks
+    divide the grid. Not for several threads at once: it reuses its memory.
+    """
+
+    rig: Rig
+    columns: int = 64
+    rows: int = 8
+
+    def __post_init__(self) -> None:
+        check_whole("columns", self.columns, 1, self.rig.grid.columns)
+        check_whole("rows", self.rows, 1, self.rig.grid.rows)
+        self.blocks  # noqa: B018 (refuses what does not divide)
+
+    @cached_property
+    def blocks(self) -> Tiling:
+        """The blocks."""
+        return Tiling(self.rig.grid, self.columns, self.rows)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(channels, rows, columns)."""
+        return len(CHANNELS), self.rows, self.columns
+
+    def __call__(self, belief: Belief) -> Observation:
+        """`grid` (channels * rows * columns,) and `ego` (4,), both float32."""
+        out = np.zeros((len(CHANNELS), self.rows * self.columns), np.float32)
+        self._draw_objects(belief, out[:3])
+        self._draw_returns(belief.ranges.ravel(), out[3:])
+        return {"grid": np.minimum(out, 1, out=out).ravel(), "ego": self._ego(belief)}
+
+    def _draw_objects(self, belief: Belief, out: NDArray[np.float32]) -> None:
+        from care_sim.policies.learned.pooling_kernels import share
+
+        groups = [self.rig.hulls(belief.tracks.boxes), *camera_layers(belief, self.rig)]
+        cells = np.concatenate([np.empty(0, np.int64), *chain(*groups)])
+        ends = np.cumsum([sum(map(len, group)) for group in groups])
+        share(cells, ends, self._blocks, self._marks, out)
+
+    def _draw_returns(self, ranges: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        from care_sim.policies.learned.pooling_kernels import look
+
+        scan = ranges, self._rises, self.rig.grid.range_m, self.rig.sensor_height_m, *STANDING_M
+        look(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
+
+    def _ego(self, belief: Belief) -> NDArray[np.float32]:
+        ego = belief.ego
+        values = [ego.speed, ego.yaw_rate, ego.acceleration, belief.budget / self.rig.grid.size]
+        return np.asarray(np.clip(np.array(values, np.float32) / EGO_SCALES, -1, 1))
+
+    @cached_property
+    def _rises(self) -> NDArray[np.float64]:
+        return np.ascontiguousarray(self.rig.grid.directions[:, 2])
+
+    @cached_property
+    def _blocks(self) -> Cells:
+        """(N,) the block of every cell."""
+        blocks = np.empty(self.rig.grid.size, np.int64)
+        blocks[self.blocks.cells] = np.arange(self.rows * self.columns)[:, None]
+        return blocks
+
+    @cached_property
+    def _marks(self) -> NDArray[np.uint8]:
+        return np.empty(self.rig.grid.size, np.uint8)

@@ -1,0 +1,77 @@
+"""History with a learned reserve: the cells in which objects without a track are likely to return."""
+
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.grid import Cells
+from care_sim.core.types import Belief, Demand, Rig
+from care_sim.policies.base import Policy
+from care_sim.policies.learned.cell_inputs import CUES, MARKS, OUTLOOKS, Cues, Seen
+from care_sim.policies.learned.weights import Weights, load, shipped
+
+
+class LearnedScorer(Policy):
+    """The learned scorer of the paper (Sec. 5.1): a small network scores every cell by what a policy can see of it
+    (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho B highest; of these, what exploitation has already goes
+    to the floor, as with `history-uniform`.
+
+    `path` is a file of weights that `care-sim train learned-scorer` wrote; the shipped ones, unless given. They serve
+    any budget and any cameras. Raises InvalidInput for a file of something else or made for another grid.
+    """
+
+    name = "learned-scorer"
+    tags = ("causal", "learned")
+    source = "CARE paper, Sec. 5.1 (learned), after Lang et al., SampleNet, CVPR 2020"
+
+    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
+        super().__init__(rig)
+        weights = load(shipped(self.name) if path is None else path)
+        weights.check(self.name, rig)
+        self._cues = Cues(rig)
+        self._network = CellNetwork(weights, self._cues.outlooks)
+        self._reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then the cells of the highest scores."""
+        hulls = self.rig.hulls(belief.tracks.boxes)
+        return Demand(hulls, [[highest(self._network.scores(self._cues.of(belief, hulls)), self._reserve)]])
+
+
+class CellNetwork:
+    """The network of some weights over cells whose outlooks (N, `OUTLOOKS`) are fixed."""
+
+    def __init__(self, weights: Weights, outlooks: NDArray[np.float32]):
+        layer = weights.array("layer", CUES + len(OUTLOOKS), None)
+        units = layer.shape[1]
+        self._out = weights.array("out", units)
+        hidden = outlooks @ layer[CUES:] + weights.array("bias", units)
+        self._outlook = hidden, np.maximum(hidden, 0) @ self._out
+        if not np.isfinite(self._outlook[1]).all():
+            raise InvalidInput(f"weights {weights.path}: too large to score a cell")
+        self._layers = _by_code(layer[: len(MARKS)]), *np.ascontiguousarray(layer[len(MARKS) : CUES])
+
+    def scores(self, seen: Seen) -> NDArray[np.float32]:
+        """(N,) of cells; higher where an object without a track is likelier."""
+        from care_sim.policies.learned.cell_scores import score
+
+        scores: NDArray[np.float32] = score(tuple(seen), self._outlook, self._layers, self._out)
+        return scores
+
+
+def _by_code(layer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(256, h) what every code of marks adds to the units, given what each mark does (8, h)."""
+    codes = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little")
+    return codes.astype(np.float32) @ layer
+
+
+def highest(scores: NDArray[np.float32], count: int) -> Cells:
+    """The `count` cells of the highest scores, ascending; of equals those of the lowest index."""
+    if not 0 < count < len(scores):
+        return np.arange(len(scores))[:count]
+    least = np.partition(scores, -count)[-count]
+    above = np.flatnonzero(scores > least)
+    equal = np.flatnonzero(scores == least)[: count - len(above)]
+    return np.sort(np.concatenate([above, equal]))

@@ -1,0 +1,52 @@
+"""A learned allocator: sectors scored by a small network, trained by proximal policy optimisation."""
+
+from os import PathLike
+from typing import ClassVar
+
+from care_sim.core.types import Belief, Demand, Rig
+from care_sim.policies.base import Policy
+from care_sim.policies.learned.grid_features import GridFeatures
+from care_sim.policies.learned.score_map import ScoreMap
+from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
+from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.weights import load, shipped
+from care_sim.policies.learned.wrapper_text import Wrapping
+
+
+class Ppo(Policy):
+    """Does what the learner would behind its wrappers, without noise: the same scores, the same allocator.
+
+    `path` is a file of weights that `care-sim train ppo` wrote; without, those that come with the package, learned on
+    the dense street at all budgets of its tables. Raises InvalidInput for weights that are missing, damaged, of another
+    kind, or made for another grid or budget.
+    """
+
+    name = "ppo"
+    tags = ("causal", "learned")
+    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on the dense street"
+    weights: ClassVar[str] = "ppo-dense"
+
+    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
+        super().__init__(rig)
+        file = load(shipped(self.weights) if path is None else path)
+        file.check(Ppo.name, rig)
+        wrapping = Wrapping.parse(file.card.wrapper)
+        self._reserve_alone = wrapping.action == "SectorReserve"
+        self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
+        self._sectors = Tiling(rig.grid, wrapping.azimuths, wrapping.elevations)
+        self._score_map = ScoreMap(file, wrapping)
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the sectors alone."""
+        scores = self._score_map(self._features(belief))
+        if self._reserve_alone:
+            return reserve_demand(belief, self.rig, self._sectors, scores)
+        return sector_demand(self.rig, self._sectors, scores)
+
+
+class PpoDartout(Ppo):
+    """The same, learned on the dart-out."""
+
+    name = "ppo-dartout"
+    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on the dart-out"
+    weights = "ppo-dartout"

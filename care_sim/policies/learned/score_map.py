@@ -1,0 +1,57 @@
+"""The network of learned allocators in NumPy: one small network slides over the sectors and scores each.
+
+It sees the coarse blocks of a sector and one block more on each side, over the seam behind the car too, and the car's
+own motion. Hidden layers are rectified, scores are hyperbolic tangents of
+
+    score.weight . relu(hidden.weight relu(window.weight * blocks + ego.weight ego + window.bias) + hidden.bias) + place
+
+with `place` one number a sector.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.types import Observation
+from care_sim.policies.learned.grid_features import CHANNELS, EGO
+from care_sim.policies.learned.weights import Weights
+from care_sim.policies.learned.wrapper_text import Wrapping
+
+MARGIN = 1
+"""Blocks seen beyond a sector on every side."""
+
+
+class ScoreMap:
+    """Scores of sectors from the observation of `GridObservation`. Raises InvalidInput for arrays that do not fit."""
+
+    def __init__(self, weights: Weights, wrapping: Wrapping):
+        self._shape = len(CHANNELS), wrapping.rows, wrapping.columns
+        self._stride = wrapping.blocks_a_sector
+        self._window = tuple(blocks + 2 * MARGIN for blocks in self._stride)
+        kernel = weights.array("window.weight", None, len(CHANNELS), *self._window)
+        hidden = len(kernel)
+        self._kernel = np.ascontiguousarray(kernel.reshape(hidden, -1).T)
+        self._bias = weights.array("window.bias", hidden)
+        self._ego = weights.array("ego.weight", hidden, len(EGO))
+        self._hidden = weights.array("hidden.weight", hidden, hidden), weights.array("hidden.bias", hidden)
+        self._score = weights.array("score.weight", hidden)
+        self._place = weights.array("place", wrapping.elevations, wrapping.azimuths)
+
+    def __call__(self, observation: Observation) -> NDArray[np.float32]:
+        """(elevations, azimuths) from -1 to 1."""
+        seen = self._windows(observation["grid"]) @ self._kernel + (self._ego @ observation["ego"] + self._bias)
+        weight, bias = self._hidden
+        thought = np.maximum(np.maximum(seen, 0) @ weight.T + bias, 0)
+        return np.asarray(np.tanh((thought @ self._score).reshape(self._place.shape) + self._place))
+
+    def _windows(self, grid: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(sectors, channels * blocks) what each sector sees; nothing above and below the grid."""
+        channels, rows, columns = self._shape
+        padded = np.zeros((channels, rows + 2 * MARGIN, columns + 2 * MARGIN), np.float32)
+        padded[:, MARGIN:-MARGIN, MARGIN:-MARGIN] = grid.reshape(self._shape)
+        padded[:, :, :MARGIN], padded[:, :, -MARGIN:] = (
+            padded[:, :, -2 * MARGIN : -MARGIN],
+            padded[:, :, MARGIN : 2 * MARGIN],
+        )
+        tall, wide = self._stride
+        windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[:, ::tall, ::wide]
+        return windows.transpose(1, 2, 0, 3, 4).reshape(-1, self._kernel.shape[0])

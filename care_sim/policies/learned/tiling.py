@@ -1,0 +1,55 @@
+"""Equal tiles of the angular grid: the sectors that an agent scores, and the coarse blocks in which it sees."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.errors import InvalidInput, check_whole
+from care_sim.core.grid import AngularGrid, Cells
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """`azimuths` x `elevations` tiles. Raises InvalidInput unless they divide the grid's columns and rows.
+
+    A tile's index is `elevation * azimuths + azimuth`; as with cells, elevation 0 is the highest and azimuth 0 begins
+    straight behind, at -pi. `shape` is that of a picture of the tiles.
+    """
+
+    grid: AngularGrid
+    azimuths: int = 32
+    elevations: int = 4
+
+    def __post_init__(self) -> None:
+        sides = (("azimuths", self.azimuths, self.grid.columns), ("elevations", self.elevations, self.grid.rows))
+        for name, count, cells in sides:
+            check_whole(name, count, 1, cells)
+            if cells % count:
+                raise InvalidInput(f"{name} must divide the {cells} of the grid, got {count}")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(elevations, azimuths)."""
+        return self.elevations, self.azimuths
+
+    @property
+    def tile_shape(self) -> tuple[int, int]:
+        """Rows and columns of cells in a tile."""
+        return self.grid.rows // self.elevations, self.grid.columns // self.azimuths
+
+    @cached_property
+    def cells(self) -> Cells:
+        """(tiles, n) the cells of every tile, ascending."""
+        rows, columns = self.tile_shape
+        pictured = np.arange(self.grid.size).reshape(self.elevations, rows, self.azimuths, columns)
+        return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
+
+    def ranked(self, scores: NDArray[np.floating], enough: int) -> list[Cells]:
+        """The cells of the tiles with a strictly positive score (`shape`), best first, ties by ascending index; no more
+        tiles than hold `enough` cells.
+        """
+        flat = np.ravel(scores)
+        many = min(np.count_nonzero(flat > 0), -(-enough // self.cells.shape[1]))
+        return list(self.cells[np.argsort(-flat, kind="stable")[:many]])

@@ -1,0 +1,168 @@
+"""Weights of learned policies in a file that executes no code: float32 arrays and a card that says whose they are.
+
+The file is an .npz of NumPy, read with `allow_pickle=False`; the card is JSON text in one of its entries.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from os import PathLike
+from pathlib import Path
+from typing import Any
+from zipfile import ZipInfo
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.errors import InvalidInput, check_path, is_number
+from care_sim.base.files import ZIP, replacing
+from care_sim.base.json_text import parsed
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import Rig
+
+FORMAT = "care-sim weights 1"
+LARGEST = 2**26
+"""Bytes that a file may hold when it is unpacked; the shipped ones hold some thousands."""
+_CARD = "card"
+
+Arrays = dict[str, NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a file of weights is, what it fits, and how it was made.
+
+    `kind` names the policy. `grid` is the one that was trained on, `budget` the cells a keyframe, None where any will
+    do; `wrapper` are the wrappers that it was trained behind in one text, None without. `scenario`, `data`, `seeds`,
+    `steps`, `machine`, `versions` and `result` tell people how the weights were trained and what they reached.
+    """
+
+    kind: str
+    grid: AngularGrid
+    budget: int | None = None
+    wrapper: str | None = None
+    scenario: str | None = None
+    data: str = ""
+    seeds: Mapping[str, Any] = field(default_factory=dict)
+    steps: int = 0
+    machine: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    result: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> str:
+        """As text that people can read."""
+        return json.dumps({"format": FORMAT} | asdict(self), indent=1)
+
+    @classmethod
+    def from_json(cls, text: str) -> "Card":
+        """Read text back. Raises ValueError for anything but a card."""
+        plain = parsed(text)
+        if not isinstance(plain, dict) or plain.pop("format", None) != FORMAT:
+            raise ValueError(f"its card is not of the format {FORMAT!r}")
+        if wrong := set(plain) ^ {column.name for column in fields(cls)}:
+            raise ValueError(f"its card lacks or has too much: {', '.join(sorted(wrong))}")
+        for name, value in plain.items():
+            if not isinstance(value, _TYPES[name]) or isinstance(value, bool):
+                raise ValueError(f"its card says {name} {value!r}")
+        card = cls(**plain | {"grid": _grid(plain["grid"])})
+        if card.budget is not None and not 0 < card.budget <= card.grid.size:
+            raise ValueError(f"its card says budget {card.budget}")
+        return card
+
+
+_TYPES: dict[str, Any] = {column.name: str for column in fields(Card)}
+_TYPES |= {"grid": dict, "budget": int | None, "wrapper": str | None, "scenario": str | None, "steps": int}
+_TYPES |= dict.fromkeys(("seeds", "versions", "result"), dict)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The arrays and the card of the file at `path`."""
+
+    path: Path
+    arrays: Arrays
+    card: Card
+
+    def check(self, kind: str, rig: Rig) -> None:
+        """Raise InvalidInput, with what the file has and what is needed, unless the weights are of this kind and fit
+        this rig.
+        """
+        card = self.card
+        needed: dict[str, Any] = {"kind": kind, "grid": rig.grid}
+        needed |= {"budget": rig.budget} if card.budget is not None else {}
+        for name, value in needed.items():
+            if getattr(card, name) != value:
+                has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
+                hint = "; those trained with several budgets fit any" if name == "budget" else ""
+                raise InvalidInput(f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}")
+
+    def array(self, name: str, *shape: int | None) -> NDArray[np.float32]:
+        """An array by name; None in `shape` is any length. Raises InvalidInput for a missing one, or another shape."""
+        if name not in self.arrays:
+            raise InvalidInput(f"weights {self.path}: no array {name!r}; it has {', '.join(self.arrays) or 'none'}")
+        array = self.arrays[name]
+        if array.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):
+            wanted = " x ".join("any" if n is None else str(n) for n in shape)
+            raise InvalidInput(f"weights {self.path}: array {name!r} has the shape {array.shape}, needed is {wanted}")
+        return array
+
+
+def save(path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: Card) -> None:
+    """Write weights, whole or not at all; the same arrays and card give the same bytes."""
+    entries: dict[str, Any] = {_CARD: np.frombuffer(card.to_json().encode(), np.uint8)}
+    entries |= {name: np.asarray(array, np.float32) for name, array in arrays.items()}
+    with replacing(Path(path), ZIP) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, **entries)
+
+
+def load(path: str | PathLike[str]) -> Weights:
+    """Read weights. Raises InvalidInput for a file that is missing, damaged or something else.
+
+    Whatever a spoilt archive provokes in its readers becomes that one line.
+    """
+    check_path("a file of weights", path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            _check_contents(file.zip.infolist())
+            entries = {name: file[name] for name in file.files}
+        card = Card.from_json(bytes(entries.pop(_CARD)).decode())
+        return Weights(Path(path), _checked(entries), card)
+    except FileNotFoundError as error:
+        raise InvalidInput(f"weights {path}: no such file") from error
+    except Exception as error:
+        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[0]
+        raise InvalidInput(f"weights {path}: no .npz of weights of care-sim train, or damaged ({reason})") from error
+
+
+def shipped(name: str) -> Path:
+    """Where the weights of that name lie that come with the package."""
+    return Path(__file__).parent / "shipped" / f"{name}.npz"
+
+
+def _check_contents(entries: list[ZipInfo]) -> None:
+    if len({entry.filename for entry in entries}) < len(entries):
+        raise ValueError("an entry comes twice")
+    if sum(entry.file_size for entry in entries) > LARGEST:
+        raise ValueError(f"unpacked it is larger than {LARGEST} bytes")
+
+
+def _grid(plain: dict[str, Any]) -> AngularGrid:
+    if set(plain) != {column.name for column in fields(AngularGrid)} or not all(map(is_number, plain.values())):
+        raise ValueError(f"its card says grid {plain!r}")
+    return AngularGrid(**plain)
+
+
+def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:
+    for name, array in arrays.items():
+        if array.dtype != np.float32 or not np.isfinite(array).all():
+            raise ValueError(f"array {name!r} is not of finite float32 numbers")
+    return arrays
+
+
+def _told(name: str, value: Any, rig: Rig) -> str:
+    """A value of a card as a reader wants it."""
+    if name == "budget":
+        return f"{value} cells ({value / rig.grid.size:.4g})"
+    if isinstance(value, AngularGrid):
+        return " ".join(f"{key} {number:.6g}" for key, number in asdict(value).items())
+    return repr(value)

@@ -1,0 +1,36 @@
+"""Beam reduction: the elevation rows nearest the horizon, up to the budget."""
+
+import numpy as np
+
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.types import Belief, Demand, Rig
+from care_sim.policies.base import Policy
+
+
+class BeamReduce(Policy):
+    """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), which drops scan lines from a cloud,
+    adapted by the paper (Sec. 5.1) into a causal scan policy: it fires whole rows, the nearest to the
+    horizon first, and the last one thinned evenly, so that exactly B cells are asked for.
+    """
+
+    name = "beam-reduce"
+    source = "CARE paper, Sec. 5.1, after Wei et al., LiDAR Distillation, ECCV 2022"
+
+    def __init__(self, rig: Rig):
+        super().__init__(rig)
+        self._rows = horizon_rows(rig.grid, rig.budget)
+
+    def demand(self, belief: Belief) -> Demand:
+        """A layer a row; no exploitation."""
+        return Demand(layers=[[cells] for cells in self._rows])
+
+
+def horizon_rows(grid: AngularGrid, count: int) -> list[Cells]:
+    """The cells of the rows nearest the horizon, nearest first, `count` in all; the last row evenly thinned."""
+    nearest = np.argsort(np.abs(grid.directions[:: grid.columns, 2]), kind="stable")
+    whole, rest = divmod(count, grid.columns)
+    widths = [grid.columns] * whole + [rest] * (rest > 0)
+    return [
+        row * grid.columns + np.arange(width) * grid.columns // width
+        for row, width in zip(nearest.tolist(), widths, strict=False)
+    ]

@@ -1,0 +1,32 @@
+"""Farthest point sampling of the full scan: saves no sensing."""
+
+from care_sim.base.extras import import_open3d
+from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
+from care_sim.core.types import Rig
+from care_sim.loops.truth import Truth
+from care_sim.policies.paper.matched_fraction import MatchedFraction
+
+
+class FarthestPoints(MatchedFraction):
+    """The second reference of the paper (Sec. 5.1): a matched fraction of the full cloud by farthest point
+    sampling (PointNet++, Qi et al., NeurIPS 2017; Open3D), which begins with the first point.
+
+    Raises MissingExtra without Open3D.
+    """
+
+    name = "farthest-points"
+    source = "CARE paper, Sec. 5.1, after Qi et al., PointNet++, NeurIPS 2017; Open3D"
+
+    def __init__(self, rig: Rig, truth: Truth):
+        super().__init__(rig, truth)
+        import_open3d()
+
+    def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
+        """The `count` cells whose points lie farthest from each other."""
+        if count == 0:
+            return cells[:0]
+        open3d = import_open3d()
+        cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+        # A point lies on the ray through the centre of its cell.
+        return self.rig.grid.cells_of(cloud.farthest_point_down_sample(count).points)

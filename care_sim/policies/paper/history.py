@@ -1,0 +1,17 @@
+"""History-driven scanning: dense on the forecasts of known tracks, sparse elsewhere."""
+
+from care_sim.core.types import Belief, Demand
+from care_sim.policies.base import Policy
+
+
+class History(Policy):
+    """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning: the
+    exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is empty.
+    """
+
+    name = "history"
+    source = "CARE paper, Sec. 4.1, after adaptive LiDAR scanning (2026)"
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls of all forecasts."""
+        return Demand(self.rig.hulls(belief.tracks.boxes))

@@ -1,0 +1,21 @@
+"""History with perfect forecasts: the true next poses of everything tracked."""
+
+import numpy as np
+
+from care_sim.core.types import Belief, Demand
+from care_sim.policies.privileged import PrivilegedPolicy
+
+
+class HistoryOracle(PrivilegedPolicy):
+    """The oracle of the paper (Sec. 5.2): history, with the forecast of every tracked object replaced by its
+    true next position. An upper bound on any learned predictor of regions; new objects stay unknown to it.
+    """
+
+    name = "history-oracle"
+    source = "CARE paper, Sec. 5.2 (oracle variant)"
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls of the true boxes, nearest first."""
+        boxes = self.truth.boxes(belief.tracks)
+        nearest_first = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
+        return Demand(self.rig.hulls(boxes[nearest_first]))

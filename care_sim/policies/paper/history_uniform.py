@@ -1,0 +1,39 @@
+"""History with an undirected reserve: a fixed, evenly spread pattern."""
+
+import numpy as np
+
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.types import Belief, Demand, Rig
+from care_sim.policies.base import Policy
+
+GOLDEN = (np.sqrt(5) - 1) / 2
+"""Multiples of it spread the most evenly round a circle (Kronecker sequence)."""
+
+
+class HistoryUniform(Policy):
+    """The control history+uniform of the paper (Sec. 5.1): the whole reserve, rho B cells, goes to one pattern
+    that stays the same over the episode and looks nowhere in particular.
+    """
+
+    name = "history-uniform"
+    source = "CARE paper, Sec. 5.1 (history+uniform)"
+
+    def __init__(self, rig: Rig):
+        super().__init__(rig)
+        reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
+        self._pattern = uniform_pattern(rig.grid, reserve)
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then the pattern."""
+        return Demand(self.rig.hulls(belief.tracks.boxes), [[self._pattern]])
+
+
+def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
+    """`count` different cells, ascending: as many in every row, evenly spaced, each row turned by the golden ratio."""
+    numbers = np.arange(count)
+    row = numbers * grid.rows // max(count, 1)
+    in_row = np.bincount(row, minlength=grid.rows)
+    place = numbers - (np.cumsum(in_row) - in_row)[row]
+    column = np.floor((place + row * GOLDEN % 1) * grid.columns / in_row[row]).astype(np.int64)
+    cells: Cells = row * grid.columns + column
+    return cells

@@ -1,0 +1,78 @@
+"""What is compared between policies, and from which size on a difference counts.
+
+Policies are compared seed by seed, because a seed fixes world, faults and floor (common random numbers).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from care_sim.base.errors import InvalidInput
+from care_sim.evaluation.censoring import Difference, Reading, difference
+from care_sim.study.task import Row
+
+GATE_M = 2.5
+"""What the ego covers at 30 km/h (8.33 m/s) while the controller's brake builds up (0.3 s); an earlier detection
+by less buys less than the reaction.
+"""
+GATE_POINTS = 5.0
+"""The gate of the paper (Sec. 5.2), fixed there before the runs."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A quantity of an episode, its unit and decimals, and the `gate`: the smallest mean difference that counts."""
+
+    name: str
+    unit: str
+    decimals: int
+    gate: float
+    read: Callable[[Row], Reading]
+
+
+def detection(row: Row) -> Reading:
+    """Detection distance in metres; of an actor never detected, the most it can have been.
+
+    Raises InvalidInput for a row that has neither.
+    """
+    distance, most = row["detection_distance_m"], row["undetected_to_m"]
+    if distance is None and most is None:
+        raise InvalidInput(
+            f"{row['scenario']} {row['policy']} seed {row['seed']}: one of detection_distance_m and undetected_to_m "
+            "must be given"
+        )
+    return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
+
+
+DETECTION = Measure("First detection", "m", 1, GATE_M, detection)
+BRAKED = Measure("Braked", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
+DETECTED = Measure("Detected", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored)))
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """How much more of a measure one policy has than another on the same seeds."""
+
+    measure: Measure
+    difference: Difference
+
+    @property
+    def mean(self) -> float:
+        """In the unit of the measure."""
+        return self.difference.interval.mean
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the interval excludes zero."""
+        return self.difference.excludes_zero
+
+    @property
+    def counts(self) -> bool:
+        """Whether the interval excludes zero and the mean difference reaches the gate, whatever the censored were."""
+        return self.excludes_zero and abs(self.difference.cautious.mean) >= self.measure.gate
+
+
+def contrast(measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None) -> Contrast | None:
+    """`ours` minus `theirs`, paired by seed; None without shared seeds."""
+    a, b = ({row["seed"]: measure.read(row) for row in rows or ()} for rows in (ours, theirs))
+    seeds = sorted(set(a) & set(b))
+    return Contrast(measure, difference([a[s] for s in seeds], [b[s] for s in seeds])) if seeds else None

@@ -1,0 +1,1 @@
+"""One episode for people: its timeline, its clip, a picture of the brake."""

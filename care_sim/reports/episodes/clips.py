@@ -1,0 +1,78 @@
+"""Episodes on film: one as its picture shows it, or the same seed under several policies side by side."""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import zip_longest
+from pathlib import Path
+
+from PIL import Image
+
+from care_sim.core.types import Keyframe
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.study.episode_play import Watcher
+from care_sim.viewer.pictures.clip_files import check_clip, write_clip
+from care_sim.viewer.pictures.drawing import PAPER
+from care_sim.viewer.pictures.keyframe import draw_keyframe
+
+LAST_PICTURE_S = 2.5
+"""How long the end of a film stays."""
+_GAP = 8
+
+Draw = Callable[[str, ClosedLoop, Sequence[Keyframe]], Image.Image]
+"""Draws where a loop stands after its keyframes so far, under the name of its policy."""
+
+
+def whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
+    """The picture of an episode on its own."""
+    return Image.fromarray(draw_keyframe(loop, frames[-1]))
+
+
+class Film:
+    """Episodes side by side on one film at `path`, drawn by `draw`; without a path it does nothing.
+
+    Raises InvalidInput for a folder and for an ending that no clip has, MissingExtra for one whose library is not
+    installed.
+    """
+
+    def __init__(self, path: Path | None, draw: Draw = whole):
+        self._path, self._draw = path, draw
+        self._films: list[list[Image.Image]] = []
+        if path is not None:
+            check_clip(path)
+
+    def episode(self, name: str) -> Watcher:
+        """What watches the next episode, of the policy `name`."""
+        frames: list[Keyframe] = []
+        film: list[Image.Image] = []
+        self._films.append(film)
+
+        def watch(loop: ClosedLoop, frame: Keyframe) -> None:
+            if self._path is not None:
+                self._keyframe_s = loop.rig.keyframe_s
+                frames.append(frame)
+                film.append(self._draw(name, loop, frames))
+
+        return watch
+
+    def write(self) -> bool:
+        """Write the film, a picture a keyframe, at the speed of the world; whether there was anything to write.
+
+        An episode that ends before the others keeps its last picture; one without a keyframe is left out.
+        """
+        films = [film for film in self._films if film]
+        if self._path is not None and films:
+            write_clip(self._path, _side_by_side(films), self._keyframe_s, LAST_PICTURE_S)
+        return bool(films)
+
+
+def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> Iterator[Image.Image]:
+    last = [film[-1] for film in films]
+    for moment in zip_longest(*films):
+        yield _row([now or end for now, end in zip(moment, last, strict=True)])
+
+
+def _row(pictures: Sequence[Image.Image]) -> Image.Image:
+    width, height = pictures[0].size
+    canvas = Image.new("RGB", (len(pictures) * (width + _GAP) - _GAP, height), PAPER)
+    for number, picture in enumerate(pictures):
+        canvas.paste(picture, (number * (width + _GAP), 0))
+    return canvas

@@ -1,0 +1,71 @@
+"""The timeline of one episode, for a terminal."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from care_sim.base.text import printable
+from care_sim.core.types import Keyframe, Outcome
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.task import Row
+
+COLUMNS = ("time\ns", "speed\nm/s", "sensor to\nactor m", "hull to\nhull m", "cells\nfired", "seen", "found", "brake")
+LEGEND = (
+    "seen: the camera shows the actor; found: the LiDAR detector reports it; distances are planar.\n"
+    "The brake acts 0.3 s after the decision. Keyframes in which nothing changes are left out."
+)
+LABELS = {
+    "detection_distance_m": "detection_distance_m (sensor to actor)",
+    "min_distance_m": "min_distance_m (ego centre to actor centre)",
+    "clearance_m": "clearance_m (hull to hull)",
+}
+
+
+def print_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe], console: Console) -> None:
+    """Print an episode where something changes in it, then its outcome."""
+    table = Table(
+        title=Text(printable(config.label), "table.title"), title_justify="left", box=None, padding=(0, 1, 0, 0)
+    )
+    for number, column in enumerate(COLUMNS):
+        table.add_column(column, justify="right" if number < 5 else "left", no_wrap=True)
+    for frame in eventful(keyframes):
+        table.add_row(*(_cells(frame) if frame else ["..."]))
+    console.print(table)
+    console.print(LEGEND, markup=False)
+    for name in Outcome.__dataclass_fields__:
+        console.print(f"{LABELS.get(name, name):44} {text(row[name])}")
+    console.print(f"{'episode_hash':44} {row['episode_hash']}")
+    console.print(f"{'wall_s':44} {row['wall_s']:.1f}")
+
+
+def eventful(keyframes: Sequence[Keyframe]) -> list[Keyframe | None]:
+    """First and last keyframe and those about a change of state; None for every run left out."""
+    states = [(f.in_view, f.detected, f.braking, f.impact_speed_mps is not None) for f in keyframes]
+    last = len(states) - 1
+    changes = [n for n in range(1, last + 1) if states[n] != states[n - 1]]
+    kept = sorted({0, last, *changes, *(n - 1 for n in changes)} & set(range(last + 1)))
+    shown: list[Keyframe | None] = []
+    for before, n in zip([-1, *kept], kept, strict=False):
+        shown += [keyframes[n]] if n == before + 1 else [None, keyframes[n]]
+    return shown
+
+
+def _cells(frame: Keyframe) -> tuple[str, ...]:
+    numbers = (frame.time_s, frame.speed_mps, frame.distance_m, frame.clearance_m)
+    flags = (frame.in_view, frame.detected, frame.braking)
+    return (
+        *(f"{number:z.1f}" for number in numbers),
+        str(len(frame.fired)),
+        *("yes" if flag else "" for flag in flags),
+    )
+
+
+def text(value: bool | int | float | None) -> str:
+    """A result as people read it."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:z.2f}" if isinstance(value, float) else str(value)

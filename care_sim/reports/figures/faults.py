@@ -1,0 +1,103 @@
+"""The figures of the fault study: what a measure does as every fault grows, a panel a fault."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from care_sim.reports.cells import Played
+from care_sim.reports.figures.styles import FULL, Style, styles
+from care_sim.reports.summary import Cell
+from care_sim.reports.tables.faults import FAULTS, PLACES, Fault, policies_of
+from care_sim.study.designs.levels import Place
+from care_sim.study.task import Row
+
+COLUMNS = 5
+"""Panels side by side; a place at least stays free for the legend."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a figure shows of a cell; `read` gives None where there is nothing to show."""
+
+    name: str
+    label: str
+    read: Callable[[Cell], float | None]
+
+    def value(self, cell: Cell | None) -> float | None:
+        """None for a cell that was not played, nan for one without a value."""
+        if cell is None:
+            return None
+        found = self.read(cell)
+        return math.nan if found is None else found
+
+
+MEASURES = (
+    Measure("detection", "first detection, median, m", lambda cell: cell.detection.median),
+    Measure("braked", "episodes with braking, %", lambda cell: 100.0 * cell.braked / cell.episodes),
+    Measure("clearance", "clearance, median, m", lambda cell: cell.clearance.median if cell.clearance else None),
+)
+NAMES = tuple(f"faults-{place.scenario}-{measure.name}" for place in PLACES for measure in MEASURES)
+"""Every figure that the study can draw."""
+
+
+def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
+    """A figure for every place and measure, by name."""
+    played = Played(rows)
+    drawn = styles((policy, played.tags.get(policy, ())) for policy in policies_of(played) if policy != "full")
+    curves = Curves(played, drawn | {"full": FULL})
+    return {f"faults-{p.scenario}-{m.name}": curves.figure(p, m) for p, m in product(PLACES, MEASURES)}
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Draws what was played, in the styles of the policies."""
+
+    played: Played
+    drawn: dict[str, Style]
+
+    def figure(self, place: Place, measure: Measure) -> Figure:
+        """All faults in one place: an open marker at the bottom stands for a median that there is not."""
+        lines = len(FAULTS) // COLUMNS + 1
+        figure = Figure(figsize=(2.5 * COLUMNS, 2.3 * lines), layout="constrained")
+        panels = list(figure.subplots(lines, COLUMNS, sharey=True).flat)
+        for fault, axes in zip(FAULTS, panels, strict=False):
+            self._panel(axes, fault, place, measure)
+        panels[0].set_ylim(bottom=min(0.0, panels[0].get_ylim()[0]))
+        for axes in panels[len(FAULTS) :]:
+            axes.set_axis_off()
+        handles, names = panels[0].get_legend_handles_labels()
+        panels[len(FAULTS)].legend(handles, names, loc="center left", frameon=False, fontsize=9)
+        figure.supylabel(measure.label, fontsize=10)
+        seeds = len({row["seed"] for row in self.played.rows})
+        notes = "; ".join(["open, at the bottom: not detected", *self.played.notes(self.drawn)])
+        figure.suptitle(f"{place}, {seeds} seeds ({notes})", x=0.01, ha="left", fontsize=10)
+        return figure
+
+    def _panel(self, axes: Axes, fault: Fault, place: Place, measure: Measure) -> None:
+        for policy, style in self.drawn.items():
+            keys = [level.key(place, policy) for level in fault.levels]
+            self._curve(axes, policy, style, [measure.value(self.played.cell(key)) for key in keys])
+        axes.set_title(fault.title, loc="left", fontsize=9)
+        axes.set_xlabel(fault.unit, fontsize=8)
+        axes.set_xticks(range(len(fault.levels)), [level.label for level in fault.levels])
+        axes.tick_params(labelsize=8)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(axis="y", color="0.92")
+        axes.set_axisbelow(True)
+
+    def _curve(self, axes: Axes, policy: str, style: Style, heights: Sequence[float | None]) -> None:
+        """Draw a policy over the strengths; None was not played, nan has no median."""
+        played = [(place, height) for place, height in enumerate(heights) if height is not None]
+        if not played:
+            return
+        look: dict[str, Any] = {"color": style.colour, "marker": style.marker, "markersize": 4, "alpha": 0.85}
+        label = self.played.marked(policy)
+        axes.plot(*zip(*played, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label)
+        missing = [place for place, height in played if math.isnan(height)]
+        if missing:
+            axes.plot(missing, [0.0] * len(missing), **look, linestyle="", markerfacecolor="white", clip_on=False)

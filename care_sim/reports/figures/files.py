@@ -1,0 +1,39 @@
+"""Files of figures: written as PNG and SVG, removed when another study takes their folder."""
+
+from collections.abc import Container, Iterable
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.axis import Tick
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from care_sim.base.files import PNG, SVG, check_output, replacing
+
+_FORMATS = (".png", ".svg")
+
+
+def save(figure: Figure, stem: Path) -> None:
+    """Write a figure as PNG and SVG, with its texts as they are: a $ in a name begins no formula."""
+    of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}  # Matplotlib's own
+    for text in figure.findobj(Text):
+        if id(text) not in of_ticks:
+            text.set_parse_math(False)
+    with replacing(stem.with_suffix(".png")) as unfinished:
+        figure.savefig(unfinished, dpi=200)
+    with rc_context({"svg.hashsalt": stem.name}), replacing(stem.with_suffix(".svg")) as unfinished:
+        figure.savefig(unfinished, metadata={"Date": None})
+
+
+def check_figure(stem: Path) -> None:
+    """Raise what `care_sim.base.files.check_output` does where `save` could not write a figure."""
+    check_output(stem.with_suffix(".png"), PNG)
+    check_output(stem.with_suffix(".svg"), SVG)
+
+
+def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:
+    """Remove the figures of the given names from a folder, all but those `kept`; a * in a name stands for any text."""
+    found = [path for name in names for suffix in _FORMATS for path in folder.glob(f"{name}{suffix}")]
+    for path in found:
+        if path.stem not in kept:
+            path.unlink(missing_ok=True)

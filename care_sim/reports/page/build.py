@@ -1,0 +1,160 @@
+"""Builds the page of a folder of results."""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+import care_sim
+from care_sim.base.extras import vega_bundle
+from care_sim.base.files import HTML, replacing
+from care_sim.reports.formatting import counted
+from care_sim.reports.page.budget_charts import budget_charts
+from care_sim.reports.page.chart import Chart
+from care_sim.reports.page.crowding_charts import crowding_charts
+from care_sim.reports.page.episodes import Episode, chosen, played_again
+from care_sim.reports.page.fault_charts import fault_charts
+from care_sim.reports.page.listing import Group, groups, reel
+from care_sim.reports.page.protocol_charts import protocol_charts
+from care_sim.reports.page.provenance import Origin, origin
+from care_sim.reports.page.tables import blocks
+from care_sim.reports.report import reported
+from care_sim.reports.studies import Study
+from care_sim.reports.table import Table
+from care_sim.study.executors import ExecutorFactory, processes
+from care_sim.study.results_files import EPISODES
+from care_sim.study.task import Row
+
+CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
+    "sweep": budget_charts,
+    "paper": budget_charts,
+    "faults": fault_charts,
+    "crowding": crowding_charts,
+    "protocol": protocol_charts,
+}
+"""The interactive charts of the studies that have any."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a study makes of its rows."""
+
+    charts: Sequence[Chart]
+    tables: Sequence[Table]
+    closing: Sequence[str]
+
+    @classmethod
+    def of(cls, study: Study, rows: Sequence[Row]) -> "Findings":
+        """Charts, tables and closing sentences."""
+        charts = CHARTS.get(study.name, _no_charts)(rows)
+        return cls(charts, study.tables(rows), study.closing(rows))
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page shows of a study."""
+
+    name: str
+    study: Study
+    rows: Sequence[Row]
+    findings: Findings
+    origin: Origin
+    episodes: Sequence[Episode]
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether there are episodes to watch: in the open loop nothing reacts."""
+        return self.study.kind is EPISODES
+
+    def html(self) -> str:
+        """The page as one file."""
+        charts = self.findings.charts
+        return str(
+            _template().render(
+                page=self,
+                title=self.study.title,
+                version=care_sim.__version__,
+                charts=charts,
+                specs=_embedded([chart.spec for chart in charts]),
+                vega=Markup(vega_bundle()) if charts else "",
+                tables=[(table, blocks(table)) for table in self.findings.tables],
+                closing=self.findings.closing,
+                groups=self.groups(),
+                reel=_embedded(reel(self.episodes)),
+                asset=_asset,
+                counted=counted,
+            )
+        )
+
+    def groups(self) -> list[Group]:
+        """The episodes by setting; none in the open loop."""
+        return groups(self.rows, self.episodes) if self.closed_loop else []
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences about what is missing, or is not as it was."""
+        reasons = Counter(episode.ending for episode in self.episodes if isinstance(episode.ending, str))
+        unplayable = [f"Episodes that cannot be played again: {count} ({reason})." for reason, count in reasons.items()]
+        otherwise = [f"Episodes that end otherwise when played again here, which are marked: {self.differing}."]
+        return [*self.origin.missing, *unplayable, *(otherwise if self.differing else [])]
+
+    @property
+    def watchable(self) -> int:
+        """How many episodes were played again."""
+        return sum(episode.replay is not None for episode in self.episodes)
+
+    @property
+    def identical(self) -> int:
+        """How many of them fired, measured and moved as in the results."""
+        return sum(episode.identical for episode in self.episodes)
+
+    @property
+    def differing(self) -> int:
+        """How many of them ended otherwise."""
+        return sum(bool(episode.differences) for episode in self.episodes)
+
+
+def write_page(folder: Path, path: Path, most: int, workers: int, make_executor: ExecutorFactory = processes) -> Page:
+    """Write the page of a folder of results, with at most so many episodes to watch, to `path`.
+
+    Raises InvalidInput where there are no results, and MissingExtra without the libraries.
+    """
+    rows, study, left_out = reported(folder)
+    with replacing(path, HTML) as unfinished:
+        findings, about = Findings.of(study, rows), origin(folder, rows, study.kind, left_out)
+        watched = chosen(rows, most) if study.kind is EPISODES else []
+        if watched:
+            print(f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr)
+        episodes = played_again(watched, workers, make_executor)
+        page = Page(folder.resolve().name, study, rows, findings, about, episodes)
+        unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")
+    return page
+
+
+def _no_charts(_rows: Sequence[Row]) -> list[Chart]:
+    return []
+
+
+def _template() -> Any:
+    loader = PackageLoader("care_sim.reports.page", "assets")
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("page.html")
+
+
+def _asset(name: str) -> Markup:
+    """A file of the page as it stands."""
+    return Markup(resources.files("care_sim.reports.page").joinpath("assets", name).read_text(encoding="utf-8"))
+
+
+def _embedded(data: Any) -> Markup:
+    """Plain data for a script element, whose end no text in it can be."""
+    return Markup(json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))

@@ -1,0 +1,96 @@
+"""The episodes of a page: which are played again, and whether they go as they went when the results were made."""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor, Future
+from dataclasses import dataclass
+
+from care_sim.core.types import Outcome
+from care_sim.reports.page.replay import Replay, replayed
+from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
+from care_sim.study.episode_play import answer
+from care_sim.study.executors import ExecutorFactory, processes
+from care_sim.study.parameters import Parameters
+from care_sim.study.runner import DIED
+from care_sim.study.task import Row
+
+TOLERANCE = 1e-6
+"""Machines of different kinds may differ in the last bits."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A row of the results and its replay, or in one line why there is none."""
+
+    row: Row
+    ending: Replay | str
+
+    @property
+    def replay(self) -> Replay | None:
+        """None of an episode that could not be played."""
+        return self.ending if isinstance(self.ending, Replay) else None
+
+    @property
+    def identical(self) -> bool:
+        """Whether the replay fired, measured and moved as the episode did (its hash), and ends as the row does."""
+        if self.replay is None or self.differences:
+            return False
+        return bool(self.replay.row["episode_hash"] == self.row.get("episode_hash"))
+
+    @property
+    def differences(self) -> list[str]:
+        """The outcomes in which the replay departs from the row, each as NAME THEN -> NOW."""
+        if self.replay is None:
+            return []
+        pairs = {name: (self.row[name], self.replay.row[name]) for name in Outcome.__dataclass_fields__}
+        return [f"{name} {_text(was)} → {_text(now)}" for name, (was, now) in pairs.items() if not _equal(was, now)]
+
+
+def chosen(rows: Sequence[Row], most: int) -> list[Row]:
+    """At most so many rows: those of the first seed, then of the next, so that policies are seen side by side."""
+    return sorted(rows, key=lambda row: row["seed"])[:most]
+
+
+def played_again(rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes) -> list[Episode]:
+    """Play the episodes of rows again, in processes. An interrupt does not wait for those that have not begun."""
+    if not rows:
+        return []
+    executor = make_executor(min(workers, len(rows)))
+    try:
+        futures = [executor.submit(answer, _replay_of, row) for row in rows]
+        return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def config_of(row: Row) -> EpisodeConfig:
+    """The configuration that a row was played with. Raises InvalidInput for one that this version does not accept."""
+    plain = {name: row[name] for name in PLAIN_FIELDS}
+    scenario, policy = (_parameters(row, kind) for kind in ("scenario", "policy"))
+    return EpisodeConfig(**plain, scenario_parameters=scenario, policy_parameters=policy)
+
+
+def _parameters(row: Row, kind: str) -> Parameters:
+    named = ((name.removeprefix(f"{kind}."), value) for name, value in row.items() if name.startswith(f"{kind}."))
+    return tuple((name, value) for name, value in named if value is not None)
+
+
+def _replay_of(row: Row) -> Replay:
+    return replayed(config_of(row))
+
+
+def _ending(future: Future[Replay | str]) -> Replay | str:
+    try:
+        return future.result()
+    except BrokenExecutor:
+        return DIED
+
+
+def _equal(was: object, now: object) -> bool:
+    if isinstance(was, float) and isinstance(now, float):
+        return math.isclose(was, now, rel_tol=TOLERANCE, abs_tol=TOLERANCE)
+    return was == now
+
+
+def _text(value: object) -> str:
+    return f"{value:.2f}" if isinstance(value, float) else "none" if value is None else f"{value}"

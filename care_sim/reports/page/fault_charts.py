@@ -1,0 +1,88 @@
+"""The charts of the fault study: what a measure does as every fault grows, a panel a fault."""
+
+import math
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import altair as alt
+
+from care_sim.reports.cells import Played
+from care_sim.reports.figures.faults import MEASURES, Measure
+from care_sim.reports.figures.styles import FULL, styles
+from care_sim.reports.formatting import counted
+from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Look, inline, specification
+from care_sim.reports.tables.faults import FAULTS, PLACES, policies_of
+from care_sim.study.designs.levels import Place
+from care_sim.study.task import Row
+
+LARGEST, LEAST = 220.0, 15.0
+"""Areas of the marks, in square pixels, of the first policy and of one after the last."""
+
+
+def fault_charts(rows: Sequence[Row]) -> list[Chart]:
+    """A chart for every place and measure."""
+    played = Played(rows)
+    return [_chart(played, place, measure) for place, measure in product(PLACES, MEASURES)]
+
+
+def _chart(played: Played, place: Place, measure: Measure) -> Chart:
+    names = policies_of(played)
+    known = styles((policy, played.tags.get(policy, ())) for policy in names if policy != "full") | {"full": FULL}
+    drawn = {played.marked(policy): style for policy, style in known.items()}
+    look = Look.of_styles(drawn)
+    ratio = (LEAST / LARGEST) ** (1 / len(names))
+    values = [
+        value | {"area": round(LARGEST * ratio**number, 1)}
+        for number, policy in enumerate(names)
+        for value in _values(played, place, measure, policy)
+    ]
+    strengths = sorted({value["level"] for value in values}, key=float)
+    base = alt.Chart().encode(
+        x=alt.X("level:O", sort=strengths, title=None, axis=alt.Axis(labelAngle=0)),
+        y=alt.Y("value:Q", title=None),
+        color=look.colour,
+        opacity=look.opacity,
+    )
+    missed = base.transform_filter("datum.value == null").encode(y=alt.datum(0))
+    nested = alt.Size("area:Q", scale=None, legend=None)
+    about = [alt.Tooltip(f"{name}:N") for name in ("policy", "fault", "level")] + [alt.Tooltip("text:N", title="value")]
+    layers = alt.layer(
+        base.mark_line(strokeWidth=1.5).encode(strokeDash=look.dash),
+        base.mark_point(filled=True).encode(shape=look.shape, size=nested, tooltip=about),
+        missed.mark_point(filled=False).encode(shape=look.shape, size=nested, tooltip=about),
+    ).properties(width=PANEL_WIDTH, height=110)
+    header = alt.Header(title=None, labelAnchor="start", labelExpr="split(datum.value, ', ')", labelFontSize=11)
+    faults = [fault.label for fault in FAULTS]
+    chart = layers.facet(
+        facet=alt.Facet("fault:N", sort=faults, header=header), columns=5, data=inline(values)
+    ).resolve_scale(x="independent")
+    seeds = counted(len({row["seed"] for row in played.rows}), "seed")
+    apart = "Marks of later policies are smaller, so that equal ones stay visible."
+    hollow = "Hollow, at the bottom: the median is an actor that was not detected."
+    return Chart(
+        f"{place}: {measure.label}, {seeds}",
+        f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a policy.",
+        (apart, *([hollow] if any(value["value"] is None for value in values) else []), *played.notes(played.policies)),
+        specification(chart.add_params(look.chosen)),
+    )
+
+
+def _values(played: Played, place: Place, measure: Measure, policy: str) -> list[dict[str, Any]]:
+    """The points of a policy at every strength that was played."""
+    found = [
+        (fault, level.label, measure.value(played.cell(level.key(place, policy))))
+        for fault in FAULTS
+        for level in fault.levels
+    ]
+    return [
+        {
+            "policy": played.marked(policy),
+            "fault": fault.label,
+            "level": label,
+            "value": None if math.isnan(value) else round(value, 3),
+            "text": "not detected" if math.isnan(value) else f"{value:.1f}",
+        }
+        for fault, label, value in found
+        if value is not None
+    ]

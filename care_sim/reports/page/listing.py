@@ -1,0 +1,111 @@
+"""The episodes of a page as it lists them: setting by setting a line a configuration, an entry a seed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from care_sim.reports.formatting import marked, percent
+from care_sim.reports.page.episodes import Episode
+from care_sim.reports.page.replay import packed
+from care_sim.reports.summary import Setting, policy_of, setting_of, tags_of_row
+from care_sim.study.task import Row
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an entry says of an episode; `number` of the replay in the page, None without."""
+
+    text: str
+    about: str
+    collision: bool
+    differs: bool
+    number: int | None
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A policy at a budget, and its outcomes by seed; None for a seed that was not played."""
+
+    policy: str
+    budget: str
+    outcomes: tuple[Outcome | None, ...]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The configurations of a setting, and their seeds; `watchable` counts the episodes that can be watched."""
+
+    label: str
+    seeds: tuple[int, ...]
+    configurations: tuple[Configuration, ...]
+    watchable: int
+
+
+def groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Group]:
+    """All rows by setting; `episodes` are those of them that were played again, in the order of `reel`."""
+    held = {_place(episode.row): (number, episode) for number, episode in enumerate(_watchable(episodes))}
+    by_setting: dict[Setting, list[Row]] = {}
+    for row in rows:
+        by_setting.setdefault(setting_of(row), []).append(row)
+    return [_group(setting, own, held) for setting, own in by_setting.items()]
+
+
+def reel(episodes: Sequence[Episode]) -> dict[str, Any]:
+    """What `play.js` plays: every replay, and the standing bodies that several share."""
+    shared: dict[str, int] = {}
+    worlds: dict[Any, int] = {}
+    played = []
+    for episode in _watchable(episodes):
+        assert episode.replay is not None
+        bodies, row = episode.replay.bodies, episode.row
+        played.append(
+            {
+                "policy": f"{marked(policy_of(row), tags_of_row(row))} {percent(row['budget'])}",
+                "setting": setting_of(row).label,
+                "seed": row["seed"],
+                "world": worlds.setdefault(_world(row), len(worlds)),
+                "bodies": shared.setdefault(repr(bodies), len(shared)),
+                "standing": bodies,
+                "differences": episode.differences,
+                "story": packed(episode.replay.story),
+            }
+        )
+    bodies_of = {one["bodies"]: one.pop("standing") for one in played}
+    return {"bodies": [bodies_of[number] for number in sorted(bodies_of)], "episodes": played}
+
+
+def _watchable(episodes: Sequence[Episode]) -> list[Episode]:
+    return [episode for episode in episodes if episode.replay]
+
+
+def _group(setting: Setting, rows: Sequence[Row], held: dict[Any, tuple[int, Episode]]) -> Group:
+    seeds = sorted({row["seed"] for row in rows})
+    lines: dict[tuple[str, str], dict[int, Outcome]] = {}
+    for row in rows:
+        key = marked(policy_of(row), tags_of_row(row)), percent(row["budget"])
+        lines.setdefault(key, {})[row["seed"]] = _outcome(row, *held.get(_place(row), (None, None)))
+    configurations = [Configuration(*key, tuple(map(own.get, seeds))) for key, own in lines.items()]
+    watchable = sum(_place(row) in held for row in rows)
+    return Group(setting.label, tuple(seeds), tuple(configurations), watchable)
+
+
+def _outcome(row: Row, number: int | None, episode: Episode | None) -> Outcome:
+    distance = row["detection_distance_m"]
+    said = [
+        "never detected" if distance is None else f"first detected at {distance:.1f} m",
+        "braked" if row["braked"] else "did not brake",
+        *(["collided"] if row["collision"] else []),
+    ]
+    differs = bool(episode and episode.differences)
+    text = "never" if distance is None else f"{distance:.1f}"
+    return Outcome(text, ", ".join(said), row["collision"], differs, number)
+
+
+def _place(row: Row) -> tuple[Any, ...]:
+    return setting_of(row), policy_of(row), row["budget"], row["seed"]
+
+
+def _world(row: Row) -> tuple[Any, ...]:
+    """What two episodes share that can be watched side by side."""
+    physics = sorted((name, repr(value)) for name, value in row.items() if name.startswith("scenario.") and value)
+    return row["scenario"], tuple(physics), row["seed"]

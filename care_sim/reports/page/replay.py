@@ -1,0 +1,166 @@
+"""An episode played again to be watched: what moved, what the camera and the LiDAR saw, and what the policy knew.
+
+Everything is in the world frame and in whole numbers, lengths in centimetres and angles in milliradians, so that an
+episode takes a few kilobytes.
+"""
+
+import base64
+import json
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.frames import Floats, Pose
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.residual import explained
+from care_sim.core.types import CLASSES, ImageDetections, Keyframe, Rig
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_play import trace
+from care_sim.study.task import Row
+from care_sim.world.world import Actor
+
+SECTORS = 128
+"""Directions of the picture in which fired cells are counted, from azimuth -pi on."""
+DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
+"""How full a sector is, is written as one digit, from none of its cells to all of them."""
+CENTI, MILLI = 100, 1000
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A replayed episode: its row, and its story as plain data that `play.js` draws.
+
+    `bodies` are those that stand still, in a list of their own because many episodes share it.
+    """
+
+    row: Row
+    bodies: list[dict[str, Any]]
+    story: dict[str, Any]
+
+
+def replayed(config: EpisodeConfig) -> Replay:
+    """Play an episode and write down its story."""
+    recorder = Recorder()
+    row, keyframes = trace(config, recorder.after, begin=recorder.before)
+    bodies = recorder.bodies()
+    standing = [body for body in bodies if "poses" not in body]
+    moving = [body for body in bodies if "poses" in body]
+    return Replay(row, standing, {"moving": moving, **recorder.story(), **_flags(keyframes)})
+
+
+def packed(story: dict[str, Any]) -> str:
+    """Plain data as deflated JSON in base64."""
+    return base64.b64encode(zlib.compress(json.dumps(story, separators=(",", ":")).encode(), 9)).decode()
+
+
+@dataclass
+class Recorder:
+    """Watches an episode. A moment is what there is before a keyframe; the last one is after the last keyframe."""
+
+    actors: Sequence[Actor] = ()
+    first_sighting: Actor | None = None
+    ego_size: tuple[float, ...] = ()
+    poses: list[list[Pose]] = field(default_factory=list)
+    moments: list[dict[str, Any]] = field(default_factory=list)
+    rays: list[str] = field(default_factory=list)
+    tracked: dict[int, list[Any]] = field(default_factory=dict)
+
+    def before(self, loop: ClosedLoop) -> None:
+        """Take down the world and the belief at the start."""
+        self.actors, self.first_sighting = loop.world.actors, loop.world.first_sighting
+        self.ego_size = loop.world.ego_kind.size
+        self._take(loop)
+
+    def after(self, loop: ClosedLoop, frame: Keyframe) -> None:
+        """Take down what a keyframe fired, and what there is after it."""
+        self.rays.append(fullness(frame.fired, loop.rig.grid))
+        self._take(loop)
+
+    def bodies(self) -> list[dict[str, Any]]:
+        """Name, class, size and place of every body; `poses` of those that move."""
+        return [self._body(number, actor) for number, actor in enumerate(self.actors)]
+
+    def story(self) -> dict[str, Any]:
+        """What was taken down, a list a column."""
+        columns = {name: [moment[name] for moment in self.moments] for name in self.moments[0]}
+        ego = {"size": _whole(np.array(self.ego_size[:2]), CENTI), "sensor": _whole(LIDAR_POSITION[0], CENTI)}
+        return {"ego": ego, "tracked": self.tracked, "rays": self.rays, **columns}
+
+    def _take(self, loop: ClosedLoop) -> None:
+        world, tracks = loop.world, loop.belief.tracks
+        self.poses.append([actor.pose_at(world.time) for actor in self.actors])
+        places = loop.sensor.boxes_to_world(tracks.boxes)
+        moves = loop.sensor.vectors_to_world(np.column_stack([tracks.velocities, np.zeros(len(tracks))]))
+        for track, label, box in zip(tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True):
+            self.tracked[track] = [CLASSES[label], *_whole(box[3:5], CENTI)]
+        columns = [tracks.ids[:, None], _poses(places[:, [0, 1, 6]]), _whole_array(moves[:, :2], CENTI)]
+        self.moments.append(
+            {
+                "time": _whole(world.time, CENTI),
+                "place": _poses(np.array([world.ego.pose]))[0].tolist(),
+                "speed": _whole(loop.world.ego_motion.speed, CENTI),
+                "tracks": np.column_stack([*columns, tracks.misses > 0]).tolist(),
+                "camera": sightlines(
+                    loop.belief.detections, explained(loop.belief.detections, tracks, loop.rig), loop.rig
+                ),
+                "seen": "".join(str(int(loop.picture.shows(actor.body))) for actor in self.actors),
+            }
+        )
+
+    def _body(self, number: int, actor: Actor) -> dict[str, Any]:
+        poses = _poses(np.array([moment[number] for moment in self.poses]))
+        about = {
+            "n": number,
+            "kind": actor.kind.name,
+            "size": _whole(np.array(actor.kind.size[:2]), CENTI),
+            "reported": actor.label is not None,
+            "sought": actor is self.first_sighting,
+        }
+        still = bool((poses == poses[0]).all())
+        return about | ({"pose": poses[0].tolist()} if still else {"poses": poses.tolist()})
+
+
+def fullness(fired: Cells, grid: AngularGrid) -> str:
+    """How much of every sector fires, a digit a sector."""
+    width = grid.columns // SECTORS
+    counts = np.bincount(np.asarray(fired) % grid.columns // width, minlength=SECTORS)
+    return "".join(DIGITS[round(digit)] for digit in (counts / (width * grid.rows) * (len(DIGITS) - 1)).tolist())
+
+
+def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) -> list[list[int]]:
+    """The left and right azimuth of every camera box in the sensor frame, and 1 where a track explains it."""
+    lines = []
+    for number, (left, _, right, _) in enumerate(detections.boxes.tolist()):
+        camera = rig.cameras[int(detections.cameras[number])]
+        ends = camera.rays(np.array([[left, camera.height / 2], [right, camera.height / 2]]))
+        azimuths = np.arctan2(ends[:, 1], ends[:, 0]) - detections.yaw_changes[number]
+        lines.append([*_whole(azimuths, MILLI), int(known[number])])
+    return lines
+
+
+def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
+    """What the keyframes tell, a column each."""
+    switches = {"in_view": "in_view", "found": "detected", "brake": "braking"}
+    written = {key: "".join(str(int(getattr(f, name))) for f in keyframes) for key, name in switches.items()}
+    distances = [_whole(f.distance_m, CENTI) if np.isfinite(f.distance_m) else None for f in keyframes]
+    contact = next((f.index for f in keyframes if f.impact_speed_mps is not None), None)
+    return {**written, "distance": distances, "contact": contact}
+
+
+def _poses(poses: Floats) -> NDArray[np.int64]:
+    """Places in centimetres and headings in milliradians, (n, 3)."""
+    return _whole_array(poses * (CENTI, CENTI, MILLI), 1)
+
+
+def _whole_array(values: Floats, scale: int) -> NDArray[np.int64]:
+    return np.rint(values * scale).astype(np.int64)
+
+
+def _whole(values: Any, scale: int) -> Any:
+    return _whole_array(np.asarray(values, float), scale).tolist()

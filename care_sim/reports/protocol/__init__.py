@@ -1,0 +1,1 @@
+"""Tables of the first-sighting protocol of the open loop."""

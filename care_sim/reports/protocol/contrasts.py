@@ -1,0 +1,75 @@
+"""The paper's Table 1, CARE less every policy, and every policy less history: what a new idea adds to either."""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.protocol.differences import RATIOS, Gap, Pair
+from care_sim.reports.protocol.formatting import PAPER, whole
+from care_sim.reports.protocol.notes import UNITS, left_out, on_intervals, papers, played
+from care_sim.reports.protocol.paper import statements_about
+from care_sim.reports.protocol.rows import HISTORY, Plays
+from care_sim.reports.table import Table
+from care_sim.study.task import REFERENCE
+
+TITLES = {REFERENCE: f"{REFERENCE} minus each policy", HISTORY: f"each policy minus {HISTORY}"}
+HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}
+"""What stands above the names of the policies that the base is compared with."""
+
+
+class Contrast(NamedTuple):
+    """A pair, named by the one of its policies that is not the base, and its differences at every budget."""
+
+    policy: str
+    pair: Pair
+    gaps: list[Gap | None]
+
+
+def contrast_tables(plays: Plays) -> list[Table]:
+    """CARE less every other policy, every policy less history, and CARE's with equal weight to every scene; none of a
+    base that was not played, or alone.
+    """
+    wanted = ((REFERENCE, False), (HISTORY, False), (REFERENCE, True))
+    return [_table(plays, base, alike) for base, alike in wanted if plays.other_than(base)]
+
+
+def _table(plays: Plays, base: str, alike: bool) -> Table:
+    contrasts = list(_contrasts(plays, base, alike))
+    said = statements_about(plays.setting)
+    intervals = on_intervals(gap for contrast in contrasts for gap in contrast.gaps)
+    weights = ", equal scene weights" if alike else ""
+    return Table(
+        f"{plays.setting.label}: {TITLES[base]}{weights}",
+        (HEADS[base], *map(percent, plays.budgets)),
+        tuple(_lines(plays, contrasts)),
+        (f"{UNITS} {played(plays)}", *intervals, *left_out(plays), *tag_notes(plays.tags.values())),
+        papers(
+            said[contrast.pair].source
+            for contrast in contrasts
+            if contrast.pair in said and said[contrast.pair].among(plays.budgets)
+        ),
+        terminal=not alike,
+    )
+
+
+def _contrasts(plays: Plays, base: str, alike: bool) -> Iterator[Contrast]:
+    """CARE stands first in its pairs, history last."""
+    for ratio in RATIOS:
+        for policy in plays.other_than(base):
+            first, second = (base, policy) if base == REFERENCE else (policy, base)
+            pair = Pair(first, second, ratio, alike=alike)
+            yield Contrast(policy, pair, [pair.gap(plays, budget) for budget in plays.budgets])
+
+
+def _lines(plays: Plays, contrasts: Iterable[Contrast]) -> Iterator[tuple[str, ...]]:
+    """The differences at every budget, and under them the paper's, below the headings of the measures."""
+    heading = ""
+    for policy, pair, gaps in contrasts:
+        if pair.heading != heading:
+            heading = pair.heading
+            yield (heading,)
+        if any(gaps):
+            yield (marked(policy, plays.tags[policy]), *map(whole, gaps))
+            said = statements_about(plays.setting).get(pair)
+            if said and (entries := said.among(plays.budgets)):
+                yield (PAPER, *entries)

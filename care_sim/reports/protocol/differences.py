@@ -1,0 +1,181 @@
+"""How much more one policy found than another, and how sure that is: by scenes, or where they are few by events."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from care_sim.core.frames import Floats
+from care_sim.evaluation.bootstrap import Interval, paired_difference
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.scene_contrasts import (
+    FIRST_SIGHTING,
+    OVERALL,
+    TTFD,
+    Ratio,
+    SceneContrast,
+    Tallies,
+    contrast,
+    contrast_gap,
+)
+from care_sim.reports.protocol.rows import Plays
+from care_sim.study.task import REFERENCE
+
+RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
+HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
+RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
+"""What the columns by which scenes are ranked count, a keyframe."""
+FEWEST_SCENES = 9
+"""Three in each third: of fewer, a third says nothing of crowded scenes but of one or two."""
+GAP = "dense minus sparse"
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A difference in the unit of `ratio`; `interval` is None where too little was played for one.
+
+    The interval comes from resampling scenes, or `over_events` from resampling the events of the scenes played.
+    """
+
+    ratio: Ratio
+    mean: float
+    interval: Interval | None
+    over_events: bool = False
+
+    @property
+    def sign(self) -> int:
+        """1 or -1 where the interval excludes zero, else 0."""
+        return 0 if self.interval is None else int(self.interval.low > 0) - int(self.interval.high < 0)
+
+
+class Compared(Protocol):
+    """Anything that can be measured of a setting at a budget and set beside what the paper says of it."""
+
+    @property
+    def heading(self) -> str:
+        """What is measured."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """What is compared."""
+        ...
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """The policies that it takes."""
+        ...
+
+    def gap(self, plays: Plays, budget: float) -> Gap | None:
+        """What was measured, None without plays."""
+        ...
+
+
+@dataclass(frozen=True)
+class Pair:
+    """`first` less `second`, of all or `within` one stratum; with `alike` every scene weighs the same."""
+
+    first: str
+    second: str
+    ratio: Ratio
+    within: str = ""
+    alike: bool = False
+
+    @property
+    def heading(self) -> str:
+        """The measure, the stratum, the weights."""
+        within = [self.within.partition("/")[2]] if self.within else []
+        return ", ".join([HEADINGS[self.ratio], *within, *(["equal scenes"] if self.alike else [])])
+
+    @property
+    def label(self) -> str:
+        """The two policies."""
+        return f"{self.first} minus {self.second}"
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """The two policies."""
+        return self.first, self.second
+
+    def gap(self, plays: Plays, budget: float) -> Gap | None:
+        """Paired by scene, on the scenes that both policies have."""
+        found = self._contrast(plays, budget)
+        if found is None:
+            return None
+        by = found.by_scene if self.alike else found.by_event
+        if found.scenes >= FEWEST_PAIRS:
+            return Gap(self.ratio, by.mean, by)
+        by_events = None if self.within or self.alike else _by_events(self, plays, budget)
+        return Gap(self.ratio, by.mean, by_events, over_events=by_events is not None)
+
+    def _contrast(self, plays: Plays, budget: float) -> SceneContrast | None:
+        ours, theirs = (plays.tallies(policy, budget, self.within) for policy in self.policies)
+        return contrast(self.ratio, ours, theirs)
+
+
+@dataclass(frozen=True)
+class Third:
+    """CARE less all-camera in a third of the scenes (paper, Sec. 5.2), or in the dense third less the sparse.
+
+    `ranked_by` is the column of CARE's plays by which scenes are ranked.
+    """
+
+    which: str
+    ranked_by: str
+    ratio: Ratio
+    policies = (REFERENCE, "all-camera")
+
+    @property
+    def heading(self) -> str:
+        """The measure, and what scenes are ranked by."""
+        return f"{HEADINGS[self.ratio]}, by {self.ranked_by}"
+
+    @property
+    def label(self) -> str:
+        """The third."""
+        return self.which if self.which == GAP else f"{self.which} third"
+
+    def gap(self, plays: Plays, budget: float) -> Gap | None:
+        """None with fewer than three scenes a third."""
+        groups = plays.thirds(self.ranked_by, budget)
+        if sum(map(len, groups.values())) < FEWEST_SCENES:
+            return None
+        ours, theirs = (plays.tallies(policy, budget) for policy in self.policies)
+        if self.which != GAP:
+            return _among(self.ratio, {name: ours[name] for name in groups[self.which]}, theirs)
+        return _dense_less_sparse(self.ratio, ours, theirs, groups)
+
+
+def _among(ratio: Ratio, ours: Tallies, theirs: Tallies) -> Gap | None:
+    found = contrast(ratio, ours, theirs)
+    if found is None:
+        return None
+    return Gap(ratio, found.by_event.mean, found.by_event if found.scenes >= FEWEST_PAIRS else None)
+
+
+def _dense_less_sparse(ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Mapping[str, Sequence[str]]) -> Gap | None:
+    interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
+    if interval is None:
+        return None
+    ends = [_among(ratio, {name: ours[name] for name in groups[which]}, theirs) for which in ("dense", "sparse")]
+    enough = all(end and end.interval for end in ends)
+    return Gap(ratio, interval.mean, interval if enough else None)
+
+
+def _by_events(pair: Pair, plays: Plays, budget: float) -> Interval | None:
+    """The interval from resampling events, paired and averaged over floor seeds; overall recall has none."""
+    if pair.ratio is OVERALL:
+        return None
+    scenes = sorted(set(plays.tallies(pair.first, budget)) & set(plays.tallies(pair.second, budget)))
+    ours, theirs = (
+        np.concatenate([_of_events(pair.ratio, plays.delays(policy, budget, scene)) for scene in scenes])
+        for policy in pair.policies
+    )
+    return paired_difference(ours, theirs) if len(ours) >= FEWEST_PAIRS else None
+
+
+def _of_events(ratio: Ratio, delays: Floats) -> Floats:
+    """(e,) the measure of every event, from (floor seeds, e) TTFD."""
+    means: Floats = np.mean(delays if ratio is TTFD else ratio.scale * (delays == 0), axis=0)
+    return means

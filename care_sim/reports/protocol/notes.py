@@ -1,0 +1,88 @@
+"""What stands under the protocol's tables: how much was played, what is missing, where the paper's numbers stand."""
+
+from collections.abc import Collection, Iterable, Iterator
+
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.recall import Tally
+from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
+from care_sim.reports.formatting import percent
+from care_sim.reports.protocol.differences import Gap
+from care_sim.reports.protocol.formatting import OVER_EVENTS
+from care_sim.reports.protocol.rows import Plays
+from care_sim.study.task import FULL, Row
+
+UNITS = "Recall in points; TTFD in keyframes, where less is better."
+BY_EVENTS = (
+    f"{OVER_EVENTS}: fewer than {FEWEST_PAIRS} scenes have events and plays of both policies, too few for an interval "
+    "over scenes. This one comes from resampling events, paired and averaged over floor seeds; events of one scene are "
+    "not independent, so it is too narrow, and it speaks for these drives alone."
+)
+NO_INTERVAL = (
+    f"Without an interval: fewer than {FEWEST_PAIRS} scenes, in a measure for which events are not resampled (overall "
+    f"recall, strata, equal scene weights, thirds) or with fewer than {FEWEST_PAIRS} events."
+)
+
+
+def played(plays: Plays) -> str:
+    """Scenes, events, object frames and floor seeds."""
+    total = counts(plays.scenes.values())
+    seeds = {len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets}
+    return (
+        f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} object frames; "
+        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene.{by_both_counts(plays.scenes.values())}"
+    )
+
+
+def by_both_counts(scenes: Collection[Row]) -> str:
+    """How many events there are by the other presence, given one row of every scene; nothing where rows do not tell."""
+    if any(row.get("emerging") is None for row in scenes):
+        return ""
+    emerging = sum(row["emerging"] for row in scenes)
+    if any(row.get("presence") == VISIBLE for row in scenes):
+        return (
+            f" Of the events, {emerging:,} are of objects that were hidden within range at scene start, which "
+            f"presence {ANNOTATED} does not count."
+        )
+    return (
+        f" {_several(emerging, 'object')} hidden within range at scene start {'is' if emerging == 1 else 'are'} no "
+        f"event; presence {VISIBLE} counts them too, {counts(scenes).events + emerging:,.0f} in all."
+    )
+
+
+def counts(scenes: Iterable[Row]) -> Tally:
+    """Events and object frames, given one row of every scene."""
+    return sum((Tally(events=row["events"], frames=row["frames"]) for row in scenes), Tally())
+
+
+def on_intervals(gaps: Iterable[Gap | None]) -> tuple[str, ...]:
+    """What to know of the intervals of the differences shown: which are over events, and why some have none."""
+    shown = [gap for gap in gaps if gap]
+    by_events = (BY_EVENTS,) if any(gap.over_events for gap in shown) else ()
+    return (*by_events, NO_INTERVAL) if any(gap.interval is None for gap in shown) else by_events
+
+
+def left_out(plays: Plays) -> tuple[str, ...]:
+    """How many scenes lack a play of a policy, which are therefore out of its levels and contrasts."""
+    missing = list(_missing(plays))
+    if not missing:
+        return ()
+    return (f"Left out where a play is missing, of {_several(len(plays.scenes), 'scene')}: {'; '.join(missing)}.",)
+
+
+def papers(sources: Iterable[str]) -> tuple[str, ...]:
+    """The paper's sentences, each once."""
+    return tuple(f'Paper: "{source}"' for source in dict.fromkeys(sources))
+
+
+def _missing(plays: Plays) -> Iterator[str]:
+    for policy in plays.policies:
+        lacking = {budget: len(plays.scenes) - len(plays.tallies(policy, budget)) for budget in plays.budgets}
+        listed = [f"{count} at {percent(budget)}" for budget, count in lacking.items() if count]
+        if listed:
+            yield f"{policy} {', '.join(listed)}"
+    if plays.full and (count := len(plays.scenes) - len(plays.tallies(FULL, 1.0))):
+        yield f"{FULL} {count}"
+
+
+def _several(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"

@@ -1,0 +1,189 @@
+"""The rows of the first-sighting protocol, one a play: setting by setting what each policy found of every scene."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import DEFAULTS, UNFELT_BY_FULL
+from care_sim.core.frames import Floats
+from care_sim.evaluation.allocation_differences import AllocationDifference
+from care_sim.evaluation.recall import Tally
+from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged, level
+from care_sim.evaluation.sightings import ANNOTATED
+from care_sim.evaluation.strata import thirds
+from care_sim.perception.listing import PROXY
+from care_sim.reports.summary import policy_of, tags_of_row, with_parameters
+from care_sim.study.task import FULL, REFERENCE, Row
+
+SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
+HISTORY = "history"
+"""The policy that every other is held against."""
+_USUAL = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {
+    "camera_detections": None,
+    "presence": ANNOTATED,
+}
+_COLUMNS = tuple(field.name for field in fields(Tally))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What plays that are compared have in common: films, detector, and the conditions that are not the default."""
+
+    source: str
+    detector: str
+    conditions: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def strict_causal(self) -> bool:
+        """Whether it is the paper's strict-causal variant (Sec. 3): the camera one keyframe old."""
+        return self.conditions == (("camera_latency", 1),)
+
+    @property
+    def label(self) -> str:
+        """A heading."""
+        changed = [f"{name.replace('_', ' ')} {value}" for name, value in self.conditions]
+        if self.strict_causal:
+            changed = ["strict-causal (camera one keyframe old)"]
+        return ", ".join([SOURCES.get(self.source, self.source), f"detector {self.detector}", *changed])
+
+    @property
+    def slug(self) -> str:
+        """A part of a file's name, beginning with the source."""
+        detector = [] if self.detector == PROXY else [self.detector]
+        changed = [f"{name}-{value}" for name, value in self.conditions]
+        text = "-".join([self.source, *detector, *changed])
+        return "".join(sign if sign.isalnum() or sign in ".-" else "-" for sign in text)
+
+    def for_full(self) -> "Setting":
+        """The setting in which the full scan of the same films is found."""
+        felt = (pair for pair in self.conditions if pair[0] not in UNFELT_BY_FULL)
+        return Setting(self.source, self.detector, tuple(felt))
+
+
+class Plays:
+    """The plays of one setting, floor seeds averaged per scene. Policies are named with their parameters.
+
+    `scenes` holds one row of every scene; `full` are the full scans of them, which may come from another setting.
+    """
+
+    def __init__(self, setting: Setting, rows: Sequence[Row], full: Sequence[Row] = ()):
+        self.setting = setting
+        self.scenes = {row["scene"]: row for row in rows}
+        self.full = tuple(row for row in full if row["scene"] in self.scenes)
+        budgeted = [row for row in rows if row["policy"] != FULL]
+        self.tags = {policy_of(row): tags_of_row(row) for row in budgeted}
+        self.budgets = sorted({row["budget"] for row in budgeted})
+        self._groups: dict[tuple[str, float], list[Row]] = {}
+        for row in budgeted:
+            self._groups.setdefault((policy_of(row), row["budget"]), []).append(row)
+        self._tallies: dict[tuple[str, float, str], Tallies] = {}
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """All but the full scan, in the order of their first rows."""
+        return tuple(self.tags)
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The policies that the reference is compared with; none where it was not played."""
+        return self.other_than(REFERENCE)
+
+    def other_than(self, base: str) -> tuple[str, ...]:
+        """All but one and the full scan; none where that one was not played."""
+        return tuple(policy for policy in self.tags if policy != base) if base in self.tags else ()
+
+    def rows(self, policy: str, budget: float) -> Sequence[Row]:
+        """The plays of a policy; the full scan has one budget."""
+        return self.full if policy == FULL else self._groups.get((policy, budget), ())
+
+    def seeds(self, policy: str, budget: float, within: str = "") -> list[Tallies]:
+        """The tallies of every floor seed, of all or of one stratum ("range/below 20 m")."""
+        prefix = f"{within}/" if within else ""
+        seeds: dict[int, dict[str, Tally]] = {}
+        for row in self.rows(policy, budget):
+            tally = Tally(*(row[f"{prefix}{column}"] for column in _COLUMNS))
+            seeds.setdefault(row["floor_seed"], {})[row["scene"]] = tally
+        return list(seeds.values())
+
+    def tallies(self, policy: str, budget: float, within: str = "") -> Tallies:
+        """The mean tally over floor seeds of every scene that was played with all of them."""
+        key = (policy, budget, within)
+        if key not in self._tallies:
+            self._tallies[key] = averaged(self.seeds(*key))
+        return self._tallies[key]
+
+    def level(self, ratio: Ratio, policy: str, budget: float, within: str = "") -> Level:
+        """A measure over all scenes of the policy."""
+        return level(ratio, self.tallies(policy, budget, within))
+
+    def delays(self, policy: str, budget: float, scene: str) -> Floats:
+        """(floor seeds, events) censored TTFD in keyframes of a scene's events."""
+        return np.array([row["ttfds"] for row in self.rows(policy, budget) if row["scene"] == scene], float)
+
+    def thirds(self, column: str, budget: float) -> dict[str, list[str]]:
+        """Scenes ranked by what the reference held there (`tracks`, `explained`), cut in three."""
+        return thirds(self.means(column, budget))
+
+    def means(self, column: str, budget: float) -> dict[str, float]:
+        """A column of the reference by scene, averaged over floor seeds."""
+        values: dict[str, list[float]] = {scene: [] for scene in self.tallies(REFERENCE, budget)}
+        for row in self.rows(REFERENCE, budget):
+            if row["scene"] in values:
+                values[row["scene"]].append(row[column])
+        return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
+
+    def difference(self, policy: str, budget: float) -> AllocationDifference:
+        """How its allocations differ from those of the reference, over all plays for which that is known."""
+        columns = ("keyframes", "differing_keyframes", "differing_cells")
+        known = [row for row in self.rows(policy, budget) if None not in (row[column] for column in columns)]
+        return AllocationDifference(*(int(sum(row[column] for row in known)) for column in columns))
+
+    def strata(self) -> dict[str, list[str]]:
+        """The labels of the strata by kind, as the rows name them."""
+        kinds: dict[str, list[str]] = {}
+        for kind, label in _strata_of(next(iter(self.scenes.values()))):
+            kinds.setdefault(kind, []).append(label)
+        return kinds
+
+
+def plays_of(rows: Sequence[Row]) -> list[Plays]:
+    """The plays of every setting in the order of their first rows; the full scan alone makes none where others do.
+
+    Raises InvalidInput where the plays of a scene are of two films, or one does not tell the TTFD of its events.
+    """
+    _check_films(rows)
+    groups: dict[Setting, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(setting_of(row), []).append(row)
+    full = {setting: [row for row in own if row["policy"] == FULL] for setting, own in groups.items()}
+    plays = [Plays(setting, own, full[setting] or full.get(setting.for_full(), ())) for setting, own in groups.items()]
+    return [each for each in plays if each.tags] or plays
+
+
+def setting_of(row: Row) -> Setting:
+    """The setting that a row belongs to; a condition that it has no column for is the usual one."""
+    changed = tuple((name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None))
+    return Setting(row["source"], with_parameters(row, "detector"), changed)
+
+
+def _check_films(rows: Sequence[Row]) -> None:
+    """The data of a source may have changed between two runs into one folder."""
+    films: dict[tuple[str, ...], str] = {}
+    for row in rows:
+        scene = (row["source"], row["scene"], row.get("camera_detections") or "")
+        if len(row["ttfds"]) != row["events"]:
+            raise InvalidInput(
+                f"a play of scene {row['scene']} has {len(row['ttfds'])} TTFD of {row['events']:g} events"
+            )
+        if films.setdefault(scene, row["film_hash"]) != row["film_hash"]:
+            raise InvalidInput(
+                f"the plays of scene {row['scene']} are of two films, its data changed between runs: take a new --out"
+            )
+
+
+def _strata_of(row: Row) -> list[tuple[str, str]]:
+    names = [name.split("/") for name in row if name.endswith("/events")]
+    return [(kind, label) for kind, label, _ in names]

@@ -1,0 +1,151 @@
+"""Where policies gain and what the residual filter changes: strata, thirds of scenes, and differing allocations."""
+
+from collections.abc import Iterator
+
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
+from care_sim.evaluation.strata import THIRDS
+from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.protocol.differences import FEWEST_SCENES, GAP, RANKINGS, Pair, Third
+from care_sim.reports.protocol.formatting import PAPER, whole, written
+from care_sim.reports.protocol.notes import UNITS, papers
+from care_sim.reports.protocol.paper import ALLOCATIONS, statements_about
+from care_sim.reports.protocol.rows import HISTORY, Plays
+from care_sim.reports.table import Table
+from care_sim.study.task import REFERENCE
+
+BASES = (HISTORY, "all-camera")
+"""The policies that strata compare CARE with."""
+RANKED = (
+    "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. No interval of "
+    f"fewer than {FEWEST_PAIRS} scenes."
+)
+NO_THIRDS = (
+    f"No thirds of the scenes by traffic: they take all-camera and at least {FEWEST_SCENES} scenes at every budget."
+)
+DIFFERING = (
+    "Share of the keyframes, and mean number of cells where they differ. Each policy follows its own tracks, so "
+    "differences accumulate over a scene."
+)
+
+
+def strata_tables(plays: Plays) -> list[Table]:
+    """Recall by range, azimuth and class: the level of every policy, and CARE less the others in `BASES`."""
+    if not plays.policies:
+        return []
+    columns = (*(marked(policy, tags) for policy, tags in plays.tags.items()), *(pair.label for pair in _pairs(plays)))
+    notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
+    without = (NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
+    return [
+        Table(
+            f"{plays.setting.label}: {ratio.name} by stratum",
+            ("stratum", "budget", counted, *columns),
+            tuple(_strata_lines(plays, ratio)),
+            (*notes, *more),
+            terminal=False,
+        )
+        for ratio, counted, more in ((FIRST_SIGHTING, "events", ()), (OVERALL, "object frames", without))
+    ]
+
+
+def _pairs(plays: Plays, ratio: Ratio = FIRST_SIGHTING, within: str = "") -> list[Pair]:
+    return [Pair(REFERENCE, base, ratio, within) for base in BASES if base in plays.others]
+
+
+def _on_strata(plays: Plays) -> tuple[str, ...]:
+    intervals = f"Intervals over scenes that have anything in the stratum, none of fewer than {FEWEST_PAIRS}."
+    return ("Levels in %.", *((intervals,) if _pairs(plays) else ()))
+
+
+def _strata_lines(plays: Plays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
+    for kind, labels in plays.strata().items():
+        yield (kind,)
+        for label in labels:
+            for budget in plays.budgets:
+                yield _stratum_line(plays, ratio, f"{kind}/{label}", budget)
+
+
+def _stratum_line(plays: Plays, ratio: Ratio, within: str, budget: float) -> tuple[str, ...]:
+    column = "events" if ratio is FIRST_SIGHTING else "frames"
+    levels = (plays.level(ratio, policy, budget, within).by_event for policy in plays.policies)
+    return (
+        within.partition("/")[2],
+        percent(budget),
+        f"{sum(row[f'{within}/{column}'] for row in plays.scenes.values()):,.0f}",
+        *(written(ratio, value) for value in levels),
+        *(whole(pair.gap(plays, budget)) for pair in _pairs(plays, ratio, within)),
+    )
+
+
+def thirds_tables(plays: Plays) -> list[Table]:
+    """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every budget."""
+    if not _has_thirds(plays):
+        return []
+    said = statements_about(plays.setting)
+    return [
+        Table(
+            f"{plays.setting.label}: care minus all-camera in thirds of the scenes",
+            ("third", *map(percent, plays.budgets)),
+            tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
+            (f"{UNITS} {RANKED}",),
+            papers(text.source for each, text in said.items() if isinstance(each, Third) and text.among(plays.budgets)),
+            terminal=False,
+        )
+    ]
+
+
+def _has_thirds(plays: Plays) -> bool:
+    third = Third(GAP, "tracks", OVERALL)
+    played = {*third.policies} <= {*plays.policies}
+    return played and all(third.gap(plays, budget) for budget in plays.budgets)
+
+
+def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
+    yield (f"{RANKINGS[column]} a keyframe",)
+    for name in reversed(THIRDS):
+        yield (f"{name} third", *(_mean_count(plays, column, name, budget) for budget in plays.budgets))
+    for ratio in (OVERALL, FIRST_SIGHTING):
+        thirds = [Third(which, column, ratio) for which in (*reversed(THIRDS), GAP)]
+        yield (thirds[0].heading,)
+        for third in thirds:
+            yield from _third_lines(plays, third)
+
+
+def _third_lines(plays: Plays, third: Third) -> Iterator[tuple[str, ...]]:
+    yield (third.label, *(whole(third.gap(plays, budget)) for budget in plays.budgets))
+    said = statements_about(plays.setting).get(third)
+    if said and (entries := said.among(plays.budgets)):
+        yield (PAPER, *entries)
+
+
+def _mean_count(plays: Plays, column: str, third: str, budget: float) -> str:
+    counts = plays.means(column, budget)
+    held = [counts[scene] for scene in plays.thirds(column, budget)[third]]
+    return f"{sum(held) / len(held):.1f}"
+
+
+def allocation_tables(plays: Plays) -> list[Table]:
+    """How often every policy fires other cells than CARE, and how many; none without CARE."""
+    if not plays.others:
+        return []
+    asked = {name: text for name, text in ALLOCATIONS.items() if name in plays.others and text.among(plays.budgets)}
+    said = {} if plays.setting.conditions else asked
+    lines: list[tuple[str, ...]] = []
+    for policy in plays.others:
+        lines.append((marked(policy, plays.tags[policy]), *(_differing(plays, policy, b) for b in plays.budgets)))
+        if policy in said:
+            lines.append((PAPER, *said[policy].among(plays.budgets)))
+    return [
+        Table(
+            f"{plays.setting.label}: keyframes on which the allocation differs from that of {REFERENCE}",
+            ("policy", *map(percent, plays.budgets)),
+            tuple(lines),
+            (DIFFERING, *tag_notes(plays.tags.values())),
+            papers(each.source for each in said.values()),
+        )
+    ]
+
+
+def _differing(plays: Plays, policy: str, budget: float) -> str:
+    found = plays.difference(policy, budget)
+    return f"{100 * found.share:.0f}%, {found.cells_where_differing:.0f} cells" if found.keyframes else ""

@@ -1,0 +1,112 @@
+"""Tables of the first-sighting protocol: those of levels, and all others in their order."""
+
+from collections.abc import Callable, Collection, Sequence
+
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, level
+from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.protocol.contrasts import contrast_tables
+from care_sim.reports.protocol.differences import RATIOS
+from care_sim.reports.protocol.formatting import PAPER, written
+from care_sim.reports.protocol.notes import left_out, papers
+from care_sim.reports.protocol.paper import LEVELS, LEVELS_SAID, Level
+from care_sim.reports.protocol.rows import Plays, plays_of
+from care_sim.reports.protocol.statements import statements_tables
+from care_sim.reports.protocol.strata import allocation_tables, strata_tables, thirds_tables
+from care_sim.reports.table import Table
+from care_sim.study.task import FULL, Row
+
+LEVEL_COLUMNS = (
+    "budget",
+    "policy",
+    "first sightings %",
+    "of full %",
+    "overall %",
+    "of full %",
+    "TTFD",
+    "equal scenes: first sightings %",
+    "equal scenes: overall %",
+    "equal scenes: TTFD",
+    "seeds: first sightings ±",
+    "seeds: overall ±",
+    "scenes",
+)
+LEVEL_FILES_ONLY = tuple(name for name in LEVEL_COLUMNS if ": " in name or name == "scenes")
+LEVEL_WHOLE = tuple(name for name in LEVEL_COLUMNS if name != "policy")
+
+
+def protocol_tables(rows: Sequence[Row]) -> list[Table]:
+    """All tables, one setting after the other."""
+    made: list[Callable[[Plays], list[Table]]] = [
+        contrast_tables,
+        levels_tables,
+        statements_tables,
+        strata_tables,
+        thirds_tables,
+        allocation_tables,
+    ]
+    return [table for plays in plays_of(rows) for make in made for table in make(plays)]
+
+
+def levels_tables(plays: Plays) -> list[Table]:
+    """Recall and TTFD of every policy and of the full scan, one line a policy and budget."""
+    ceiling = ((FULL, 1.0),) if plays.full else ()
+    budgeted = ((policy, budget) for budget in plays.budgets for policy in plays.policies)
+    keys = [key for key in (*budgeted, *ceiling) if plays.rows(*key)]
+    lines = [line for key in keys for line in _level_lines(plays, *key)]
+    missing = () if plays.full else ("Of full: the full scan was not played.",)
+    return [
+        Table(
+            f"{plays.setting.label}: levels",
+            LEVEL_COLUMNS,
+            tuple(lines),
+            (*missing, *left_out(plays), *tag_notes(plays.tags.values())),
+            papers(LEVELS_SAID) if any(line[1] == PAPER for line in lines) else (),
+            LEVEL_FILES_ONLY,
+            LEVEL_WHOLE,
+        )
+    ]
+
+
+def _level_lines(plays: Plays, policy: str, budget: float) -> list[tuple[str, ...]]:
+    first, overall, ttfd = (plays.level(ratio, policy, budget) for ratio in RATIOS)
+    line = (
+        percent(budget),
+        marked(policy, plays.tags.get(policy, ())),
+        written(FIRST_SIGHTING, first.by_event),
+        _of_full(plays, FIRST_SIGHTING, policy, budget),
+        written(OVERALL, overall.by_event),
+        _of_full(plays, OVERALL, policy, budget),
+        written(TTFD, ttfd.by_event),
+        written(FIRST_SIGHTING, first.by_scene),
+        written(OVERALL, overall.by_scene),
+        written(TTFD, ttfd.by_scene),
+        _deviation(plays, FIRST_SIGHTING, policy, budget),
+        _deviation(plays, OVERALL, policy, budget),
+        str(len(plays.tallies(policy, budget))),
+    )
+    said = None if plays.setting.conditions else LEVELS.get((policy, budget))
+    return [line, *([_said_line(said)] if said else [])]
+
+
+def _said_line(said: Level) -> tuple[str, ...]:
+    return ("", PAPER, *said, *("" for _ in LEVEL_FILES_ONLY))
+
+
+def _of_full(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
+    """Share of the ceiling in %, of the scenes that the policy and the full scan have."""
+    ours, full = plays.tallies(policy, budget), plays.tallies(FULL, 1.0)
+    value, ceiling = (_over(ratio, tallies, set(ours) & set(full)) for tallies in (ours, full))
+    return f"{100 * value / ceiling:.0f}" if value is not None and ceiling else ""
+
+
+def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | None:
+    return level(ratio, {scene: tallies[scene] for scene in scenes}).by_event
+
+
+def _deviation(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
+    """The most by which one floor seed differs from the mean, of the scenes that all seeds have."""
+    mean = plays.tallies(policy, budget)
+    seeds = [_over(ratio, seed, mean) for seed in plays.seeds(policy, budget)]
+    middle = _over(ratio, mean, mean)
+    off = [abs(value - middle) for value in seeds if value is not None and middle is not None]
+    return written(ratio, max(off)) if len(off) > 1 else ""

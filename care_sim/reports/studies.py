@@ -1,0 +1,133 @@
+"""The studies by name: what is shown of their rows."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from care_sim.base.errors import unknown
+from care_sim.reports.captions import CAPTION, COMPARED
+from care_sim.reports.figures import budget as budget_figure
+from care_sim.reports.figures import crowding as crowding_figure
+from care_sim.reports.figures import faults as faults_figure
+from care_sim.reports.figures.protocol import FIGURE_NAMES, protocol_figures
+from care_sim.reports.protocol.captions import PROTOCOL_CAPTION
+from care_sim.reports.protocol.closing import protocol_closing
+from care_sim.reports.protocol.tables import protocol_tables
+from care_sim.reports.table import Table
+from care_sim.reports.tables.ablations import ablation_tables
+from care_sim.reports.tables.crowding import COLUMN, crowding_tables
+from care_sim.reports.tables.faults import fault_tables
+from care_sim.reports.tables.paper_statements import statements
+from care_sim.reports.tables.sweep import sweep_tables
+from care_sim.study.designs.paper import NO_COLLISION
+from care_sim.study.results_files import EPISODES, PLAYS, Kind
+from care_sim.study.row_schema import COUNT, Column, Schema
+from care_sim.study.rows import read_notes
+from care_sim.study.task import Row
+
+
+@dataclass(frozen=True)
+class Study:
+    """How the rows of a study are shown: all pure functions of them.
+
+    `title` names it to readers; `closing` are sentences after the tables; `figure_names` every figure that the study
+    can draw, as patterns in which a * stands for any text; `caption` says how to read its tables; `kind` is what it
+    plays; `columns` are further ones that its tables need.
+    """
+
+    name: str
+    title: str
+    tables: Callable[[Sequence[Row]], list[Table]]
+    figures: Callable[[Sequence[Row]], dict[str, Figure]]
+    closing: Callable[[Sequence[Row]], list[str]]
+    figure_names: tuple[str, ...]
+    caption: str = CAPTION
+    kind: Kind = EPISODES
+    columns: Mapping[str, Column] = field(default_factory=dict)
+
+    @property
+    def schema(self) -> Schema:
+        """The columns that its rows must have."""
+        return replace(self.kind.schema, needed={**self.kind.schema.needed, **self.columns})
+
+
+def collisions(rows: Sequence[Row]) -> str:
+    """Collisions over all rows."""
+    return f"Collisions: {sum(row['collision'] for row in rows)} in {len(rows)} episodes."
+
+
+def _sweep_closing(rows: Sequence[Row]) -> list[str]:
+    return [collisions(rows)]
+
+
+def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
+    return {}
+
+
+def _paper_closing(rows: Sequence[Row]) -> list[str]:
+    return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
+
+
+_ALL = (
+    Study(
+        "sweep",
+        "Sweep of the closed loop",
+        sweep_tables,
+        budget_figure.sweep_figures,
+        _sweep_closing,
+        budget_figure.NAMES,
+    ),
+    Study(
+        "paper",
+        "The paper's closed-loop study",
+        sweep_tables,
+        budget_figure.sweep_figures,
+        _paper_closing,
+        budget_figure.NAMES,
+    ),
+    Study(
+        "crowding",
+        "Crowding in the closed loop",
+        crowding_tables,
+        crowding_figure.crowding_figures,
+        _sweep_closing,
+        (crowding_figure.NAME,),
+        COMPARED,
+        columns={COLUMN: COUNT},
+    ),
+    Study("ablate", "Ablations of the closed loop", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
+    Study(
+        "faults",
+        "Faults in the closed loop",
+        fault_tables,
+        faults_figure.fault_figures,
+        _sweep_closing,
+        faults_figure.NAMES,
+        COMPARED,
+    ),
+    Study(
+        "protocol",
+        "First sightings in the open loop",
+        protocol_tables,
+        protocol_figures,
+        protocol_closing,
+        FIGURE_NAMES,
+        PROTOCOL_CAPTION,
+        PLAYS,
+    ),
+)
+STUDIES = {study.name: study for study in _ALL}
+SWEEP = STUDIES["sweep"]
+
+
+def study_of(path: Path) -> Study:
+    """The study that a file of rows belongs to; a file that names none holds a sweep.
+
+    Raises InvalidInput for the name of a study that this version does not know.
+    """
+    name = read_notes(path)[0] or SWEEP.name
+    if name not in STUDIES:
+        raise unknown(f"study in {path}", name, STUDIES)
+    return STUDIES[name]

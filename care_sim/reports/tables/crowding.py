@@ -1,0 +1,106 @@
+"""Where the all-camera reserve collapses as the number of tracked vehicles in the dense street grows."""
+
+from collections.abc import Sequence
+
+from care_sim.reports.cells import Played
+from care_sim.reports.contrasts import Contrast
+from care_sim.reports.formatting import interval, mean, median, percent
+from care_sim.reports.summary import Key, key_of
+from care_sim.reports.table import Table
+from care_sim.scenarios.dense import PLACES
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.task import Row
+
+BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
+VEHICLES = range(len(PLACES) + 1)
+POLICIES = ("all-camera", "care", "full")
+COLUMN = "scenario.vehicles"
+"""The column of the rows that the study varies."""
+TITLE = "dense, by standing vehicles: "
+COLLAPSE_M = 3.0
+"""All-camera counts as collapsed where CARE detects this much earlier and the interval excludes zero."""
+
+
+def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
+    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221 configurations a seed.
+
+    `also` are further policies.
+    """
+    policies = list(dict.fromkeys([*POLICIES, *also]))
+    return [
+        config
+        for vehicles in VEHICLES
+        for config in grid(["dense"], policies, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),))
+    ]
+
+
+class Crowd:
+    """The rows of a crowding study by standing vehicles and budget."""
+
+    def __init__(self, rows: Sequence[Row]):
+        self.played = Played(rows)
+        self.counts = sorted({row[COLUMN] for row in rows})
+        self.budgets = sorted({row["budget"] for row in rows if row["policy"] != "full"})
+        self.others = ["all-camera", *(policy for policy in self.played.policies if policy not in POLICIES)]
+
+    def key(self, vehicles: int, policy: str, budget: float) -> Key:
+        """Where the rows are found."""
+        return key_of({"scenario": "dense", "policy": policy, "budget": budget, COLUMN: vehicles})
+
+    def gap(self, vehicles: int, budget: float, other: str = "all-camera") -> Contrast | None:
+        """First detection of another policy minus that of CARE, metres; negative where the other is later."""
+        return self.played.difference(self.key(vehicles, other, budget), self.key(vehicles, "care", budget))
+
+    def median(self, vehicles: int, policy: str, budget: float) -> str:
+        """A median first detection, as text."""
+        cell = self.played.cell(self.key(vehicles, policy, budget))
+        return median(cell.detection if cell else None)
+
+    def collapsed(self, budget: float) -> list[int]:
+        """Numbers of vehicles at which all-camera has collapsed."""
+        gaps = {vehicles: self.gap(vehicles, budget) for vehicles in self.counts}
+        return [
+            n for n, gap in gaps.items() if gap and gap.excludes_zero and gap.difference.cautious.mean <= -COLLAPSE_M
+        ]
+
+
+def crowding_tables(rows: Sequence[Row]) -> list[Table]:
+    """What all-camera, and every further policy, has less than CARE by standing vehicles and budget: differences,
+    intervals, and the medians behind them.
+    """
+    crowd = Crowd(rows)
+    gaps = [_gaps_table(crowd, other, intervals) for other in crowd.others for intervals in (False, True)]
+    return [*gaps, _medians_table(crowd)]
+
+
+def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
+    entry, more = (interval, ", with intervals") if intervals else (mean, "")
+    lines = [(str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets)) for n in crowd.counts]
+    title = f"{TITLE}first detection of {crowd.played.marked(other)} minus care, m{more}"
+    notes = (_collapse_note(crowd),) if other == "all-camera" and not intervals else crowd.played.notes([other])
+    return Table(title, ("vehicles", *map(percent, crowd.budgets)), tuple(lines), notes, terminal=not intervals)
+
+
+def _medians_table(crowd: Crowd) -> Table:
+    policies = ["care", *crowd.others]
+    lines = [
+        (str(n), *(_medians(crowd, n, policies, budget) for budget in crowd.budgets), crowd.median(n, "full", 1.0))
+        for n in crowd.counts
+    ]
+    title = f"{TITLE}median first detection, {'/'.join(map(crowd.played.marked, policies))}, m"
+    columns = ("vehicles", *map(percent, crowd.budgets), "full")
+    return Table(title, columns, tuple(lines), ("n.d.: not detected.", *crowd.played.notes(policies)), terminal=False)
+
+
+def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:
+    medians = (crowd.median(vehicles, policy, budget) for policy in policies)
+    return "/".join(medians).replace("not detected", "n.d.")
+
+
+def _collapse_note(crowd: Crowd) -> str:
+    found = [(percent(budget), crowd.collapsed(budget)) for budget in crowd.budgets]
+    listed = "; ".join(f"{budget}: {', '.join(map(str, counts)) or 'none'}" for budget, counts in found)
+    return (
+        f"All-camera has collapsed (at least {COLLAPSE_M:.0f} m later than care on average, interval without zero), by "
+        f"budget, at these numbers of vehicles: {listed}."
+    )

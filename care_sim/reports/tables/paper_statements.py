@@ -1,0 +1,166 @@
+"""Every statement of the paper's Sec. 5.6 beside what a study measured, as pure functions of its rows.
+
+Numbers are medians in metres; a median that is not detected ranks below every other. Statements that the paper
+makes in words are put as a bound, which they name.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from care_sim.reports.formatting import median
+from care_sim.reports.summary import Cell, summarise
+from care_sim.study.designs.paper import CAMERA_POLICIES, paper_cells
+from care_sim.study.task import Row
+
+Cells = dict[tuple[str, str, float, str], Cell]
+"""By scenario, policy, budget and camera fault ('' without one)."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What the paper says, what was measured, and whether they agree."""
+
+    text: str
+    paper: str
+    measured: str
+    agrees: bool
+
+    def __str__(self) -> str:
+        verdict = "agrees" if self.agrees else "DIFFERS"
+        return f"{verdict}: {self.text}. Paper: {self.paper}. Here: {self.measured}."
+
+
+def statements(rows: Sequence[Row]) -> list[Statement]:
+    """All statements, when the rows cover every cell of the paper's study; else none."""
+    found = {cell.key: cell for cell in summarise(rows)}
+    if not paper_cells() <= set(found):
+        return []
+    cells = {_key(cell): cell for key, cell in found.items() if key in paper_cells()}
+    return [*_dartout(cells), *_dense(cells), _cutin(cells), *_faults(cells), _collisions(list(cells.values()))]
+
+
+def _key(cell: Cell) -> tuple[str, str, float, str]:
+    fault = " ".join(f"{name} {value}" for name, value in cell.setting.conditions)
+    return cell.setting.scenario, cell.policy, cell.budget, fault
+
+
+def _dartout(cells: Cells) -> list[Statement]:
+    camera = [cells["dartout", policy, 0.1, ""] for policy in CAMERA_POLICIES]
+    history, full = cells["dartout", "history", 0.1, ""], cells["dartout", "full", 1.0, ""]
+    gaps = [_gap(cell, full) for cell in camera]
+    passes = [_pass(cell) for cell in camera]
+    latest = min(camera, key=_median)
+    at = "dart-out 10%: "
+    return [
+        Statement(
+            at + "camera policies brake in every episode",
+            "5/5",
+            ", ".join(f"{cell.policy} {cell.braked}/{cell.episodes}" for cell in camera),
+            all(cell.braked == cell.episodes for cell in camera),
+        ),
+        Statement(
+            at + "camera policies detect within 0.3 m of full",
+            "about 15",
+            f"{_list(camera)}, full {_shown(full)}",
+            max(gaps) <= 0.3,
+        ),
+        Statement(
+            at + "history detects at least 2 m later",
+            "11.9 against about 15",
+            f"{_shown(history)} against {_shown(latest)}",
+            _median(latest) - _median(history) >= 2.0,
+        ),
+        Statement(
+            at + "history brakes in 3 of 5 episodes, to a tenth",
+            "3/5",
+            f"{history.braked}/{history.episodes}",
+            abs(history.braked / history.episodes - 0.6) <= 0.1,
+        ),
+        Statement(
+            at + "camera policies pass at 5.7 m or more, history at 4.0 m, to 0.5 m",
+            "5.7 or more against 4.0",
+            f"{min(passes):.1f} or more against {_pass(history):.1f}",
+            min(passes) >= 5.7 and abs(_pass(history) - 4.0) <= 0.5,
+        ),
+    ]
+
+
+def _dense(cells: Cells) -> list[Statement]:
+    care, camera, full = (cells["dense", p, b, ""] for p, b in (("care", 0.03), ("all-camera", 0.03), ("full", 1.0)))
+    pairs = [(cells["dense", "all-camera", b, ""], cells["dense", "care", b, ""]) for b in (0.05, 0.1, 0.2)]
+    return [
+        Statement(
+            "dense 3%: care detects within 0.5 m of full",
+            "15.1, full 15.1",
+            f"{_shown(care)}, full {_shown(full)}",
+            _gap(care, full) <= 0.5,
+        ),
+        Statement(
+            "dense 3%: all-camera detects at least 3 m later than care",
+            "10.3 against 15.1",
+            f"{_shown(camera)} against {_shown(care)}",
+            _median(care) - _median(camera) >= 3.0,
+        ),
+        Statement(
+            "dense from 5%: all-camera and care within 0.5 m of each other",
+            "they converge",
+            ", ".join(f"{_shown(a)} against {_shown(b)} at {100 * a.budget:.0f}%" for a, b in pairs),
+            all(_gap(a, b) <= 0.5 for a, b in pairs),
+        ),
+    ]
+
+
+def _cutin(cells: Cells) -> Statement:
+    group = [cell for cell in cells.values() if cell.setting.scenario == "cutin"]
+    first, last = max(group, key=_median), min(group, key=_median)
+    return Statement("cut-in: all policies within 1 m", "no separation", _list(group), _gap(first, last) <= 1.0)
+
+
+def _faults(cells: Cells) -> list[Statement]:
+    """A camera policy may not fall behind history, which asks no camera and so is its faultless self under latency."""
+    made = []
+    for text, name in (("missed detections up to 0.4", "false_negative_rate"), ("latency up to 2", "camera_latency")):
+        faults = [fault for _, policy, _, fault in cells if fault.startswith(name) and policy == "care"]
+        pairs = [(_slowest(cells, f), cells.get(("dartout", "history", 0.1, f), _history(cells))) for f in faults]
+        measured = (f"{_shown(a)} against {_shown(b)}" for a, b in pairs)
+        agrees = all(_median(a) > _median(b) for a, b in pairs)
+        said = f"dart-out 10%: {text} leaves every camera policy before history"
+        made.append(Statement(said, "order unchanged", ", ".join(measured), agrees))
+    return made
+
+
+def _slowest(cells: Cells, fault: str) -> Cell:
+    return min((cells["dartout", policy, 0.1, fault] for policy in CAMERA_POLICIES), key=_median)
+
+
+def _history(cells: Cells) -> Cell:
+    return cells["dartout", "history", 0.1, ""]
+
+
+def _collisions(cells: Sequence[Cell]) -> Statement:
+    collided = sum(cell.collisions for cell in cells)
+    return Statement("no episode collides", "0", f"{collided} of {sum(c.episodes for c in cells)}", not collided)
+
+
+def _median(cell: Cell) -> float:
+    return -math.inf if cell.detection.median is None else round(cell.detection.median, 1)
+
+
+def _gap(ours: Cell, theirs: Cell) -> float:
+    """Distance between two medians; no gap is known where one is not detected."""
+    gap = abs(_median(ours) - _median(theirs))
+    return round(gap, 1) if math.isfinite(gap) else math.inf
+
+
+def _shown(cell: Cell) -> str:
+    return median(cell.detection)
+
+
+def _pass(cell: Cell) -> float:
+    values = cell.closest_pass
+    return round(values.median, 1) if values and values.median is not None else 0.0
+
+
+def _list(cells: Sequence[Cell]) -> str:
+    return ", ".join(f"{cell.policy} {_shown(cell)}" for cell in cells)

@@ -1,0 +1,114 @@
+"""Tables of a sweep: in every setting the levels of all policies, then what CARE and the learned have over each."""
+
+from collections.abc import Sequence
+
+from care_sim.evaluation.censoring import Quartiles
+from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
+from care_sim.reports.formatting import ends, interval, marked, percent, spread, tag_notes, unsigned
+from care_sim.reports.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
+from care_sim.reports.table import Table
+from care_sim.study.designs.paper import Published, paper_cells, published
+from care_sim.study.task import FULL, REFERENCE, Row
+
+COLUMNS = (
+    "budget",
+    "policy",
+    "first detection m",
+    "never",
+    "braked",
+    "pass m",
+    "clearance m",
+    "collisions",
+    "regret m",
+    "interval",
+    "as full",
+    "paper",
+)
+FILES_ONLY = ("pass m", "clearance m", "collisions", "interval", "as full")
+"""Columns that 80 characters of a terminal leave no room for."""
+WHOLE = tuple(column for column in COLUMNS if column not in ("policy", "paper"))
+
+
+def sweep_tables(rows: Sequence[Row]) -> list[Table]:
+    """Levels and contrasts, one setting after the other."""
+    cells, groups = summarise(rows), grouped(rows)
+    tables = []
+    for setting in dict.fromkeys(cell.setting for cell in cells):
+        own = [cell for cell in cells if cell.setting == setting]
+        tables += [levels_table(setting.label, own), *contrast_tables(setting, own, groups)]
+    return tables
+
+
+def levels_table(title: str, cells: Sequence[Cell]) -> Table:
+    """Medians, counts and regret, one row a cell."""
+    sayings = [_published(cell) for cell in cells]
+    sentences = dict.fromkeys(f'Paper: "{saying.sentence}"' for saying in sayings if saying)
+    lines = (_line(cell, saying) for cell, saying in zip(cells, sayings, strict=True))
+    regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
+    missing = [] if regretted else ["Regret: full not run."]
+    notes = [*tag_notes(cell.tags for cell in cells), *missing]
+    hidden = FILES_ONLY if any(cell.never for cell in cells) else (*FILES_ONLY, "never")
+    return Table(title, COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, WHOLE)
+
+
+def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
+    """CARE minus every other policy, then the same of every learned one; none for a policy that ran alone."""
+    tags = {cell.policy: cell.tags for cell in cells} | ({FULL: ()} if full_of(groups, setting) else {})
+    learned = [policy for policy in tags if "learned" in tags[policy]]
+    named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
+    return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
+
+
+def _contrast_table(
+    setting: Setting, reference: str, cells: Sequence[Cell], groups: Groups, tags: dict[str, tuple[str, ...]]
+) -> Table:
+    """The reference minus the others, policies by budgets, a block a measure."""
+    budgets = sorted({cell.budget for cell in cells if cell.policy == reference})
+    lines: list[tuple[str, ...]] = []
+    for measure in (DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])):
+        lines.append((f"{measure.name}, {measure.unit}",))
+        for policy in (policy for policy in tags if policy != reference):
+            pairs = [((setting, reference, budget), (setting, policy, budget)) for budget in budgets]
+            lines.append((marked(policy, tags[policy]), *(interval(_ahead(measure, *pair, groups)) for pair in pairs)))
+    columns = (f"{reference} minus", *map(percent, budgets))
+    title = f"{setting.label}: {reference} minus each policy"
+    return Table(title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1])
+
+
+def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
+    """What a policy has over another at the same budget, or over the full scan."""
+    setting, policy, _ = theirs
+    return contrast(measure, groups.get(ours), full_of(groups, setting) if policy == FULL else groups.get(theirs))
+
+
+def _published(cell: Cell) -> Published | None:
+    if (cell.setting, cell.policy, cell.budget) not in paper_cells():
+        return None
+    return published(cell.setting.scenario, cell.policy, cell.budget, cell.setting.faults)
+
+
+def _line(cell: Cell, saying: Published | None) -> tuple[str, ...]:
+    return (
+        percent(cell.budget),
+        marked(cell.policy, cell.tags),
+        spread(cell.detection),
+        _share(cell.never, cell),
+        _share(cell.braked, cell),
+        _median(cell.closest_pass, cell),
+        _median(cell.clearance, cell),
+        _share(cell.collisions, cell),
+        unsigned(cell.regret),
+        ends(cell.regret) if cell.regret else "",
+        f"{cell.as_full}/{cell.regret.difference.pairs}" if cell.regret else "",
+        saying.figure if saying else "",
+    )
+
+
+def _share(count: int, cell: Cell) -> str:
+    return f"{count}/{cell.episodes}"
+
+
+def _median(values: Quartiles | None, cell: Cell) -> str:
+    if values is None:
+        return "never in view"
+    return f"{values.median:.1f}" + (f" (of {values.count})" if values.count < cell.episodes else "")

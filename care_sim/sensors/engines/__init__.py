@@ -1,0 +1,1 @@
+"""Engines that answer rays and pictures: Bullet, and the compiled one."""

@@ -1,0 +1,64 @@
+"""Columns of Feather files; what is missing or broken is named in one line."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow
+from numpy.typing import NDArray
+from pyarrow import feather, types
+
+from care_sim.base.errors import InvalidInput
+
+Columns = dict[str, NDArray[Any]]
+
+
+def read_columns(path: Path, kinds: Mapping[str, type]) -> Columns:
+    """The named columns of a Feather file as arrays of the given kinds: int, float or str.
+
+    Raises InvalidInput for a file that is missing or truncated, lacks a column, holds another kind in it, or has an
+    empty or infinite value.
+    """
+    try:
+        table = feather.read_table(path)
+        table.validate(full=True)
+    except FileNotFoundError:
+        raise InvalidInput(f"{path}: no such file") from None
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InvalidInput(f"{path}: no readable Feather file ({_first_line(error)})") from error
+    for name in kinds:
+        count = table.column_names.count(name)
+        if count != 1:
+            found = "lacks the column" if not count else f"has {count} columns"
+            raise InvalidInput(f"{path}: {found} {name!r}; needed: {', '.join(kinds)}")
+    return {name: _column(path, table[name], name, kind) for name, kind in kinds.items()}
+
+
+def _column(path: Path, column: pyarrow.ChunkedArray, name: str, kind: type) -> NDArray[Any]:
+    if not _HOLDS[kind](column.type):
+        raise InvalidInput(f"{path}: column {name!r} must hold {kind.__name__} values, has {column.type}")
+    if column.null_count:
+        raise InvalidInput(f"{path}: column {name!r} has {column.null_count} empty values")
+    values: NDArray[Any] = np.asarray(column.to_pylist() if kind is str else column, dtype=kind)
+    if kind is float and not np.isfinite(values).all():
+        raise InvalidInput(
+            f"{path}: column {name!r} has a value that is not finite, in row {np.isfinite(values).argmin()}"
+        )
+    return values
+
+
+def _is_text(kind: pyarrow.DataType) -> bool:
+    kind = kind.value_type if types.is_dictionary(kind) else kind
+    return bool(types.is_string(kind) or types.is_large_string(kind))
+
+
+_HOLDS: dict[type, Callable[[pyarrow.DataType], bool]] = {
+    int: types.is_integer,
+    float: lambda kind: types.is_floating(kind) or types.is_integer(kind),
+    str: _is_text,
+}
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,126 @@
+"""The tables of an Argoverse 2 log: annotations and poses of the car, checked; what is wrong is named in one line."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.errors import InvalidInput, unknown
+from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
+from care_sim.sources.argoverse2.feather import Columns, read_columns
+
+CATEGORIES: dict[str, str | None] = {
+    "REGULAR_VEHICLE": "car",
+    "BOX_TRUCK": "truck",
+    "LARGE_VEHICLE": "truck",
+    "TRUCK": "truck",
+    "TRUCK_CAB": "truck",
+    "ARTICULATED_BUS": "bus",
+    "BUS": "bus",
+    "SCHOOL_BUS": "bus",
+    "BICYCLE": "bicycle",
+    "OFFICIAL_SIGNALER": "pedestrian",
+    "PEDESTRIAN": "pedestrian",
+    # Outside the five classes: bodies that occlude, and that nobody reports. Riders have boxes of their own; as in
+    # nuScenes the bicycle counts, once, and its rider does not.
+    "ANIMAL": None,
+    "BICYCLIST": None,
+    "BOLLARD": None,
+    "CONSTRUCTION_BARREL": None,
+    "CONSTRUCTION_CONE": None,
+    "DOG": None,
+    "MESSAGE_BOARD_TRAILER": None,
+    "MOBILE_PEDESTRIAN_CROSSING_SIGN": None,
+    "MOBILE_PEDESTRIAN_SIGN": None,
+    "MOTORCYCLE": None,
+    "MOTORCYCLIST": None,
+    "RAILED_VEHICLE": None,
+    "SIGN": None,
+    "STOP_SIGN": None,
+    "STROLLER": None,
+    "TRAFFIC_LIGHT_TRAILER": None,
+    "VEHICULAR_TRAILER": None,
+    "WHEELCHAIR": None,
+    "WHEELED_DEVICE": None,
+    "WHEELED_RIDER": None,
+}
+"""The class of every category of the taxonomy, None outside the five classes."""
+RECORDING_CAR = "EGO_VEHICLE"
+"""The category of the recording car itself, which is no object of its own film."""
+
+POSE_FILE, ANNOTATION_FILES = "city_SE3_egovehicle.feather", "annotations*.feather"
+PLACE, TURN, SIZE = ("tx_m", "ty_m", "tz_m"), ("qx", "qy", "qz", "qw"), ("length_m", "width_m", "height_m")
+_POSE_TYPES = {"timestamp_ns": int, **dict.fromkeys((*PLACE, *TURN), float)}
+_BOX_TYPES = {
+    **_POSE_TYPES,
+    **dict.fromkeys(SIZE, float),
+    "track_uuid": str,
+    "category": str,
+    "num_interior_pts": int,
+}
+
+
+def annotation_file(log: Path) -> Path:
+    """The file of the annotations of a log. Raises InvalidInput where there is none."""
+    found = sorted(log.glob(ANNOTATION_FILES))
+    if not found:
+        raise InvalidInput(f"{log / ANNOTATION_FILES}: no such file")
+    return found[0]
+
+
+def read_boxes(path: Path) -> tuple[Cells, Columns]:
+    """The annotated timestamps (n,), ascending, and the checked annotations, without the recording car, each with the
+    `number` of its track in the film.
+
+    Raises InvalidInput for a file that is missing, truncated or incomplete, an unknown category, a box or a rotation
+    without length, an object annotated twice at once.
+    """
+    boxes = read_columns(path, _BOX_TYPES)
+    sweeps, kept = np.unique(boxes["timestamp_ns"]), boxes["category"] != RECORDING_CAR
+    boxes = {name: column[kept] for name, column in boxes.items()}
+    if not kept.any():
+        raise InvalidInput(f"{path}: no annotations")
+    for category in np.unique(boxes["category"]).tolist():
+        if category not in CATEGORIES:
+            raise InvalidInput(f"{path}: {unknown('category', category, CATEGORIES)}")
+    numbers = np.unique(boxes["track_uuid"], return_inverse=True)[1]
+    for wrong, message in (
+        ((table(boxes, SIZE) <= 0).any(axis=1), "has a box without length, width or height"),
+        (~table(boxes, TURN).any(axis=1), "has a quaternion qw, qx, qy, qz of length zero"),
+        (_repeated(np.column_stack([boxes["timestamp_ns"], numbers])), "is annotated twice"),
+    ):
+        if wrong.any():
+            row = wrong.argmax()
+            raise InvalidInput(f"{path}: track {boxes['track_uuid'][row]} {message} at {boxes['timestamp_ns'][row]}")
+    return sweeps, boxes | {"number": numbers}
+
+
+def read_poses(path: Path) -> Columns:
+    """The checked poses of the car, in order of time.
+
+    Raises InvalidInput for a file that is missing, truncated or incomplete, a rotation without length, two poses at
+    once.
+    """
+    poses = read_columns(path, _POSE_TYPES)
+    stamps = poses["timestamp_ns"]
+    for wrong, message in (
+        (~table(poses, TURN).any(axis=1), "a quaternion qw, qx, qy, qz of length zero"),
+        (_repeated(stamps[:, None]), "two poses"),
+    ):
+        if wrong.any():
+            raise InvalidInput(f"{path}: {message} at {stamps[wrong.argmax()]}")
+    order = np.argsort(stamps)
+    return {name: column[order] for name, column in poses.items()}
+
+
+def _repeated(rows: Cells) -> NDArray[np.bool_]:
+    """(n,) which rows (n, k) stand further up as well."""
+    repeated = np.ones(len(rows), dtype=bool)
+    repeated[np.unique(rows, axis=0, return_index=True)[1]] = False
+    return repeated
+
+
+def table(columns: Columns, names: tuple[str, ...]) -> Floats:
+    """(n, k) the named columns side by side."""
+    return np.column_stack([columns[name] for name in names]).astype(float)

@@ -1,0 +1,80 @@
+"""Annotated boxes as bodies of a world, and what its sensors make of them."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.frames import Floats, Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import CLASSES
+from care_sim.loops.film import Annotations, Cloud, Sights
+from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.world.bodies import sized
+from care_sim.world.bullet import BulletWorld
+
+
+@dataclass(frozen=True)
+class Prop:
+    """An annotated box: its `number` in the film, its class name (None outside the five classes), length, width and
+    height, and the frame in its centre, seen from the sensor.
+    """
+
+    number: int
+    label: str | None
+    size: tuple[float, float, float]
+    frame: Frame
+
+    @property
+    def box(self) -> tuple[float, ...]:
+        """Centre, size and heading in the sensor frame."""
+        return (*self.frame.origin.tolist(), *self.size, self.frame.yaw)
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """The box along the sensor's axes that holds it, however it is turned."""
+        extents = np.abs(self.frame.rotation.as_matrix()) @ self.size
+        return (*self.frame.origin.tolist(), *extents.tolist(), 0.0)
+
+    @property
+    def foot(self) -> Frame:
+        """The frame in the middle of its bottom face."""
+        return self.frame.holding(np.array([0.0, 0.0, -self.size[2] / 2]))
+
+
+def shoot(
+    props: Sequence[Prop], sensor: Frame, height_m: float, grid: AngularGrid
+) -> tuple[Annotations, Sights, Cloud]:
+    """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell fired.
+
+    The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing: real roads undulate, and a
+    plane in the world would bury what stands where they fall.
+    """
+    reported = [prop for prop in props if prop.label is not None]
+    annotations = annotations_of(reported)
+    with closing(BulletWorld(ground=False)) as world:
+        bodies = {id(prop): _add(world, prop, sensor) for prop in props}
+        numbers = {bodies[id(prop)]: prop.number for prop in reported}
+        labels = {bodies[id(prop)]: CLASSES.index(str(prop.label)) for prop in reported}
+        seen = look_around(world, SURROUND_CAMERAS, sensor, labels, annotations.boxes)
+        swept = full_sweep(world, grid, sensor, _table([prop.bounds for prop in props]), height_m)
+    sights = Sights(seen.detections, numbers_of(seen.objects, numbers))
+    return annotations, sights, Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
+
+
+def annotations_of(props: Sequence[Prop]) -> Annotations:
+    """The annotations of `props`, all of the five classes."""
+    boxes = _table([prop.box for prop in props])
+    classes = [CLASSES.index(str(prop.label)) for prop in props]
+    numbers = [prop.number for prop in props]
+    return Annotations(np.array(numbers, dtype=np.int64), np.array(classes, dtype=np.int64), boxes)
+
+
+def _table(boxes: list[tuple[float, ...]]) -> Floats:
+    return np.array(boxes, dtype=float).reshape(-1, 7)
+
+
+def _add(world: BulletWorld, prop: Prop, sensor: Frame) -> int:
+    foot = prop.foot
+    return world.add(sized("prop", prop.label, prop.size), sensor.holding(foot.origin, foot.rotation))

@@ -1,0 +1,131 @@
+"""The scenes of the protocol by a text: generated streets, or recordings in a folder."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from care_sim.base.errors import InvalidInput, check_known, shortened
+from care_sim.loops.film import Film
+from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
+from care_sim.sources.streets.recording import record
+from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street, street_name
+from care_sim.study.provenance import data_digest, file_digest
+
+
+class Scene(NamedTuple):
+    """A scene by name, and the seed that its environment is reset with."""
+
+    name: str
+    seed: int
+
+
+class Source(Protocol):
+    """Where scenes come from. Hashable."""
+
+    def scenes(self) -> list[Scene]:
+        """All of them, in order. Raises InvalidInput where they cannot be listed."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """What the source is called."""
+        ...
+
+    def film(self, scene: Scene) -> Film:
+        """The film of a scene. Raises InvalidInput where it cannot be made."""
+        ...
+
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """Columns that tell where a scene comes from: the kind of the source, and of recordings a hash of the files
+        that it is read from, wherever they lie.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Streets:
+    """Generated streets: the 150 of the evaluation, or the 20 of the calibration."""
+
+    kind = "streets"
+    split: str = "evaluation"
+
+    def scenes(self) -> list[Scene]:
+        """One a seed."""
+        return [Scene(street_name(seed), seed) for seed in SPLITS[self.split]]
+
+    def film(self, scene: Scene) -> Film:
+        """The street of the seed."""
+        return record(make_street(scene.seed))
+
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """The name of a street says all."""
+        return {"source": self.kind}
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Scenes of recordings."""
+
+    recordings: Recordings
+
+    @property
+    def kind(self) -> str:
+        """The kind of the recordings."""
+        return self.recordings.kind
+
+    def scenes(self) -> list[Scene]:
+        """By name; one seed for all, since the name of a scene is part of what draws its faults and floor."""
+        return [Scene(name, 0) for name in self.recordings.scenes()]
+
+    def film(self, scene: Scene) -> Film:
+        """The recorded scene of the name."""
+        return self.recordings.film(scene.name)
+
+    def row(self, scene: Scene) -> dict[str, Any]:
+        """The kind, the hash of the scene's files, and that of the camera detections where there are some."""
+        own: dict[str, Any] = {"source": self.kind, "recording": data_digest(self.recordings.files(scene.name))}
+        if isinstance(self.recordings, NuScenes) and self.recordings.camera_detections:
+            own["camera_detections"] = file_digest(self.recordings.camera_detections)
+        return own
+
+
+LONGEST_NUMBER = 40
+"""Digits that are read of a number of scenes."""
+SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
+
+
+def source_of(text: str, **options: object) -> Source:
+    """The source that a text names: `streets`, `argoverse2:FOLDER` or `nuscenes:FOLDER`, with `options` of its kind
+    (`split`, and those of `care_sim.sources.recordings.NuScenes`); those that are None are not given.
+
+    Raises InvalidInput for another text, a folder that is none, an option that the kind does not have.
+    """
+    if text != "streets":
+        if text.partition(":")[0] not in KINDS:
+            known = ", ".join(["streets", *(f"{kind}:FOLDER" for kind in KINDS)])
+            raise InvalidInput(f"unknown source {text!r}; known: {known}")
+        return Recorded(recordings(text, options))
+    given = {name: value for name, value in options.items() if value is not None}
+    split = str(given.pop("split", "evaluation"))
+    if given:
+        raise InvalidInput(f"{', '.join(given)} says nothing to streets")
+    check_known("split of the streets", split, SPLITS)
+    return Streets(split)
+
+
+def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
+    """The scenes that are asked for: one whole number means that many, from the first; else scenes by name; all of
+    them without. Raises InvalidInput for a name or a number that there is not.
+    """
+    if not names:
+        return scenes
+    if len(names) == 1 and names[0].isdecimal():
+        count = int(names[0][:LONGEST_NUMBER])
+        if not 1 <= count <= len(scenes):
+            raise InvalidInput(
+                f"scenes must be a number from 1 to {len(scenes)} or names, got {shortened(names[0], LONGEST_NUMBER)}"
+            )
+        return scenes[:count]
+    known = {scene.name: scene for scene in scenes}
+    for name in names:
+        check_known("scene", name, known)
+    return [known[name] for name in dict.fromkeys(names)]

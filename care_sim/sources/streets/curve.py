@@ -1,0 +1,78 @@
+"""The reference line of a road, and the way from road coordinates to the world and along it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.frames import Floats, Pose, turned
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A straight, one bend, and a straight again. Metres and radians.
+
+    Road coordinates: `s` along the line, `d` to its left, headings relative to its own. The line begins at the
+    world pose `start` with s = 0; it bends from `bend_at` on for `bend_length` with `curvature` (1/m, positive to
+    the left). Before 0 and after the bend it goes on straight.
+    """
+
+    start: Pose = (0.0, 0.0, 0.0)
+    bend_at: float = 0.0
+    bend_length: float = 0.0
+    curvature: float = 0.0
+
+    def heading(self, s: Floats | float) -> Floats:
+        """World heading of the line at `s`."""
+        along = np.clip(np.asarray(s) - self.bend_at, 0.0, self.bend_length)
+        return np.asarray(self.start[2] + self.curvature * along)
+
+    def curvature_at(self, s: float) -> float:
+        """Curvature of the line at `s`, 1/m."""
+        return self.curvature if self.bend_at <= s < self.bend_at + self.bend_length else 0.0
+
+    def to_world(self, places: Floats) -> Floats:
+        """World poses (..., 3: x, y, heading) of places (..., 3: s, d, heading) on the road."""
+        s, d, heading = np.moveaxis(np.asarray(places, dtype=float), -1, 0)
+        along = np.clip(s - self.bend_at, 0.0, self.bend_length)
+        turn = self.curvature * along
+        chord = along * np.sinc(turn / (2 * np.pi))
+        before, after = np.minimum(s, self.bend_at), np.maximum(s - self.bend_at - self.bend_length, 0.0)
+        x = before + chord * np.cos(turn / 2) + after * np.cos(turn) - d * np.sin(turn)
+        y = chord * np.sin(turn / 2) + after * np.sin(turn) + d * np.cos(turn)
+        world = turned(np.stack([x, y], axis=-1), self.start[2]) + self.start[:2]
+        return np.concatenate([world, (self.start[2] + turn + heading)[..., None]], axis=-1)
+
+
+@dataclass(frozen=True)
+class Walked:
+    """A way covered at constant `speed` (m/s): a person's or a cyclist's.
+
+    `corners` (k, 2) are s and d of the way's corners on `curve`; the walker is at its beginning at `starts_s` and
+    stands at either end before and after. Distances are measured in the world, so that the speed holds in a bend.
+    """
+
+    curve: Curve
+    corners: tuple[tuple[float, float], ...]
+    speed: float
+    starts_s: float = 0.0
+
+    STRIDE_M = 1.0
+
+    def poses(self, times: Floats) -> Floats:
+        """World poses (t, 3) at `times` (t,)."""
+        points = self._points()
+        legs = np.diff(points, axis=0)
+        covered = np.concatenate([[0.0], np.cumsum(np.hypot(*legs.T))])
+        way = np.clip(self.speed * (times - self.starts_s), 0.0, covered[-1])
+        leg = np.clip(np.searchsorted(covered, way, side="right") - 1, 0, len(legs) - 1)
+        x, y = (np.interp(way, covered, points[:, axis]) for axis in (0, 1))
+        return np.column_stack([x, y, np.arctan2(legs[leg, 1], legs[leg, 0])])
+
+    def _points(self) -> Floats:
+        """(n, 2) world points of the way, at most about a stride apart, so that it follows a bend."""
+        places = [np.array([*self.corners[0], 0.0])]
+        for start, end in zip(self.corners, self.corners[1:], strict=False):
+            pieces = max(int(np.ceil(np.hypot(end[0] - start[0], end[1] - start[1]) / self.STRIDE_M)), 1)
+            shares = np.arange(1, pieces + 1) / pieces
+            places += [np.array([*(np.array(start) + share * (np.array(end) - start)), 0.0]) for share in shares]
+        return self.curve.to_world(np.array(places))[:, :2]

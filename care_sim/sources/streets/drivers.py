@@ -1,0 +1,156 @@
+"""Who drives: the ego on its script, highway-env traffic on every road, and the flow that fills the lanes.
+
+Each road has a traffic of its own, unrolled onto a straight line and rolled back onto the road's curve; highway-env's
+cost grows with the square of the vehicles on a road. The lane of a bend that is not the reference line is a few per
+cent longer or shorter than its unrolled one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.frames import Floats
+from care_sim.core.types import Ego
+from care_sim.scenarios.base import LANE_WIDTH_M, SPEED_LIMIT_MPS, Range, draw
+from care_sim.sources.streets.curve import Curve
+from care_sim.sources.streets.draft import STEP_S, TIMES, Draft
+from care_sim.sources.streets.layouts import Joining, Plan, Road
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.traffic import RoadVehicle, Traffic
+
+EGO_CRUISE_MPS: Range = (3.5, SPEED_LIMIT_MPS)
+EGO_HALT_CHANCE, EGO_HALT_AT_S, EGO_HALT_S = 0.5, (3.0, 14.0), (3.0, 8.0)
+"""The ego cruises; in every other scene it comes to rest once, as before a light. Together with the cruising
+speeds that makes about 16 km/h on average, that of the drives of nuScenes (Caesar et al. 2020, Sec. 2)."""
+EGO_BRAKING_MPS2, EGO_STARTING_MPS2 = 2.0, 1.5
+"""Comfortable: less than half of what the closed loop's controller brakes with, and a usual start in town."""
+
+FLOW_PER_H: Range = (200.0, 400.0)
+"""Vehicles an hour in a direction of the main road: half the 400 to 800 of both that RASt 06 gives for a collector
+street. Their spacing is exponential beyond HEADWAY_S (Cowan 1975)."""
+SIDE_FLOW_PER_H: Range = (50.0, 200.0)
+"""In a side street: up to the 400 an hour in both directions of a residential street (RASt 06)."""
+HEADWAY_S = 3.0
+"""Least time between vehicles: what the IDM drivers keep in equilibrium at 30 km/h, so that nobody brakes at once."""
+DRIVER_MPS: Range = (7.0, SPEED_LIMIT_MPS)
+"""What oncoming drivers want in a 30 km/h zone. Those in the ego's lane keep the limit: the ego does not react, and
+none of them may hold it up."""
+TRAFFIC_KINDS = {"car": 0.78, "van": 0.08, "truck": 0.08, "bus": 0.06}
+"""Shares in moving traffic. Annotations of nuScenes with attribute moving or stopped: 161 thousand cars, 33 thousand
+trucks (which cover vans: half each), 13 thousand buses."""
+VEHICLE_BERTH_M = 0.5
+"""What people on foot or bicycle leave at least between themselves and a driving vehicle."""
+LEAD_M: Range = (28.0, 60.0)
+"""From the ego to the next vehicle ahead: beyond the gap that the IDM wants at 30 km/h."""
+BEYOND_M = 70.0
+"""The street is inhabited this far before the ego's first and beyond its last place: sight ends at 50 m."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The ego's scripted drive at every sample: world `poses` (t, 3), `motion`, and metres along the main road."""
+
+    poses: Floats
+    motion: tuple[Ego, ...]
+    along: Floats
+
+
+def ego_speeds(rng: np.random.Generator) -> Floats:
+    """(t,) the ego's speed at every sample, m/s."""
+    cruise, halts = draw(rng, EGO_CRUISE_MPS), rng.random() < EGO_HALT_CHANCE
+    begins = draw(rng, EGO_HALT_AT_S)
+    ends = begins + cruise / EGO_BRAKING_MPS2 + draw(rng, EGO_HALT_S)
+    speeds = [cruise]
+    for time in TIMES[:-1]:
+        wanted = 0.0 if halts and begins <= time < ends else cruise
+        least, most = speeds[-1] - EGO_BRAKING_MPS2 * STEP_S, speeds[-1] + EGO_STARTING_MPS2 * STEP_S
+        speeds.append(float(np.clip(wanted, least, most)))
+    return np.array(speeds)
+
+
+def drive_main(draft: Draft, plan: Plan) -> Drive:
+    """Drive the ego and the main road's traffic; the ego's way is kept clear of walkers."""
+    speeds = ego_speeds(draft.rng)
+    reach = float(speeds.sum() * STEP_S)
+    traffic = Traffic(plan.main.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
+    ego = traffic.add_ego(0.0, speeds[0], CATALOGUE["ego"])
+    drivers = _queue(draft, traffic, reach)
+    if len(plan.main.directions) > 1:
+        drivers += _oncoming(draft, traffic, reach)
+    ways = _run(traffic, [ego, *(vehicle for _, vehicle in drivers)], speeds)
+    drive = _drive(plan.main.curve, ways[:, 0], speeds)
+    draft.obstruct(drive.poses, CATALOGUE["ego"].size[:2], 2 * VEHICLE_BERTH_M)
+    for (kind, _), way in zip(drivers, np.moveaxis(ways[:, 1:], 1, 0), strict=True):
+        draft.drive(kind, plan.main.curve.to_world(way), VEHICLE_BERTH_M)
+    return drive
+
+
+def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
+    """Drive a side street's traffic: some leave along it, some come up to the main road and give way.
+
+    They wait before its pavement.
+    """
+    road = joining.road
+    nearest = main.side(joining.sign).boundary_m
+    traffic = Traffic(road.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
+    leaving = _places(draft, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
+    coming = _places(draft, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
+    drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [_driver(draft, traffic, s, 1) for s in coming]
+    if coming:
+        first = CATALOGUE[drivers[len(leaving)][0]]
+        traffic.add_stop_line(nearest + first.size[0] / 2, 1)
+    ways = _run(traffic, [vehicle for _, vehicle in drivers])
+    for (kind, _), way in zip(drivers, np.moveaxis(ways, 1, 0), strict=True):
+        draft.drive(kind, road.curve.to_world(way), VEHICLE_BERTH_M)
+
+
+Driver = tuple[str, RoadVehicle]
+"""A vehicle and its kind."""
+
+
+def _queue(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
+    """Those who drive along with the ego, ahead of it and behind."""
+    ahead = _places(draft, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
+    behind = [-s for s in _places(draft, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
+    return [_driver(draft, traffic, s, 0, SPEED_LIMIT_MPS) for s in ahead + behind]
+
+
+def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
+    """Those who come towards the ego, as far away as they may yet meet it."""
+    farthest = reach + BEYOND_M + SPEED_LIMIT_MPS * float(TIMES[-1])
+    return [_driver(draft, traffic, s, 1) for s in _places(draft, FLOW_PER_H, -BEYOND_M, farthest)]
+
+
+def _places(draft: Draft, flow_per_h: Range, first: float, last: float) -> list[float]:
+    """Places along a lane, from `first` to `last`, of vehicles that flow at the speed limit."""
+    mean_s = 3600.0 / draw(draft.rng, flow_per_h)
+    places, place = [], first + draft.rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
+    while place < last:
+        places.append(float(place))
+        place += (HEADWAY_S + draft.rng.exponential(mean_s - HEADWAY_S)) * SPEED_LIMIT_MPS
+    return places
+
+
+def _driver(draft: Draft, traffic: Traffic, s: float, lane: int, speed: float | None = None) -> Driver:
+    kind = str(draft.rng.choice(list(TRAFFIC_KINDS), p=list(TRAFFIC_KINDS.values())))
+    wanted = draw(draft.rng, DRIVER_MPS) if speed is None else speed
+    return kind, traffic.add_driver(s, lane, wanted, CATALOGUE[kind])
+
+
+def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | None = None) -> Floats:
+    """(t, n, 3) road places of vehicles at every sample; the first one is the ego when it has speeds."""
+    ways = np.empty((len(TIMES), len(vehicles), 3))
+    for sample in range(len(TIMES)):
+        ways[sample] = np.array([vehicle.pose for vehicle in vehicles]).reshape(-1, 3)
+        if ego_speeds is not None and sample + 1 < len(TIMES):
+            vehicles[0].accelerate((ego_speeds[sample + 1] - ego_speeds[sample]) / STEP_S, STEP_S)
+        traffic.step(STEP_S)
+    return ways
+
+
+def _drive(curve: Curve, way: Floats, speeds: Floats) -> Drive:
+    along = way[:, 0]
+    rates = [speed * curve.curvature_at(s) for s, speed in zip(along.tolist(), speeds.tolist(), strict=True)]
+    accelerations = np.diff(speeds, prepend=speeds[0]) / STEP_S
+    motion = tuple(Ego(*values) for values in zip(speeds.tolist(), rates, accelerations.tolist(), strict=True))
+    return Drive(curve.to_world(way), motion, along)

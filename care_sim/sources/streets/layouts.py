@@ -1,0 +1,183 @@
+"""Road layouts: which roads a scene has and how they are divided. Drawn first; everything else is placed on them.
+
+A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right. Widths follow
+the German RASt 06 (directives for urban streets), as in `care_sim.scenarios.base`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.core.frames import Pose
+from care_sim.scenarios.base import LANE_WIDTH_M, PARKING_WIDTH_M, PAVEMENT_WIDTH_M, Range, draw
+from care_sim.sources.streets.curve import Curve
+
+PAVEMENT_M: Range = (PAVEMENT_WIDTH_M, 4.0)
+"""From the least of RASt 06 to that of a shopping street."""
+CYCLE_LANE_M = 1.5
+"""An advisory cycle lane (RASt 06)."""
+CONTRAFLOW_M = 2.0
+"""A cycle lane against a one-way street, with the strip that keeps clear of car doors (RASt 06)."""
+GARDEN_M: Range = (3.0, 6.0)
+"""Front gardens: the usual set-back of a building line."""
+BEND_RADIUS_M: Range = (30.0, 60.0)
+"""At 30 km/h a sideways acceleration of 2.3 to 1.2 m/s^2: what drivers take in an urban bend."""
+BEND_TURN: Range = (np.deg2rad(30.0), np.deg2rad(90.0))
+"""From a bend that one sees around to a corner that one does not."""
+BEND_AT_M: Range = (15.0, 60.0)
+JUNCTION_AT_M: Range = (25.0, 80.0)
+"""Ahead of the ego's start, so that it comes by within the scene."""
+JUNCTION_ANGLE: Range = (np.deg2rad(75.0), np.deg2rad(105.0))
+"""RASt 06 asks for junctions that are nearly square."""
+EVEN_CHANCE = 0.5
+"""Where nothing speaks for either of two forms."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a road, from the edge of its outer lane outwards; `sign` is +1 on the left, -1 on the right."""
+
+    sign: int
+    lane_edge_m: float
+    cycle_m: float
+    parking_m: float
+    pavement_m: float
+    garden_m: float
+
+    @property
+    def cycle_d(self) -> float:
+        """Middle of the cycle lane."""
+        return self.sign * (self.lane_edge_m + self.cycle_m / 2)
+
+    @property
+    def parking_d(self) -> float:
+        """Middle of the parking lane."""
+        return self.sign * (self.lane_edge_m + self.cycle_m + self.parking_m / 2)
+
+    @property
+    def kerb_m(self) -> float:
+        """From the reference line to the pavement's inner edge."""
+        return self.lane_edge_m + self.cycle_m + self.parking_m
+
+    @property
+    def boundary_m(self) -> float:
+        """From the reference line to where the private ground begins."""
+        return self.kerb_m + self.pavement_m
+
+    @property
+    def front_m(self) -> float:
+        """From the reference line to the house fronts."""
+        return self.boundary_m + self.garden_m
+
+
+@dataclass(frozen=True)
+class Road:
+    """A road: its line, the directions of its lanes from right to left (+1 along it), and its two sides."""
+
+    curve: Curve
+    directions: tuple[int, ...]
+    right: Side
+    left: Side
+
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """Right, left."""
+        return self.right, self.left
+
+    def side(self, sign: int) -> Side:
+        """The left side for +1, the right one for -1."""
+        return self.left if sign > 0 else self.right
+
+    @property
+    def middle_d(self) -> float:
+        """Middle between the kerbs."""
+        return (self.left.kerb_m - self.right.kerb_m) / 2
+
+
+@dataclass(frozen=True)
+class Joining:
+    """A side street: it begins at the main road's `at_m`, on the side `sign`, and leads away from it."""
+
+    road: Road
+    at_m: float
+    sign: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The roads of a scene. The ego drives in lane 0 of the main one, along it."""
+
+    main: Road
+    joinings: tuple[Joining, ...] = ()
+
+
+def straight(rng: np.random.Generator) -> Plan:
+    """A straight two-way street with parking on both sides."""
+    return Plan(_road(rng, Curve()))
+
+
+def bend(rng: np.random.Generator) -> Plan:
+    """A two-way street that bends, left or right, round a corner of houses."""
+    radius, turn = draw(rng, BEND_RADIUS_M), draw(rng, BEND_TURN)
+    side = rng.choice((-1, 1))
+    return Plan(_road(rng, Curve((0.0, 0.0, 0.0), draw(rng, BEND_AT_M), radius * turn, side / radius)))
+
+
+def junction(rng: np.random.Generator) -> Plan:
+    """A two-way street with a T-junction, or a crossing, whose side streets give way."""
+    main, at = _road(rng, Curve()), draw(rng, JUNCTION_AT_M)
+    first = int(rng.choice((-1, 1)))
+    signs = (first,) if rng.random() < EVEN_CHANCE else (first, -first)
+    return Plan(main, tuple(Joining(_joining(rng, at, sign), at, sign) for sign in signs))
+
+
+def one_way(rng: np.random.Generator) -> Plan:
+    """A one-way street with a cycle lane against it, and a side street as often as not."""
+    main = _road(rng, Curve(), directions=(1,), cycles=(0.0, CONTRAFLOW_M))
+    if rng.random() < EVEN_CHANCE:
+        return Plan(main)
+    at, sign = draw(rng, JUNCTION_AT_M), int(rng.choice((-1, 1)))
+    return Plan(main, (Joining(_joining(rng, at, sign), at, sign),))
+
+
+LAYOUTS: dict[str, Callable[[np.random.Generator], Plan]] = {
+    "straight": straight,
+    "bend": bend,
+    "junction": junction,
+    "one-way": one_way,
+}
+"""Makers of layouts by name. Scenes take them in turn."""
+
+
+def _joining(rng: np.random.Generator, at: float, sign: int) -> Road:
+    """A two-way side street; its carriageway meets the main line at `at`."""
+    heading = sign * draw(rng, JUNCTION_ANGLE)
+    start: Pose = (
+        at + LANE_WIDTH_M / 2 * float(np.sin(heading)),
+        -LANE_WIDTH_M / 2 * float(np.cos(heading)),
+        heading,
+    )
+    return _road(rng, Curve(start), cycles=(0.0, 0.0))
+
+
+def _road(
+    rng: np.random.Generator,
+    curve: Curve,
+    directions: tuple[int, ...] = (1, -1),
+    cycles: tuple[float, float] | None = None,
+) -> Road:
+    if cycles is None:
+        cycles = (CYCLE_LANE_M,) * 2 if rng.random() < EVEN_CHANCE else (0.0, 0.0)
+    right, left = (
+        Side(
+            sign,
+            LANE_WIDTH_M * (0.5 if sign < 0 else len(directions) - 0.5),
+            cycle,
+            PARKING_WIDTH_M,
+            draw(rng, PAVEMENT_M),
+            draw(rng, GARDEN_M) if rng.random() < EVEN_CHANCE else 0.0,
+        )
+        for sign, cycle in zip((-1, 1), cycles, strict=True)
+    )
+    return Road(curve, directions, right, left)

@@ -1,0 +1,51 @@
+"""What a study varies, one thing at a time: places, levels, and where their rows are found."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from care_sim.reports.formatting import percent
+from care_sim.reports.summary import Key, key_of
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.task import Row
+
+
+class Place(NamedTuple):
+    """A scenario and a budget, where every level is played."""
+
+    scenario: str
+    budget: float
+
+    def __str__(self) -> str:
+        return f"{self.scenario}, {percent(self.budget)}"
+
+
+@dataclass(frozen=True)
+class Level:
+    """One value of what is varied: fields of `EpisodeConfig` that depart from the usual, or parameters of the policy.
+
+    `policy` plays instead of the study's own where the level is another policy.
+    """
+
+    label: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    policy: str | None = None
+
+    def configurations(self, place: Place, policies: Iterable[str], seeds: Sequence[int]) -> list[EpisodeConfig]:
+        """The episodes of this level; `full` runs once for all that it does not feel."""
+        given = {**self.changes, "policy_parameters": tuple(self.parameters.items())}
+        return grid([place.scenario], [self.policy or policy for policy in policies], [place.budget], seeds, **given)
+
+    def for_others(self) -> "Level":
+        """The same conditions for policies that lack the parameters."""
+        return Level(self.label, self.changes)
+
+    def key(self, place: Place, policy: str) -> Key:
+        """Where `care_sim.reports.summary` keeps the rows of a policy at this level."""
+        row: Row = {"scenario": place.scenario, "policy": self.policy or policy, "budget": place.budget}
+        key = key_of(row | dict(self.changes) | {f"policy.{name}": value for name, value in self.parameters.items()})
+        return (key[0].for_full(), "full", 1.0) if policy == "full" else key
+
+
+USUAL = Level("usual")

@@ -1,0 +1,139 @@
+"""What an episode is made of: checked when written down."""
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from math import prod
+from typing import Any, Self
+
+import gymnasium
+
+from care_sim.base.errors import check_known, check_seed
+from care_sim.core.conditions import Conditions
+from care_sim.envs import CLOSED_LOOP
+from care_sim.scenarios import make_scenario
+from care_sim.study.parameters import Parameters
+from care_sim.study.task import (
+    CONDITIONS,
+    Likeness,
+    Row,
+    Task,
+    check_size,
+    collected,
+    departures,
+    felt,
+    flat,
+)
+
+ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
+"""Environment id of every scenario."""
+
+
+@dataclass(frozen=True)
+class EpisodeConfig(Conditions, Task):
+    """Everything that decides an episode.
+
+    The fields are the arguments of the environments (see `care_sim.envs.closed_loop.ClosedLoopEnv`);
+    `scenario_parameters` and `policy_parameters` are pairs of name and value. Raises InvalidInput for
+    anything that scenario, environment or policy does not accept.
+    """
+
+    scenario: str
+    policy: str
+    budget: float = 0.1
+    seed: int = 0
+    scenario_parameters: Parameters = ()
+    policy_parameters: Parameters = ()
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+        self.settle("scenario_parameters", "policy_parameters")
+        make_scenario(self.scenario, **dict(self.scenario_parameters))
+        check_known("environment of the scenario", self.scenario, ENVIRONMENTS)
+        with self.make_env() as env:
+            self.make_policy(env)
+        super().__post_init__()
+
+    def with_seed(self, seed: int) -> Self:
+        """The same of another seed; what is sound for one is for all, so that only the seed is checked."""
+        check_seed(seed)
+        return self.changed(seed=int(seed))
+
+    def make_env(self) -> gymnasium.Env[Any, Any]:
+        """The environment of this episode, not yet reset."""
+        return gymnasium.make(
+            f"care_sim:{ENVIRONMENTS[self.scenario]}",
+            disable_env_checker=True,
+            budget=self.budget,
+            **{name: getattr(self, name) for name in CONDITIONS},
+            **dict(self.scenario_parameters),
+        )
+
+    def row(self) -> Row:
+        """Every parameter flat; those of scenario and policy as `scenario.NAME` and `policy.NAME`."""
+        plain = {name: getattr(self, name) for name in PLAIN_FIELDS}
+        return plain | flat("scenario", self.scenario_parameters) | flat("policy", self.policy_parameters)
+
+    @property
+    def label(self) -> str:
+        """A short name for people: scenario, policy, budget, seed and what departs from the defaults."""
+        main = ("scenario", "policy", "budget", "seed")
+        changes = departures(self, main)
+        return " ".join([f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes])
+
+    @property
+    def order(self) -> int:
+        """Seed by seed, so that an interrupted study leaves whole pairs."""
+        return self.seed
+
+    @property
+    def batch(self) -> Hashable:
+        """Every episode has a world of its own."""
+        return self
+
+    @property
+    def likenesses(self) -> tuple[Likeness, ...]:
+        """All but the seed; scenario, policy and budget; the policy; nothing."""
+        all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
+        return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
+
+
+PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITIONS]
+"""Fields that are one value."""
+
+
+def grid(
+    scenarios: Iterable[str],
+    policies: Iterable[str],
+    budgets: Sequence[float],
+    seeds: Sequence[int],
+    false_negative_rates: Sequence[float] = (0.0,),
+    camera_latencies: Sequence[int] = (0,),
+    **common: Any,
+) -> list[EpisodeConfig]:
+    """All combinations, without repeats; `full` runs once for all that it does not feel.
+
+    `common` are further fields of `EpisodeConfig`.
+    """
+    axes: list[Sequence[Any]] = [[*scenarios], [*policies], budgets, false_negative_rates, camera_latencies]
+    check_size(prod(map(len, axes)))
+    configs = (
+        _config(scenario, policy, budget, {"false_negative_rate": rate, "camera_latency": latency} | common)
+        for scenario, policy, budget, rate, latency in product(*axes)
+    )
+    return of_seeds([*dict.fromkeys(configs)], seeds)
+
+
+def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[EpisodeConfig]:
+    """The configurations with each of the seeds. Raises InvalidInput for too many, before they are made."""
+    check_size(len(configs) * len(seeds))
+    return [config.with_seed(seed) for config in configs for seed in dict.fromkeys(seeds)]
+
+
+def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
+    return EpisodeConfig(scenario, policy, **felt(policy, budget, given))
+
+
+def listed(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:
+    """The configurations as plain data, each once, with the list of its seeds."""
+    return {"configurations": collected([asdict(config) for config in configs], "seed", "seeds")}

@@ -1,0 +1,128 @@
+"""One episode: a configuration in, one tidy row out."""
+
+import hashlib
+import resource
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from traceback import extract_tb
+from typing import Any, TypeVar
+
+import gymnasium
+import numpy as np
+
+import care_sim
+from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.portable_hash import imprint
+from care_sim.core.types import Keyframe, Observation
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.policies.base import Policy
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.task import Row
+from care_sim.world.world import World
+
+Answer = TypeVar("Answer")
+Watcher = Callable[[ClosedLoop, Keyframe], None]
+Environment = gymnasium.Env[Any, Any]
+KIB_MB = 1024 / 1e6
+
+
+def attempt(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
+    """What a worker does: play episodes; of each its row, or in one line why there is none."""
+    return [answer(run_episode, config) for config in batch]
+
+
+def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
+    """What `play` returns, or in one line why it returns nothing: an exception stays in the worker, which alone may
+    know its class.
+    """
+    try:
+        return play(*arguments)
+    except InvalidInput as error:
+        return one_line(str(error))
+    except (Exception, SystemExit) as error:
+        return one_line(f"{type(error).__name__}: {error}").removesuffix(":") + _place(error)
+
+
+def run_episode(config: EpisodeConfig) -> Row:
+    """Play an episode and return its row.
+
+    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields of
+    `care_sim.core.types.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far; and
+    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`).
+    """
+    return trace(config)[0]
+
+
+def trace(
+    config: EpisodeConfig,
+    *watchers: Watcher,
+    begin: Callable[[ClosedLoop], None] = lambda _loop: None,
+    wrap: Callable[[Environment, Policy], Environment] = lambda env, _policy: env,
+) -> tuple[Row, list[Keyframe]]:
+    """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
+
+    `begin` is called before the first keyframe, `watchers` after every one; `wrap` puts wrappers that watch around the
+    environment.
+    """
+    started = time.perf_counter()
+    seal = Seal()
+    bare = config.make_env()
+    policy = config.make_policy(bare)
+    with wrap(bare, policy) as env:
+        observation, info = env.reset(seed=config.seed)
+        policy.reset()
+        begin(env.unwrapped.loop)  # type: ignore[attr-defined]
+        ended = False
+        while not ended:
+            observation, _, terminated, truncated, info = env.step(policy(observation))
+            seal.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
+            for watch in watchers:
+                watch(env.unwrapped.loop, env.unwrapped.keyframes[-1])  # type: ignore[attr-defined]
+            ended = terminated or truncated
+        keyframes: list[Keyframe] = env.unwrapped.keyframes  # type: ignore[attr-defined]
+    row = {
+        **config.row(),
+        "version": care_sim.__version__,
+        "digest": config.digest(),
+        **info["outcome"],
+        "keyframes": len(keyframes),
+        "wall_s": time.perf_counter() - started,
+        "peak_rss_mb": peak_rss_mb(),
+        "episode_hash": seal.hexdigest(),
+    }
+    return row, keyframes
+
+
+class Seal:
+    """A hash over all that happens in an episode."""
+
+    def __init__(self) -> None:
+        self._content = hashlib.sha256()
+
+    def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
+        """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
+        poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
+        self._content.update(imprint(np.asarray(fired, np.int64), observation["ranges"], poses))
+
+    def hexdigest(self) -> str:
+        """The hash so far."""
+        return self._content.hexdigest()[:16]
+
+
+def _place(error: BaseException) -> str:
+    """Where it was raised, for whoever has to find it in a file of their own."""
+    frames = extract_tb(error.__traceback__)
+    return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
+
+
+def peak_rss_mb() -> float:
+    """The most memory this process has held, in MB."""
+    status = Path("/proc/self/status")  # getrusage would count what the parent held when it started this process
+    lines = status.read_text().splitlines() if status.exists() else []
+    peaks = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+    if peaks:
+        return peaks[0] * KIB_MB
+    held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return held / (1e6 if sys.platform == "darwin" else 1e3)

@@ -1,0 +1,94 @@
+"""What a study plays: episodes of the closed loop, or plays of the open loop. How both run and are kept."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from care_sim.core.types import Outcome
+from care_sim.study import episode_config as config
+from care_sim.study import episode_play as episode
+from care_sim.study import play_config
+from care_sim.study import scene_play as plays
+from care_sim.study.added_columns import annotated, tagged
+from care_sim.study.row_schema import (
+    CONDITIONS,
+    COUNT,
+    FLAG,
+    PARAMETERS,
+    SEED,
+    SHARE,
+    SUM,
+    TEXT,
+    Column,
+    Schema,
+    with_gaps,
+)
+from care_sim.study.runner import Attempt
+from care_sim.study.task import Row
+
+
+@dataclass(frozen=True)
+class Kind:
+    """`unit` is what its tasks are called. `attempt` plays a batch; `finish` makes rows side by side into those that
+    are kept; `file` holds them, in columns of the `schema`; `listed` are configurations as plain data.
+    `aside` are further files, as columns by name, made of the rows as they were played.
+    """
+
+    unit: str
+    attempt: Attempt
+    finish: Callable[[Sequence[Row]], list[Row]]
+    file: str
+    schema: Schema
+    listed: Callable[[Any], dict[str, Any]]
+    aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
+
+
+_ORIGIN = dict.fromkeys(("version", "digest", "episode_hash", "tags"), with_gaps(TEXT))
+_EPISODES = Schema(
+    {name: CONDITIONS.get(name, TEXT) for name in config.PLAIN_FIELDS}
+    | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
+    | {name: with_gaps(SUM) for name, kind in Outcome.__annotations__.items() if kind == float | None},
+    _ORIGIN,
+)
+_PLAYS = Schema(
+    {name: CONDITIONS.get(name, TEXT) for name in (*play_config.PLAY_FIELDS, "film_hash")}
+    | {"budget": SHARE, "keyframes": COUNT, "floor_seed": COUNT, "ttfds": Column("lists of whole numbers", least=0)}
+    | dict.fromkeys((*plays.SUMS, "tracks", "explained"), SUM)
+    | dict.fromkeys(("differing_keyframes", "differing_cells"), with_gaps(COUNT)),
+    _ORIGIN
+    | dict.fromkeys(("recording", "camera_detections", "presence"), with_gaps(TEXT))
+    | {"emerging": with_gaps(COUNT)},
+    plays.SUMS,
+)
+EPISODES = Kind(
+    "episodes",
+    episode.attempt,
+    annotated,
+    "episodes.parquet",
+    _EPISODES,
+    config.listed,
+)
+PLAYS = Kind(
+    "plays",
+    plays.attempt,
+    lambda rows: [plays.without_events(row) for row in tagged(rows)],
+    "plays.parquet",
+    _PLAYS,
+    play_config.listed,
+    lambda rows: {"events.parquet": plays.event_columns(rows)},
+)
+KINDS = (EPISODES, PLAYS)
+
+
+def kind_in(folder: Path) -> Kind:
+    """The kind of the results in a folder; episodes where there are none."""
+    return next((kind for kind in KINDS if (folder / kind.file).is_file()), EPISODES)
+
+
+def is_parameter(name: str) -> bool:
+    """Whether a column of rows holds what a task was given."""
+    return name in _PARAMETERS or name.startswith(PARAMETERS)
+
+
+_PARAMETERS = frozenset({*config.PLAIN_FIELDS, *play_config.PLAY_FIELDS, "scene", "camera_detections", "presence"})

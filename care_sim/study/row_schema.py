@@ -1,0 +1,144 @@
+"""What the columns of results must be, so that every report can be made of them: checked where a file is opened."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from care_sim.core.conditions import DEFAULTS
+
+MOST = 1e12
+"""What a measured number may be and still be averaged and drawn."""
+PARAMETERS = ("scenario.", "policy.", "detector.")
+"""What the names of columns of parameters begin with."""
+
+
+def _is_text(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
+
+
+def _is_number(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
+
+
+def _is_list_of(is_kind: Callable[[pa.DataType], bool], kind: pa.DataType) -> bool:
+    is_list = pa.types.is_list(kind) or pa.types.is_large_list(kind)
+    return is_list and (pa.types.is_null(kind.value_type) or is_kind(kind.value_type))
+
+
+def _is_parameter(kind: pa.DataType) -> bool:
+    return _is_text(kind) or _is_number(kind) or pa.types.is_boolean(kind) or _is_list_of(_is_parameter, kind)
+
+
+_ANY = "text, numbers, flags or lists of them"
+KINDS: dict[str, Callable[[pa.DataType], bool]] = {
+    "text": _is_text,
+    "true or false": pa.types.is_boolean,
+    "whole numbers": pa.types.is_integer,
+    "numbers": _is_number,
+    "lists of whole numbers": lambda kind: _is_list_of(pa.types.is_integer, kind),
+    _ANY: _is_parameter,
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of one of `KINDS`, its numbers within `least` and `most`; `gaps` tells whether rows may hold nothing."""
+
+    kind: str
+    gaps: bool = False
+    least: float = -MOST
+    most: float = MOST
+
+    def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
+        """What is wrong with the values of a file, if anything."""
+        if self.gaps and pa.types.is_null(values.type):
+            return
+        if not KINDS[self.kind](values.type):
+            yield f"must hold {self.kind}, got {values.type}"
+        elif values.null_count and not self.gaps:
+            yield f"must hold {self.kind} in every row, got nothing in {values.null_count}"
+        else:
+            yield from self._beyond(values)
+
+    def _beyond(self, values: pa.ChunkedArray) -> Iterator[str]:
+        while _is_list_of(lambda _kind: True, values.type):
+            values = pc.list_flatten(values)
+            if values.null_count:
+                yield "must hold whole lists, got lists with gaps"
+        if not _is_number(values.type) or self.kind == _ANY:
+            return
+        ends = pc.min_max(values).as_py()
+        finite = pc.all(pc.is_finite(values)).as_py() in (True, None)
+        if not finite or not self.least <= (ends["min"] or 0) or not (ends["max"] or self.least) <= self.most:
+            yield f"must hold {self.kind} from {self.least:g} to {self.most:g}"
+
+
+TEXT, FLAG = Column("text"), Column("true or false")
+COUNT = Column("whole numbers", least=0)
+SEED = Column("whole numbers", least=0, most=math.inf)
+SUM = Column("numbers", least=0)
+SHARE = Column("numbers", least=1e-9, most=1)
+PARAMETER = Column(_ANY, gaps=True)
+_OF_TYPES = {
+    bool: "true or false",
+    int: "whole numbers",
+    float: "numbers",
+    str: "text",
+    tuple: "lists of whole numbers",
+}
+CONDITIONS = {name: Column(_OF_TYPES[type(value)], gaps=True) for name, value in DEFAULTS.items()}
+
+
+def with_gaps(column: Column) -> Column:
+    """The same where rows may hold nothing."""
+    return replace(column, gaps=True)
+
+
+@dataclass(frozen=True)
+class Schema:
+    """The columns of a kind of results: those that are `needed`, `further` ones that are checked where they are, and
+    `sums`, which come again for every stratum as KIND/STRATUM/NAME, all or none. Columns of parameters are known too,
+    all others are not read.
+    """
+
+    needed: Mapping[str, Column] = field(default_factory=dict)
+    further: Mapping[str, Column] = field(default_factory=dict)
+    sums: tuple[str, ...] = ()
+
+    def faults(self, table: pa.Table) -> Iterator[str]:
+        """What is wrong with a table, if anything."""
+        names = table.column_names
+        if missing := sorted({*self.needed, *self._strata(names)} - {*names}):
+            yield f"it lacks {', '.join(missing)}"
+        elif not table.num_rows:
+            yield "it is empty"
+        else:
+            for name in self.known(table):
+                yield from (f"its column {name} {fault}" for fault in self._column(name).faults(table[name]))
+
+    def known(self, table: pa.Table) -> list[str]:
+        """The columns that are read."""
+        strata = self._strata(table.column_names)
+        known = {*self.needed, *self.further, *strata}
+        return [name for name in table.column_names if name in known or name.startswith(PARAMETERS)]
+
+    @property
+    def lenient(self) -> "Schema":
+        """The same where nothing is needed: of results that an older version wrote."""
+        return Schema({}, {**self.needed, **self.further})
+
+    def _column(self, name: str) -> Column:
+        if name.startswith(PARAMETERS):
+            return {**self.further, **self.needed}.get(name, PARAMETER)
+        return {**self.further, **self.needed}.get(name, SUM)
+
+    def _strata(self, names: list[str]) -> set[str]:
+        """All columns of the strata of which one is there."""
+        parts = (name.split("/") for name in names)
+        strata = {
+            (kind, label) for kind, label, last in (part for part in parts if len(part) == 3) if last in self.sums
+        }
+        return {f"{kind}/{label}/{name}" for kind, label in strata for name in self.sums}

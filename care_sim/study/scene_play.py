@@ -1,0 +1,191 @@
+"""The plays of a scene: every policy meets the same film; one tidy row a play, and its events."""
+
+import hashlib
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, astuple, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+import care_sim
+from care_sim.base.portable_hash import imprint
+from care_sim.core.grid import Cells
+from care_sim.core.residual import explained
+from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
+from care_sim.evaluation.recall import Score, Tally
+from care_sim.evaluation.strata import strata
+from care_sim.loops.film import Film
+from care_sim.loops.open_loop import Exposure
+from care_sim.study.episode_play import answer, peak_rss_mb
+from care_sim.study.play_config import PlayConfig
+from care_sim.study.task import FULL, REFERENCE, Row
+
+SUMS = tuple(field.name for field in fields(Tally))
+EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
+"""What is known of an event before any policy plays."""
+_NAMES = ("source", "scene", "policy", "budget", "detector", "floor_seed", "camera_latency", "digest")
+"""Columns by which an event finds its play."""
+
+
+def attempt(batch: Sequence[PlayConfig]) -> list[Row | str]:
+    """What a worker does: the plays of one scene; of each its row, or in one line why there is none."""
+    scene = answer(PlayedScene, batch[0])
+    if isinstance(scene, str):
+        return [scene] * len(batch)
+    return [answer(scene.row, config, len(batch)) for config in batch]
+
+
+@dataclass(frozen=True)
+class Playback:
+    """What happened in a play. `tracks` and `explained` are means a keyframe: tracks held, and camera detections
+    that a forecast explains.
+    """
+
+    score: Score
+    exposures: list[Exposure]
+    tracks: float
+    explained: float
+    wall_s: float
+
+    @property
+    def fired(self) -> list[Cells]:
+        """The cells of every keyframe."""
+        return [exposure.fired for exposure in self.exposures]
+
+
+class PlayedScene:
+    """Plays policies in one scene; those of the reference are kept, since the others are compared with them.
+
+    Raises InvalidInput where the film of the scene cannot be made.
+    """
+
+    def __init__(self, config: PlayConfig):
+        started = time.perf_counter()
+        self._film = config.source.film(config.scene)
+        self._film_s = time.perf_counter() - started
+        self._film_hash = film_hash(self._film)
+        self._references: dict[PlayConfig, Playback] = {}
+
+    def row(self, config: PlayConfig, sharers: int = 1) -> Row:
+        """The row of a play.
+
+        Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the same film was
+        played, and `episode_hash`, over what was fired and detected; the fields of `Tally`, those of every stratum as
+        `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the events; `emerging`, by how many events the two presences
+        differ (`care_sim.evaluation.sightings`); `tracks` and `explained`;
+        `differing_keyframes` and `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s`
+        with the share of the film's that falls to one of so many plays.
+        """
+        playback = self._playback(config)
+        score = playback.score
+        return {
+            **config.row(),
+            "version": care_sim.__version__,
+            "digest": config.digest(),
+            "film_hash": self._film_hash,
+            "episode_hash": _episode_hash(playback.exposures),
+            "keyframes": len(playback.exposures),
+            **asdict(score.tally()),
+            **_strata(score),
+            "ttfds": tuple(score.delays.tolist()),
+            "sightings": _sightings(score),
+            "emerging": len(score.sightings.emerging),
+            "tracks": playback.tracks,
+            "explained": playback.explained,
+            **self._difference(config, playback),
+            "wall_s": playback.wall_s + self._film_s / sharers,
+            "peak_rss_mb": peak_rss_mb(),
+        }
+
+    def _playback(self, config: PlayConfig) -> Playback:
+        if config != _reference(config):
+            return play(config, self._film)
+        if config not in self._references:
+            self._references[config] = play(config, self._film)
+        return self._references[config]
+
+    def _difference(self, config: PlayConfig, playback: Playback) -> Row:
+        reference = _reference(config)
+        if config.policy == FULL or config == reference:
+            return {"differing_keyframes": None, "differing_cells": None}
+        moved: AllocationDifference = allocation_difference(playback.fired, self._playback(reference).fired)
+        return {"differing_keyframes": moved.differing, "differing_cells": moved.cells}
+
+
+def play(config: PlayConfig, film: Film) -> Playback:
+    """Play a policy through the film of its scene."""
+    started = time.perf_counter()
+    with config.make_env(film) as env:
+        policy = config.make_policy(env)
+        observation, _ = env.reset(seed=config.scene.seed)
+        policy.reset()
+        loop = env.loop
+        counts = []
+        while not loop.over:
+            belief = loop.belief
+            counts.append((len(belief.tracks), int(explained(belief.detections, belief.tracks, loop.rig).sum())))
+            observation, *_ = env.step(policy(observation))
+        score, exposures = env.score, env.exposures
+    tracks, explanations = np.mean(counts, axis=0).tolist()
+    return Playback(score, exposures, tracks, explanations, time.perf_counter() - started)
+
+
+def without_events(row: Row) -> Row:
+    """The row without what only its events need."""
+    return {name: value for name, value in row.items() if name != "sightings"}
+
+
+def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
+    """The events of all plays as columns of one table: the play's names, then what was seen where, and when found."""
+    counts = [len(row["ttfds"]) for row in rows]
+    names = {name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts) for name in _NAMES}
+    seen = {name: [value for row in rows for value in row["sightings"][name]] for name in EVENT_COLUMNS}
+    delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
+    return {**names, **seen, "detected": delays == 0, "ttfd": delays}
+
+
+def film_hash(film: Film) -> str:
+    """A hash over what a film shows and who is hidden at its start, measured numbers rounded (`care_sim.base.portable_hash`).
+
+    Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a round body by
+    iteration, which makes a millimetre of a last bit.
+    """
+    cameras = tuple(astuple(camera) for camera in film.cameras)
+    content = hashlib.sha256(imprint(film.name, cameras, film.sensor_height_m, film.keyframe_s))
+    for shot in film.shots:
+        seen, sights, cloud = shot.annotations, shot.sights, shot.cloud
+        content.update(imprint(shot.time_s, shot.token, astuple(shot.ego)))
+        content.update(imprint(seen.objects, seen.classes, seen.boxes, sights.detections.rows(), sights.objects))
+        content.update(imprint(cloud.cells, cloud.objects))
+    hidden = film.hidden
+    content.update(imprint(hidden.objects, hidden.classes, hidden.boxes))
+    return content.hexdigest()[:16]
+
+
+def _reference(config: PlayConfig) -> PlayConfig:
+    """The play of the reference policy under the same conditions."""
+    return config.changed(policy=REFERENCE, policy_parameters=())
+
+
+def _strata(score: Score) -> Row:
+    return {
+        f"{kind}/{label}/{name}": value
+        for kind, masks in strata(score.sightings.frames).items()
+        for label, mask in masks.items()
+        for name, value in asdict(score.tally(mask)).items()
+    }
+
+
+def _sightings(score: Score) -> dict[str, list[Any]]:
+    """What is known of the events, as columns; metres and radians to three decimals."""
+    rows = score.event_rows()
+    columns = {name: [row[name] for row in rows] for name in EVENT_COLUMNS}
+    return {name: [round(v, 3) if isinstance(v, float) else v for v in column] for name, column in columns.items()}
+
+
+def _episode_hash(exposures: Sequence[Exposure]) -> str:
+    content = hashlib.sha256()
+    for exposure in exposures:
+        content.update(imprint(exposure.fired, exposure.detections.classes, exposure.detections.boxes))
+    return content.hexdigest()[:16]

@@ -1,0 +1,1 @@
+"""Pictures of keyframes and clips of episodes."""

@@ -1,0 +1,80 @@
+"""The picture of a keyframe beside that of another policy: chase view, the cells ahead, and what came of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import Keyframe
+from care_sim.evaluation.metrics import outcome
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
+from care_sim.viewer.pictures.furnished_world import add_car, furnished
+from care_sim.viewer.pictures.keyframe import BRAKING, DETECTED, IN_VIEW, mark_first_sighting, mark_tracks
+
+_VIEW = (512, 320)
+_CAMERA = PinholeCamera(*_VIEW, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
+_TOP, _COLUMN_PIXELS, _ROW_PIXELS = 36, 2, 3
+_GRID_TOP = _TOP + _VIEW[1] + 22
+WIDTH, HEIGHT = _VIEW[0], 508
+
+
+def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
+    """A picture WIDTH x HEIGHT of where `loop` stands after the keyframes `frames`, under the heading `name`.
+
+    Above, the street from behind the car, as in `care_sim.viewer.pictures.keyframe`. Below, the front half of the angular grid
+    with the cells that fired, coloured by range, and whether the first-sighting actor is detected, since when and how
+    far away. The episode is left as it was.
+    """
+    canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
+    draw = ImageDraw.Draw(canvas)
+    _write_header(draw, name, loop, frames[-1])
+    canvas.paste(_chase_view(loop, frames[-1]), (0, _TOP))
+    draw.text((8, _GRID_TOP - 20), f"{len(frames[-1].fired)} LiDAR cells fired, those ahead:", FAINT, drawing.font(14))
+    canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
+    text, colour = verdict(frames, loop.rig.keyframe_s)
+    draw.text((8, HEIGHT - 26), text, colour, drawing.font(18))
+    return canvas
+
+
+def _write_header(draw: ImageDraw.ImageDraw, name: str, loop: ClosedLoop, frame: Keyframe) -> None:
+    draw.text((8, 6), name, INK, drawing.font(22))
+    draw.text((250, 8), f"{loop.world.time:.1f} s", FAINT, drawing.font(18))
+    draw.text((305, 8), f"{loop.world.ego_motion.speed:.1f} m/s", FAINT, drawing.font(18))
+    if frame.braking:
+        draw.rounded_rectangle((398, 4, 508, 32), 6, BRAKING)
+        draw.text((453, 18), "BRAKING", PAPER, drawing.font(20), anchor="mm")
+
+
+def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
+    with furnished(loop.world) as scene:
+        add_car(scene, loop.world, LIDAR_POSITION[0])
+        view = Image.fromarray(scene.colours(_CAMERA, loop.sensor))
+    draw = ImageDraw.Draw(view)
+    mark_tracks(draw, _CAMERA, loop.belief.tracks)
+    mark_first_sighting(draw, _CAMERA, loop, frame)
+    return view
+
+
+def _cells_ahead(loop: ClosedLoop) -> Image.Image:
+    grid = loop.rig.grid
+    whole = drawing.grid_picture(grid, loop.belief.ranges, 1)
+    ahead = whole.crop((grid.columns // 4, 0, 3 * grid.columns // 4, grid.rows))
+    return ahead.resize((ahead.width * _COLUMN_PIXELS, ahead.height * _ROW_PIXELS), Image.Resampling.NEAREST)
+
+
+def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:
+    """What has come of the first sighting so far."""
+    seen = next((frame.time_s for frame in frames if frame.in_view), None)
+    found = next((frame.time_s for frame in frames if frame.detected), None)
+    if found is None:
+        if seen is None:
+            return "not in view yet", FAINT
+        return f"in view for {frames[-1].time_s - seen + keyframe_s:.1f} s, not detected", IN_VIEW
+    so_far = outcome(frames)
+    late = f", {found - seen:.1f} s late" if seen is not None and found > seen else ""
+    clearance = "" if so_far.clearance_m is None else f"; least clearance {so_far.clearance_m:.1f} m"
+    return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED

@@ -1,0 +1,80 @@
+"""What is drawn over pictures: boxes in space, boxes in the image, labels, the angular grid in colours."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from care_sim.core.frames import BOX_EDGES, Floats, box_corners
+from care_sim.core.grid import AngularGrid
+from care_sim.core.pinhole import NEAR_M, PinholeCamera
+
+Colour = tuple[int, int, int]
+
+INK, FAINT, PAPER = (235, 237, 240), (150, 155, 162), (24, 26, 30)
+NOT_FIRED, NO_RETURN = (44, 47, 53), (112, 116, 124)
+_RANGE_COLOURS = colormaps["plasma_r"]
+
+
+def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
+    """The font of every text, `size` pixels high."""
+    return ImageFont.load_default(size)
+
+
+def label(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour: Colour, size: int = 13) -> None:
+    """Text centred over a point, on a dark plate, kept inside the picture."""
+    left, top, right, bottom = draw.textbbox((0, 0), text, font(size))
+    width, height = right - left + 6, bottom - top + 6
+    canvas = draw.im.size
+    x = min(max(at[0] - width / 2, 0), canvas[0] - width)
+    y = min(max(at[1] - height - 2, 0), canvas[1] - height)
+    draw.rectangle((x, y, x + width, y + height), PAPER)
+    draw.text((x + 3 - left, y + 3 - top), text, colour, font(size))
+
+
+def wireframe(draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int) -> None:
+    """The edges of a sensor-frame box (7,) that lie wholly before the camera."""
+    pixels, depth = camera.project(box_corners(box[None])[0])
+    for start, end in BOX_EDGES:
+        if min(depth[start], depth[end]) > NEAR_M:
+            draw.line([*pixels[start].tolist(), *pixels[end].tolist()], colour, width)
+
+
+def point_above(camera: PinholeCamera, box: Floats) -> tuple[float, float] | None:
+    """The pixel of the middle of a box's roof; None behind the camera or outside the picture."""
+    (pixel,), (depth,) = camera.project([[box[0], box[1], box[2] + box[5] / 2]])
+    inside = depth > NEAR_M and 0 <= pixel[0] < camera.width and 0 <= pixel[1] < camera.height
+    return (float(pixel[0]), float(pixel[1])) if inside else None
+
+
+def arrow(draw: ImageDraw.ImageDraw, tip: tuple[float, float], text: str, colour: Colour) -> None:
+    """An arrow that points down at the label of `tip`, with a text of its own over it."""
+    x, y = tip[0], tip[1] - 20
+    draw.line((x, y - 34, x, y - 8), colour, 4)
+    draw.polygon([(x - 9, y - 14), (x + 9, y - 14), (x, y)], colour)
+    label(draw, (x, y - 36), text, colour, 15)
+
+
+def image_boxes(draw: ImageDraw.ImageDraw, boxes: Floats, names: Iterable[str], colours: Iterable[Colour]) -> None:
+    """Boxes (n, 4: left, top, right, bottom in pixels) with their names."""
+    for box, name, colour in zip(boxes.tolist(), names, colours, strict=True):
+        draw.rectangle(box, outline=colour, width=2)
+        label(draw, ((box[0] + box[2]) / 2, box[1]), name, colour, 11)
+
+
+def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: int) -> Image.Image:
+    """The scan (E, A) as the car sees it: left of the picture is the left, straight ahead is the middle."""
+    picture = np.full((*grid.shape, 3), NOT_FIRED, np.uint8)
+    fired = ranges > 0
+    returned = fired & (ranges < grid.range_m)
+    picture[fired] = NO_RETURN
+    picture[returned] = range_colours(ranges[returned] / grid.range_m)
+    return Image.fromarray(np.repeat(picture[:, ::-1], row_pixels, axis=0))
+
+
+def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """(..., 3) colours of ranges given as shares of the reach: near is bright."""
+    colours: NDArray[np.uint8] = _RANGE_COLOURS(0.05 + 0.75 * np.asarray(shares), bytes=True)[..., :3]
+    return colours

@@ -1,0 +1,118 @@
+"""The picture of a keyframe of the open loop: the scene from above, and the angular grid."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from care_sim.core.frames import Floats, box_corners
+from care_sim.evaluation.sightings import RANGE_M
+from care_sim.loops.film import Cloud
+from care_sim.loops.open_loop import Exposure, OpenLoop
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
+from care_sim.viewer.pictures.keyframe import HEIGHT, WIDTH, draw_grid
+from care_sim.world.bodies import CATALOGUE
+
+_TOP, _MAP_SIZE = 40, (WIDTH, 460)
+_BOTTOM = _TOP + _MAP_SIZE[1]
+_PIXELS_PER_M = _MAP_SIZE[1] / (2 * RANGE_M + 4)
+_RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
+_CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
+_AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
+
+FOUND, MISSED, OUT_OF_RANGE, RING = (80, 230, 110), (255, 120, 60), (95, 100, 108), (52, 56, 63)
+RETURN = (172, 176, 184)
+LEGEND = (
+    ("found", FOUND),
+    ("not found", MISSED),
+    ("beyond 50 m", OUT_OF_RANGE),
+    ("double line: its first sighting", INK),
+)
+
+
+def draw_plan(
+    loop: OpenLoop,
+    index: int,
+    exposure: Exposure | None,
+    found: NDArray[np.bool_],
+    scored: NDArray[np.bool_],
+    appearing: NDArray[np.bool_],
+) -> NDArray[np.uint8]:
+    """A picture (HEIGHT, WIDTH, 3) of keyframe `index` of a film from above, the car driving to the right.
+
+    The annotated objects (n,): found, not found, or beyond the range that is `scored`; those `appearing` have a double
+    line. The returns of the fired cells, and below the angular grid with their ranges. `exposure` is None before the
+    first scan. The episode is left as it was.
+    """
+    shot = loop.film.shots[index]
+    returned = _returned(shot.cloud, exposure)
+    canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
+    draw = ImageDraw.Draw(canvas)
+    colours = [FOUND if one else MISSED if near else OUT_OF_RANGE for one, near in zip(found, scored, strict=True)]
+    canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
+    _write_words(draw, loop, shot.time_s, exposure, int(found[scored].sum()), int(scored.sum()))
+    draw_grid(canvas, draw, loop.rig.grid, _ranges(loop, returned, exposure))
+    return np.asarray(canvas)
+
+
+def _map(boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np.bool_], points: Floats) -> Image.Image:
+    """Range rings, points (P, 3), the car and boxes (n, 7) with their colours."""
+    picture = Image.new("RGB", _MAP_SIZE, PAPER)
+    draw = ImageDraw.Draw(picture)
+    for metres in _RINGS:
+        (left, top), (right, bottom) = _pixels(np.array([[-metres, metres], [metres, -metres]])).tolist()
+        draw.ellipse((left, top, right, bottom), outline=RING)
+        draw.text((right - 4, (top + bottom) / 2), f"{metres:.0f} m", FAINT, drawing.font(11), anchor="rm")
+    draw.point(_pixels(points[:, :2]).ravel().tolist(), RETURN)
+    _draw_box(draw, _CAR, INK, 2)
+    for box, colour, appears in zip(boxes, colours, appearing, strict=True):
+        _draw_box(draw, box, colour, 2)
+        if appears:
+            _draw_box(draw, box + _AROUND, colour, 1)
+    return picture
+
+
+def _write_words(
+    draw: ImageDraw.ImageDraw, loop: OpenLoop, time_s: float, exposure: Exposure | None, found: int, objects: int
+) -> None:
+    budget = loop.rig.budget
+    fired = (
+        f"nothing fired yet, budget {budget} cells"
+        if exposure is None
+        else f"{len(exposure.fired)} of {budget} cells fired"
+    )
+    for x, text in ((12, f"{time_s:.1f} s"), (110, f"{found} of {objects} objects found"), (420, fired)):
+        draw.text((x, 8), text, INK, drawing.font(20))
+    draw.text((WIDTH - 12, 12), loop.film.name[:28], FAINT, drawing.font(14), anchor="ra")
+    draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
+    for row, (text, colour) in enumerate(LEGEND):
+        draw.text((20, _BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
+    draw.text((20, _BOTTOM + 40 + 24 * len(LEGEND)), "dots: returns", RETURN, drawing.font(16))
+
+
+def _draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, width: int) -> None:
+    corners = box_corners(box[None])[0, :4, :2]
+    draw.polygon(_pixels(corners).ravel().tolist(), outline=colour, width=width)
+
+
+def _pixels(places: Floats) -> Floats:
+    """(n, 2) pixels of the map for places (n, 2) in the sensor frame: ahead is right, left is up."""
+    pixels: Floats = np.array(_MAP_SIZE) / 2 + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
+    return pixels
+
+
+def _returned(cloud: Cloud, exposure: Exposure | None) -> Cloud:
+    """The returns of the cells that fired."""
+    fired = np.empty(0, np.int64) if exposure is None else exposure.fired
+    return cloud.take(np.isin(cloud.cells, fired))
+
+
+def _ranges(loop: OpenLoop, returned: Cloud, exposure: Exposure | None) -> NDArray[np.float64]:
+    grid = loop.rig.grid
+    ranges = np.zeros(grid.size)
+    if exposure is not None:
+        ranges[exposure.fired] = grid.range_m
+        np.minimum.at(ranges, returned.cells, np.linalg.norm(returned.points, axis=1))
+    return ranges.reshape(grid.shape)

@@ -1,0 +1,1 @@
+"""Recordings of episodes that the Rerun viewer plays."""

@@ -1,0 +1,57 @@
+"""A lane of a recording: the entities of one episode, all below its name."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from care_sim.core.frames import Floats
+from care_sim.viewer.recording.entities import KEYFRAME, SECONDS
+
+THIN = -1.0
+"""Radius of lines; Rerun takes negative ones for points of the screen."""
+
+
+def entity_path(lane: str, entity: str) -> str:
+    """The path of an entity of an episode; the name of a lane may hold anything."""
+    return f"{rr.escape_entity_path_part(lane)}/{entity}"
+
+
+class Lane:
+    """Logs below `name` into a stream."""
+
+    def __init__(self, stream: rr.RecordingStream, name: str):
+        self._stream, self.name = stream, name
+        self._counts: dict[str, int] = {}
+
+    def at(self, keyframe: int, time_s: float) -> None:
+        """What is logged from now on belongs to this keyframe."""
+        self._stream.set_time(KEYFRAME, sequence=keyframe)
+        self._stream.set_time(SECONDS, duration=time_s)
+
+    def log(self, entity: str, *content: Any) -> None:
+        """Log at the present keyframe."""
+        self._stream.log(entity_path(self.name, entity), *content)
+
+    def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
+        """Log a list of `count` things at the present keyframe, made by `make`; nothing if it was and is empty."""
+        if count or self._counts.get(entity) != 0:
+            self.log(entity, *make())
+        self._counts[entity] = count
+
+    def log_curve(self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats) -> None:
+        """Log a number a keyframe (n,) at once, which costs as much as logging one."""
+        times = rr.TimeColumn(KEYFRAME, sequence=keyframes), rr.TimeColumn(SECONDS, duration=times_s)
+        self._stream.send_columns(entity_path(self.name, entity), times, rr.Scalars.columns(scalars=values))
+
+    def fix(self, entity: str, *content: Any) -> None:
+        """Log what holds for the whole episode."""
+        self._stream.log(entity_path(self.name, entity), *content, static=True)
+
+
+def boxes(table: Floats, **looks: Any) -> rr.Boxes3D:
+    """Boxes (n, 7), upright, in the frame of their entity."""
+    half = table[:, 6] / 2
+    turns = np.column_stack([np.zeros((len(table), 2)), np.sin(half), np.cos(half)])
+    return rr.Boxes3D(centers=table[:, :3], sizes=table[:, 3:6], quaternions=turns, **looks)

@@ -1,0 +1,81 @@
+"""The blueprint: views that tell the story without a click."""
+
+from collections.abc import Sequence
+
+import rerun.blueprint as rrb
+
+from care_sim.viewer.recording.entities import ABOUT, SECONDS
+from care_sim.viewer.recording.lane import entity_path
+
+EYE_M, TARGET_M = (-11.0, 0.0, 6.0), (12.0, 0.0, -1.0)
+"""Behind the car and above it, in the sensor frame."""
+DARK = (24, 26, 30)
+FIRED = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
+
+
+def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
+    """Of one episode, or of several side by side."""
+    story = _one(lanes[0]) if len(lanes) == 1 else _several(lanes)
+    time = rrb.TimePanel(state="collapsed", timeline=SECONDS, play_state="playing", loop_mode="all")
+    panels = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time
+    return rrb.Blueprint(story, *panels, auto_layout=False, auto_views=False)
+
+
+def _one(lane: str) -> rrb.Vertical:
+    words = rrb.Tabs(
+        rrb.TextLogView(
+            origin=entity_path(lane, "events"),
+            name="What happened",
+            columns=rrb.TextLogColumns(text_log_columns=["Body"]),
+        ),
+        rrb.TextDocumentView(origin=entity_path(lane, "outcome"), name="Outcome"),
+        rrb.TextDocumentView(origin=ABOUT, name="About"),
+    )
+    budget = rrb.TimeSeriesView(origin=entity_path(lane, "budget"), name="Budget, percent")
+    side = rrb.Vertical(_camera(lane), words, row_shares=[3, 2])
+    below = rrb.Horizontal(_states([lane]), *_plots([lane]), budget)
+    return rrb.Vertical(
+        rrb.Horizontal(_chase(lane), side, column_shares=[3, 2]),
+        _grid(lane),
+        below,
+        row_shares=[5, 1.7, 2],
+    )
+
+
+def _several(lanes: Sequence[str]) -> rrb.Vertical:
+    columns = [rrb.Vertical(_chase(lane), _camera(lane), _grid(lane), row_shares=[4, 3, 1.3]) for lane in lanes]
+    below = rrb.Horizontal(_states(lanes), *_plots(lanes))
+    return rrb.Vertical(rrb.Horizontal(*columns), below, row_shares=[4, 0.5 + 0.4 * len(lanes)])
+
+
+def _chase(lane: str) -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        origin=entity_path(lane, "world/lidar"),
+        contents=[f"+ {entity_path(lane, 'world/**')}", f"- {entity_path(lane, 'world/lidar/camera/**')}"],
+        name=f"{lane}: the street",
+        background=DARK,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=EYE_M, look_target=TARGET_M, eye_up=(0, 0, 1)),
+    )
+
+
+def _camera(lane: str) -> rrb.Spatial2DView:
+    name = f"{lane}: camera: blue explained, orange residual, red missed by fault"
+    return rrb.Spatial2DView(origin=entity_path(lane, "world/lidar/camera"), name=name)
+
+
+def _grid(lane: str) -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {FIRED}")
+
+
+def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(
+        contents=[entity_path(lane, "states/**") for lane in lanes], name="Who is seen, who brakes"
+    )
+
+
+def _plots(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
+    return [
+        rrb.TimeSeriesView(contents=[entity_path(lane, f"measures/{name}") for lane in lanes], name=title)
+        for name, title in (("speed", "Speed, m/s"), ("clearance", "Clearance, m"))
+    ]

@@ -1,0 +1,88 @@
+"""A file that the Rerun viewer plays: episodes in lanes, side by side."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+
+from care_sim.base.errors import InvalidInput, unknown
+from care_sim.base.files import RERUN, replacing
+from care_sim.core.types import Rig
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.watcher import Moment
+from care_sim.viewer.recording.camera_photo import photograph
+from care_sim.viewer.recording.curves import Curves
+from care_sim.viewer.recording.entities import ABOUT, LANES, about
+from care_sim.viewer.recording.grid_pictures import Pictures
+from care_sim.viewer.recording.lane import Lane
+from care_sim.viewer.recording.layout import blueprint
+from care_sim.viewer.recording.space import Space
+
+
+class Recording(AbstractContextManager["Recording"]):
+    """Writes `path`, which is there once this is closed; `lanes` are the names of the episodes that will be in it.
+    Until then it is held in memory: 1 to 9 MB an episode.
+
+    Raises InvalidInput for a lane with the name of the page `about`, and as `care_sim.base.files.replacing` does.
+    """
+
+    def __init__(self, path: Path, lanes: Sequence[str]):
+        if ABOUT in lanes:
+            raise InvalidInput(f"{ABOUT!r} is a page of every recording: name the episode otherwise")
+        self._lanes = tuple(lanes)
+        self._file = ExitStack()
+        self._unfinished = self._file.enter_context(replacing(path, RERUN))
+        self._stream = rr.RecordingStream("care-sim")
+        # Rerun's own writer is a thread that a full disk ends, and whatever waits for it then waits for ever.
+        self._memory = self._stream.memory_recording()
+        self._stream.send_blueprint(blueprint(self._lanes), make_active=False)
+        self._file.callback(self._write)
+        self._stream.send_recording_name(path.stem)
+        self._stream.log(ABOUT, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True)
+
+    def episode(self, name: str, loop: ClosedLoop) -> "Episode":
+        """Begin the lane `name`. Raises InvalidInput for one that was not announced."""
+        if name not in self._lanes:
+            raise unknown("lane", name, self._lanes)
+        colour = LANES[self._lanes.index(name) % len(LANES)]
+        return Episode(Lane(self._stream, name), loop.rig, loop.world.ego_kind.size[1], colour)
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Finish the file. Raises OSError where it cannot be written."""
+        self._file.close()
+
+    def _write(self) -> None:
+        self._unfinished.write_bytes(self._memory.drain_as_bytes())
+        self._stream.disconnect()
+
+
+class Episode:
+    """Logs one episode, moment by moment."""
+
+    def __init__(self, lane: Lane, rig: Rig, ego_width_m: float, colour: tuple[int, int, int]):
+        self._lane = lane
+        self._space, self._pictures = Space(lane, rig, ego_width_m), Pictures(lane, rig)
+        self._curves = Curves(lane, rig.budget, colour)
+        self._photo = b""
+
+    def look(self, loop: ClosedLoop) -> None:
+        """Take the camera's picture of the keyframe that is about to be played."""
+        self._photo = photograph(loop)
+
+    def keep(self, moment: Moment) -> None:
+        """Log a keyframe that was played."""
+        frame = moment.frame
+        self._lane.at(frame.index, frame.time_s)
+        state = "detected" if frame.detected else "in view" if frame.in_view else "out of view"
+        self._space.log(moment, state)
+        self._pictures.log(moment, self._photo)
+        self._curves.log(moment, state)
+
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """Log how it ended."""
+        self._curves.end(outcome)

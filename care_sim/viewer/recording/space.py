@@ -1,0 +1,99 @@
+"""What is logged in space: bodies, the car and its way, returns, tracks, wedges."""
+
+import math
+
+import numpy as np
+import rerun as rr
+from rerun.components import FillMode
+
+from care_sim.core.frames import Floats
+from care_sim.core.residual import bundles
+from care_sim.core.types import CLASSES, Rig
+from care_sim.driving.braking import BrakingRules
+from care_sim.loops.watcher import Moment, Stance
+from care_sim.viewer.recording import entities as looks
+from care_sim.viewer.recording.lane import THIN, Lane, boxes
+
+PATH_M = 40.0
+CORNERS = (1, 2, 4, 3)
+"""The corners of an image box among its rays, in turn."""
+SHARE_COLOURS = np.array(looks.SHARE_COLOURS, np.uint8)
+GLASSY = FillMode.TransparentFillMajorWireframe
+"""People look through bodies at what they hide."""
+MARGIN_M = 0.15
+"""How much larger than its body the box of the first-sighting actor is drawn."""
+
+
+class Space:
+    """Logs the 3D part of an episode whose car is `ego_width_m` wide."""
+
+    def __init__(self, lane: Lane, rig: Rig, ego_width_m: float):
+        self._lane, self._rig = lane, rig
+        self._driven: list[Floats] = []
+        lane.fix("world", rr.ViewCoordinates.FLU)
+        width = ego_width_m + 2 * BrakingRules().side_margin_m
+        strip = np.array([[PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, PATH_M, width, 0.02, 0.0]])
+        lane.fix("world/lidar/path", boxes(strip, colors=looks.PATH, fill_mode=FillMode.Solid))
+        lane.fix("world/ego", rr.Boxes3D.from_fields(colors=[looks.EGO], fill_mode=FillMode.Solid))
+        lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=GLASSY))
+        lane.fix("world/driven", rr.LineStrips3D.from_fields(colors=[looks.EGO], radii=[THIN]))
+        lane.fix("world/lidar/returns", rr.Points3D.from_fields(radii=[2 * THIN]))
+        lane.fix("world/lidar/tracks", rr.Boxes3D.from_fields(show_labels=False))
+        lane.fix("world/lidar/velocities", rr.Arrows3D.from_fields(colors=[looks.EXPLAINED], radii=[0.08]))
+        for kind, colour in (("residual", (*looks.RESIDUAL, 200)), ("explained", (*looks.EXPLAINED, 50))):
+            lane.fix(f"world/lidar/wedges/{kind}", rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]))
+
+    def log(self, moment: Moment, state: str) -> None:
+        """A keyframe, with the state of the first-sighting actor."""
+        stance = moment.stance
+        self._log_bodies(stance, state)
+        self._log_ego(stance)
+        self._log_returns(moment)
+        self._log_tracks(stance)
+        for kind, chosen in (("residual", ~stance.known), ("explained", stance.known)):
+            self._log_wedges(kind, bundles(stance.belief.detections, self._rig)[chosen][:, CORNERS])
+
+    def _log_bodies(self, stance: Stance, state: str) -> None:
+        colours = [looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]] for label in stance.labels]
+        self._lane.log("world/bodies", boxes(stance.bodies, colors=colours, labels=stance.names))
+        if stance.target is not None:
+            around = stance.bodies[[stance.target]] + np.array([0, 0, 0, *[2 * MARGIN_M] * 3, 0])
+            text = [f"{stance.names[stance.target]}: {state}"]
+            self._lane.log("world/first_sighting", boxes(around, colors=looks.ACTOR_COLOURS[state], labels=text))
+
+    def _log_ego(self, stance: Stance) -> None:
+        self._lane.log("world/ego", boxes(stance.ego[None]))
+        self._driven.append(np.array([*stance.ego[:2], 0.03]))
+        self._lane.log("world/driven", rr.LineStrips3D([self._driven]))
+        sensor = stance.sensor
+        turn = rr.Quaternion(xyzw=sensor.rotation.as_quat())
+        self._lane.log("world/lidar", rr.Transform3D(translation=sensor.origin, quaternion=turn))
+
+    def _log_returns(self, moment: Moment) -> None:
+        cells, points = moment.returned(self._rig.grid)
+        step = math.ceil(len(cells) / looks.MOST_POINTS) or 1
+        colours = SHARE_COLOURS[moment.shares.ravel()[cells[::step]]]
+        self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
+
+    def _log_tracks(self, stance: Stance) -> None:
+        tracks = stance.belief.tracks
+        colours = [looks.COASTING if misses else looks.EXPLAINED for misses in tracks.misses]
+        names = [CLASSES[label] for label in tracks.classes]
+        moves = np.column_stack([tracks.velocities, np.zeros(len(tracks))])
+        for entity, make in (
+            ("tracks", lambda: [boxes(tracks.boxes, colors=colours, labels=names)]),
+            ("velocities", lambda: [rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])]),
+        ):
+            self._lane.log_list(f"world/lidar/{entity}", len(tracks), make)
+
+    def _log_wedges(self, kind: str, rays: Floats) -> None:
+        ends = looks.WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        strips = [strip for corners in ends for strip in _pyramid(corners)]
+        self._lane.log_list(f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)])
+
+
+def _pyramid(corners: Floats) -> list[Floats]:
+    """The edges of a wedge whose far corners (4, 3) are given, seen from the sensor: three lines."""
+    origin = np.zeros(3)
+    a, b, c, d = corners
+    return [np.array([origin, a, b, c, d, a]), np.array([b, origin, c]), np.array([origin, d])]

@@ -1,0 +1,104 @@
+"""Bodies as PyBullet's renderer draws them: convex polyhedra, which only stand near to round parts."""
+
+import math
+from collections.abc import Sequence
+from functools import cache, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from care_sim.core.frames import Floats
+from care_sim.world.bodies import Part
+
+RING = 32
+"""Points on each rim of a cylinder."""
+RIM_M = 0.001
+"""A cylinder is drawn larger by this."""
+SAME_FACE = 9
+"""Decimals to which two triangles of one face agree."""
+
+Integers = NDArray[np.int64]
+Mesh = tuple[Floats, Floats, Integers]
+Tables = tuple[Floats, Floats, Integers, Integers, Integers]
+
+_NOTHING: Mesh = np.empty((0, 3)), np.empty((0, 4)), np.empty((0, 2), np.int64)
+
+
+class Looks:
+    """Every part that cameras see, as a polyhedron in the frame of its body."""
+
+    def __init__(self) -> None:
+        self._owners: list[int] = []
+        self._parts: list[Part] = []
+        self._tables: Tables | None = None
+
+    def add(self, body: int, parts: Sequence[Part]) -> None:
+        """Take in what is seen of a body, its parts in its own frame."""
+        self._owners += [body] * len(parts)
+        self._parts += parts
+        self._tables = None
+
+    @property
+    def tables(self) -> Tables:
+        """All parts in one: corners (c, 3) in metres; faces (f, 4) outward unit normals and distances from the body's
+        origin in metres; edges (e, 2) the two faces that meet in each, counted within the part; (k + 1, 3) where the
+        rows of each part begin in these three; (k,) body ids.
+        """
+        if self._tables is None:
+            meshes = [_NOTHING, *map(_mesh, self._parts)]
+            starts = np.cumsum([[len(column) for column in mesh] for mesh in meshes], axis=0)
+            corners, faces, edges = (np.concatenate(column) for column in zip(*meshes, strict=True))
+            self._tables = corners, faces, edges, starts, np.array(self._owners, np.int64)
+        return self._tables
+
+
+def _mesh(part: Part) -> Mesh:
+    """A part's polyhedron in the frame of its body."""
+    corners, faces, edges = polyhedron(part.shape, part.size)
+    centre = np.array(part.centre)
+    return corners + centre, np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre]), edges
+
+
+@lru_cache(maxsize=256)
+def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
+    """Corners, faces and edges of a primitive about its centre; see `Looks.tables`."""
+    corners = _corners(shape, np.array(size))
+    hull = ConvexHull(corners)
+    equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
+    meets = np.stack([np.repeat(number, hull.neighbors.shape[1]), number[hull.neighbors].ravel()], axis=1)
+    edges = np.unique(meets[meets[:, 0] < meets[:, 1]], axis=0)
+    return corners, equations * (1, 1, 1, -1), edges
+
+
+def _corners(shape: str, size: Floats) -> Floats:
+    if shape == "box":
+        return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size / 2
+    if shape == "sphere":
+        return np.multiply(directions(), size / 2)
+    angles = 2 * np.pi * np.arange(RING) / RING
+    rims = [np.column_stack([np.sin(angles), np.cos(angles), np.full(RING, side)]) for side in (1.0, -1.0)]
+    points = np.concatenate(rims) * size / 2
+    furthest = np.argmax(np.round(directions() @ points.T, SAME_FACE), axis=1)
+    drawn: Floats = points[furthest] + RIM_M * directions()
+    return drawn
+
+
+@cache
+def directions() -> Floats:
+    """(42, 3) the unit vectors in which Bullet's `btShapeHull` feels for the surface of a round shape: the corners of
+    an icosahedron that stands on one of them, and the middles of its edges.
+    """
+    azimuths = np.deg2rad(np.arange(0, 360, 72))
+    rings = [_ring(azimuths + np.deg2rad(36), -1.0), _ring(azimuths, 1.0)]
+    corners = np.concatenate([[(0.0, 0.0, -1.0)], *rings, [(0.0, 0.0, 1.0)]])
+    one, other = np.nonzero(np.triu(np.isclose(corners @ corners.T, 1 / np.sqrt(5))))
+    middles = corners[one] + corners[other]
+    middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+    spread: Floats = np.concatenate([corners, middles])
+    return spread
+
+
+def _ring(azimuths: Floats, side: float) -> Floats:
+    points: Floats = np.column_stack([2 * np.cos(azimuths), 2 * np.sin(azimuths), np.full(len(azimuths), side)])
+    return points / math.sqrt(5)

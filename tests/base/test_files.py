@@ -1,0 +1,164 @@
+"""Files that are there whole or not at all."""
+
+import contextlib
+import os
+import re
+import socket
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.base.files import JSON, PNG, check_output, replacing, write_text
+
+
+def test_the_old_file_stays_until_the_new_one_is_whole(tmp_path):
+    file = tmp_path / "deeper" / "table.csv"
+    for text in ("old", "new"):
+        with replacing(file) as unfinished:
+            assert unfinished.suffix == ".csv"
+            unfinished.write_text(text)
+            assert not file.exists() or file.read_text() == "old"
+    assert file.read_text() == "new"
+    with contextlib.suppress(RuntimeError), replacing(file) as unfinished:
+        unfinished.write_text("half")
+        raise RuntimeError
+    assert file.read_text() == "new"
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_a_file_has_one_writer_at_a_time(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with replacing(tmp_path / "table.csv") as unfinished:
+        with pytest.raises(InvalidInput, match=r"table\.csv is being written already"):
+            replacing(unfinished.with_name("table.csv").relative_to(tmp_path)).__enter__()
+        unfinished.write_text("whole")
+    assert (tmp_path / "table.csv").read_text() == "whole"
+
+
+def test_what_a_killed_writer_left_goes_and_what_others_write_stays(tmp_path):
+    program = (
+        "import os, sys; from pathlib import Path; from care_sim.base.files import replacing\n"
+        "with replacing(Path(sys.argv[1])) as unfinished:\n"
+        "    print(unfinished.name, flush=True); sys.stdin.read(1); os.kill(os.getpid(), 9)"
+    )
+    file = tmp_path / "table.csv"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as writer:
+        unfinished = tmp_path / writer.stdout.readline().strip()
+        check_output(file)
+        assert unfinished.exists()  # it is alive
+        writer.communicate("x")
+    others = [unfinished.name + "x", unfinished.name.replace("table", "cable"), f".elsewhere.{writer.pid}.table.csv"]
+    for name in others:
+        (tmp_path / name).touch()
+    check_output(file)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(others)
+
+
+def test_a_folder_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match="is a folder"), replacing(tmp_path):
+        pass
+
+
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link.csv").symlink_to("far/table.csv")
+    for text in ("made", "replaced"):
+        write_text(tmp_path / "link.csv", text)
+        assert (tmp_path / "link.csv").is_symlink()
+        assert (tmp_path / "far" / "table.csv").read_text() == text
+    assert [path.name for path in (tmp_path / "far").iterdir()] == ["table.csv"]
+    (tmp_path / "round").symlink_to("round")
+    with pytest.raises(InvalidInput, match="leads back to itself"):
+        check_output(tmp_path / "round")
+
+
+def test_the_rights_of_a_file_stay(tmp_path):
+    file = tmp_path / "secret.json"
+    file.touch(0o600)
+    write_text(file, "{}")
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+def test_a_terminal_and_a_pipe_are_written_into(tmp_path):
+    ours, theirs = os.openpty()
+    os.set_blocking(ours, False)
+    (tmp_path / "link").symlink_to(os.ttyname(theirs))
+    write_text(tmp_path / "link", "to a device")
+    assert os.read(ours, 100) == b"to a device"
+    assert stat.S_ISCHR(os.stat(os.ttyname(theirs)).st_mode)
+    os.close(ours)
+    os.close(theirs)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    heard = []
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()), daemon=True)
+    reader.start()
+    with replacing(pipe, JSON) as unfinished:
+        unfinished.write_text("into a pipe")
+    reader.join(10)
+    assert heard == ["into a pipe"]
+    assert pipe.is_fifo()
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_the_output_of_the_process_is_written_into_wherever_it_goes(tmp_path):
+    program = (
+        "import sys; from pathlib import Path; from care_sim.base.files import write_text; "
+        "print('before'); write_text(Path('/dev/stdout'), 'between\\n'); print('after')"
+    )
+    with (tmp_path / "out").open("a") as out:
+        subprocess.run([sys.executable, "-c", program], stdout=out, check=True)
+    assert (tmp_path / "out").read_text() == "before\nbetween\nafter\n"
+
+
+def test_a_socket_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind("socket")
+        with pytest.raises(InvalidInput, match="socket is a block device or a socket"):
+            check_output(tmp_path / "socket")
+    assert stat.S_ISSOCK((tmp_path / "socket").stat().st_mode)
+
+
+@pytest.mark.parametrize(
+    ("old", "allowed"), [(b"", True), (b"\x89PNG..", True), (b"PAR1....", False), (b"hello", False)]
+)
+def test_a_file_of_another_kind_is_refused_before_anything_is_computed(old, allowed, tmp_path):
+    file = tmp_path / "mine.png"
+    file.write_bytes(old)
+    if allowed:
+        check_output(file, PNG)
+    else:
+        with pytest.raises(InvalidInput, match=r"mine\.png holds something else .*: remove it first"):
+            replacing(file, PNG).__enter__()
+    assert file.read_bytes() == old
+
+
+def test_a_name_too_long_is_refused_at_once_and_the_longest_is_written(tmp_path):
+    with pytest.raises(OSError, match="too long"):
+        check_output(tmp_path / ("n" * 256))
+    longest = tmp_path / ("ä" * 125 + ".json")
+    write_text(longest, "{}")
+    assert [path.name for path in tmp_path.iterdir()] == [longest.name]
+
+
+def test_nothing_is_written_but_through_one_door():
+    """A file of the package that is opened to be written is one that `replacing` has given; journals alone grow."""
+    package = Path(care_sim.__file__).parent
+    writes = re.compile(
+        r"(\w+)\.write_(?:text|bytes)\(|(\w+)\.open\(\s*\"[wax]|\bopen\((\w+), \"[wax]|savefig\((\w+)|to_parquet"
+    )
+    found = {
+        (file.name, next(filter(None, match.groups()), ""))
+        for file in package.rglob("*.py")
+        for match in writes.finditer(file.read_text())
+    }
+    assert {name for name, receiver in found if receiver.lstrip("_") != "unfinished"} == {"files.py", "journal.py"}

@@ -1,0 +1,105 @@
+"""The same happened, the same bytes: last bits do not count, a millimetre does."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from care_sim.base.portable_hash import STEP, imprint
+from care_sim.loops.film import NO_ANNOTATIONS, Annotations
+from care_sim.sources.streets.recording import record
+from care_sim.sources.streets.street import make_street
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_play import run_episode
+from care_sim.study.scene_play import film_hash
+from tests.helpers.places import ROOT
+from tests.helpers.processor_features import reduced
+
+EPISODES = [("cutin", "care", 0), ("dense", "history", 3)]
+"""The car that cuts in is turned by an arctangent."""
+
+
+def hashes():
+    episodes = [run_episode(EpisodeConfig(*named, seed=seed))["episode_hash"] for *named, seed in EPISODES]
+    return [*episodes, film_hash(some_keyframes(make_street(1)))]
+
+
+def some_keyframes(street):
+    part = slice(14, 17)
+    return record(replace(street, poses=street.poses[part], ego=street.ego[part], motion=street.motion[part]))
+
+
+def test_fewer_features_of_the_processor_give_the_same_hashes():
+    line = "import json; from tests.base.test_portable_hash import hashes; print(json.dumps(hashes()))"
+    child = subprocess.run(
+        [sys.executable, "-c", line], cwd=ROOT, env=reduced(), capture_output=True, text=True, check=True
+    )
+    assert json.loads(child.stdout.splitlines()[-1]) == hashes()
+
+
+def test_the_features_that_are_left_out_change_last_bits():
+    line = "import numpy as np; x = np.linspace(0.1, 9, 5000); print(np.arctan2(x, 10 - x).tobytes().hex())"
+    child = subprocess.run(
+        [sys.executable, "-c", line], cwd=ROOT, env=reduced(), capture_output=True, text=True, check=True
+    )
+    x = np.linspace(0.1, 9, 5000)
+    theirs, ours = np.frombuffer(bytes.fromhex(child.stdout.strip())), np.arctan2(x, 10 - x)
+    assert 0 < np.abs(theirs - ours).max() < 1e-15
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5, 1.5, 0.05, 0.1, 1e-4, 5e-5, 12.34565, -0.25, -3e-4, 50.0, 1e6])
+def test_round_numbers_are_not_on_a_border(value):
+    near = [value * (1 - 1e-13) - 1e-13, value, value * (1 + 1e-13) + 1e-13]
+    assert len({imprint(one) for one in near}) == 1
+
+
+def test_zero_has_no_sign_and_float32_is_not_another_number():
+    assert imprint(-0.0) == imprint(0.0)
+    assert imprint(np.float32(1.5)) == imprint(1.5)
+    assert imprint(np.float32(7.123456)) == imprint(7.123456)
+    assert imprint(np.arange(3, dtype=np.int32)) == imprint([0, 1, 2])
+
+
+def test_what_is_not_finite_is_told_apart():
+    strange = [np.inf, -np.inf, np.nan, 0.0, 1e300, -1e300]
+    assert len({imprint(one) for one in strange}) == len(strange)
+    assert imprint([np.inf, 1.0]) == imprint([np.inf, 1.0 + 1e-12])
+
+
+@given(arrays(np.float64, 5, elements=st.floats(-1e5, 1e5)), st.integers(0, 4), st.sampled_from([0.001, -0.001, 0.01]))
+def test_a_millimetre_is_noticed(values, place, change):
+    moved = values.copy()
+    moved[place] += change
+    assert imprint(moved) != imprint(values)
+
+
+@given(st.lists(st.integers(-(2**60), 2**60), min_size=1, max_size=5), st.integers(0, 4))
+def test_whole_numbers_are_taken_exactly(values, place):
+    assume(place < len(values))
+    other = [value + (n == place) for n, value in enumerate(values)]
+    assert imprint(np.array(other, np.int64)) != imprint(np.array(values, np.int64))
+
+
+def test_parts_do_not_run_into_each_other():
+    assert imprint([1, 2], [3]) != imprint([1], [2, 3]) != imprint([1, 2, 3])
+    assert imprint("a\udcff") != imprint("a?")
+    assert imprint("ab", "c") != imprint("a", "bc")
+    assert imprint(((1, 2), 3)) != imprint((1, (2, 3)))
+    assert imprint(np.zeros((2, 3), int)) != imprint(np.zeros((3, 2), int))
+
+
+def test_who_is_hidden_at_the_start_of_a_film_counts():
+    film = some_keyframes(make_street(1))
+    behind = Annotations(np.array([900]), np.array([0]), np.array([[9.0, 2.0, 0.0, 4.0, 2.0, 1.5, 0.0]]))
+    farther = replace(behind, boxes=behind.boxes + 0.01)
+    assert len({film_hash(replace(film, hidden=hidden)) for hidden in (NO_ANNOTATIONS, behind, farther)}) == 3
+
+
+def test_the_step_is_far_from_what_errs_and_from_what_counts():
+    assert np.spacing(np.float32(50.0)) * 20 < STEP < 0.001

@@ -1,0 +1,336 @@
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from care_sim.base.interrupts import SIGNALS
+from care_sim.cli import main
+from care_sim.commands.closed_loop import Reproduce
+from care_sim.commands.shared.options import Options
+from care_sim.policies import contenders
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.episode_play import run_episode
+from care_sim.study.results_files import EPISODES
+from care_sim.study.rows import read_rows, write_rows
+
+SHORT = ["--scenario-parameters", "duration_s=0.3"]
+
+
+def run(capsys, *arguments):
+    """Exit code, output and error lines of a command."""
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return end.value.code, out, err
+
+
+def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_thread(capsys):
+    before = [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)]
+    with ThreadPoolExecutor(1) as threads:
+        code, out, err = threads.submit(run, capsys, "detectors").result()
+    assert (code, err) == (0, "")
+    assert "cluster" in out
+    assert run(capsys, "detectors")[0] == 0
+    assert [signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)] == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        ([], ["reproduce", "sweep"]),
+        (["walk"], ["walk", "reproduce"]),
+        (["run"], ["SCENARIO"]),
+        (["run", "dance"], ["'dance'", "dartout"]),
+        (["run", "dense", "--policy", "best"], ["'best'", "care"]),
+        (["run", "dense", "--bugdet", "1"], ["--bugdet", "--budget"]),
+        (["run", "dense", "--budget", "x"], ["--budget", "'x'"]),
+        (["run", "dense", "--budget", "0"], ["budget", "(0, 1]"]),
+        (["run", "dense", "--budget", "1.5"], ["budget", "(0, 1]"]),
+        (["run", "dense", "--camera-latency", "-1"], ["camera_latency", ">= 0"]),
+        (["run", "dense", "--false-negative-rate", "1.1"], ["false_negative_rate", "[0, 1]"]),
+        (["run", "dense", "--lidar-dropout", "-1"], ["dropout", "[0, 1]"]),
+        (["run", "dense", "--reserve-fraction", "2"], ["reserve_fraction", "[0, 1]"]),
+        (["run", "dense", "--engine", "warp"], ["'warp'", "bullet"]),
+        (["run", "dense", "--min-returns", "0"], ["min_returns", ">= 1"]),
+        (["run", "dense", "--seed", "-1"], ["seed", ">= 0"]),
+        (["run", "dense", "--scenario-parameters", "wheels=3"], ["'wheels'", "vehicles"]),
+        (["run", "dense", "--scenario-parameters", "wheels"], ["NAME=VALUE", "'wheels'"]),
+        (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
+        (["sweep", "--seeds", "0"], ["seeds", "from 1 to"]),
+        (["sweep", "--budgets"], ["--budgets", "at least one"]),
+        (["sweep", "--scenarios"], ["--scenarios", "at least one"]),
+        (["reproduce", "--workers", "0"], ["workers", ">= 1"]),
+        (["report", "nowhere"], ["nowhere"]),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("care-sim: ")
+    assert err.count("\n") == 1
+    assert all(name in err for name in names), err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "run dartout --picture",
+        "run dartout --video",
+        "run dartout --record",
+        "compare dartout --record",
+        "bench --out",
+        "parity --out",
+        "train learned-scorer --out",
+        "report NOTHING -o",
+    ],
+)
+def test_what_stands_where_a_file_is_wanted_is_one_line_before_anything_is_computed(command, capsys, tmp_path):
+    """Somebody's table, and a folder."""
+    table, results = tmp_path / "table.png", tmp_path / "results"
+    table.write_bytes(b"PAR1 and rows")
+    write_rows(
+        [run_episode(EpisodeConfig("dartout", "random", scenario_parameters=(("duration_s", 0.1),)))],
+        results / EPISODES.file,
+    )
+    for place in (table, tmp_path) if "video" not in command else (table,):
+        code, out, err = run(capsys, *command.replace("NOTHING", str(results)).split(), place)
+        assert (code, out, err.count("\n")) == (2, "", 1), err
+        assert str(place) in err
+    assert table.read_bytes() == b"PAR1 and rows"
+
+
+def test_a_folder_that_cannot_be_written_is_named(capsys, tmp_path):
+    (tmp_path / "file").touch()
+    code, _, err = run(capsys, "sweep", "--seeds", "1", "--out", tmp_path / "file" / "out")
+    assert (code, err.count("\n")) == (2, 1)
+    assert str(tmp_path / "file") in err
+
+
+def test_a_damaged_parquet_file_is_named(capsys, tmp_path):
+    (tmp_path / EPISODES.file).write_bytes(b"PAR1 and then nothing")
+    code, _, err = run(capsys, "report", tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert EPISODES.file in err
+
+
+def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
+    (tmp_path / "journal.jsonl").touch()
+    code, _, err = run(capsys, "report", tmp_path)
+    assert (code, err) == (
+        2,
+        f"care-sim: {tmp_path} holds an unfinished study; the command that began it goes on there\n",
+    )
+    code, _, err = run(capsys, "report", tmp_path / "nowhere")
+    assert "no results at" in err
+
+
+def test_the_detectors_are_listed_with_a_line_each(capsys):
+    code, out, _ = run(capsys, "detectors")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()[:3]] == ["returns", "cluster", "torchscript"]
+    assert all(len(line.split()) > 5 for line in out.splitlines())
+
+
+def test_run_prints_the_timeline_and_the_outcome(capsys):
+    code, out, _ = run(capsys, "run", "dense", "--policy", "full", "--budget", "0.2", *SHORT)
+    assert code == 0
+    assert out.count("16384") == 2
+    assert max(map(len, out.splitlines())) <= 100
+    assert all(word in out for word in ("sensor to", "0.3 s after", "detection_distance_m", "episode_hash"))
+
+
+def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
+    axes = ["--scenarios", "dartout", "--policies", "random", "full", "--budgets", "0.05", "0.1"]
+    code, out, err = run(capsys, "sweep", *axes, "--seeds", "3", "4", "--out", tmp_path, "--workers", "1", *SHORT)
+    assert code == 0, err
+    rows = read_rows(tmp_path / EPISODES.file)
+    assert {(row["policy"], row["budget"], row["seed"]) for row in rows} == {
+        (policy, budget, seed)
+        for policy, budget in (("random", 0.05), ("random", 0.1), ("full", 1.0))
+        for seed in (3, 4)
+    }
+    (tmp_path / "tables.md").unlink()
+    code, again, _ = run(capsys, "report", tmp_path)
+    assert code == 0
+    assert again in out
+    assert (tmp_path / "tables.md").exists()
+
+
+@pytest.fixture
+def torn(tmp_path, monkeypatch):
+    """An installed package whose policy does not load."""
+    package = tmp_path / "site" / "torn-1.5.dist-info"
+    package.mkdir(parents=True)
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: torn\nVersion: 1.5\n")
+    (package / "entry_points.txt").write_text("[care_sim.policies]\ntorn = torn_policy:Torn\n")
+    monkeypatch.syspath_prepend(package.parent)
+
+
+def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_named(capsys, tmp_path, torn):
+    out = tmp_path / "out"
+    axes = ["--policies", "all", "--scenarios", "all", "--seeds", "1", "--workers", "1", "--out", out]
+    short = ["--scenario-parameters", "duration_s=0.1"]
+    code, _, err = run(capsys, "sweep", *axes, *short)
+    assert code == 1
+    assert err.count("care-sim: left out: policy torn cannot be loaded: ModuleNotFoundError") == 2
+    rows = read_rows(out / EPISODES.file)
+    assert {row["policy"] for row in rows} == set(contenders()) - {"torn"}
+    assert {row["scenario"] for row in rows} == set(SCENARIOS)
+    code, _, err = run(capsys, "sweep", "--policies", "torn", "--seeds", "1", "--out", out)
+    assert code == 2
+    assert "policy torn cannot be loaded" in err
+    assert err.endswith("care-sim: none of the policies can be played\n")
+
+
+def test_further_policies_join_a_set_study_and_a_broken_one_is_left_out(capsys, tmp_path, torn):
+    def short(seeds, also):
+        return grid(["dartout"], ["care", *also], [0.1], seeds, scenario_parameters=(("duration_s", 0.1),))
+
+    study = Reproduce(seeds=(1,), workers=1, also=("torn", "uncertainty"))
+    assert study.play("sweep", short, tmp_path / "out") == 1
+    assert "left out: policy torn cannot be loaded" in capsys.readouterr().err
+    assert {row["policy"] for row in read_rows(tmp_path / "out" / EPISODES.file)} == {"care", "uncertainty"}
+    assert Reproduce(seeds=(1,), workers=1, also=("torn",)).play("sweep", short, tmp_path / "alone") == 1
+    assert {row["policy"] for row in read_rows(tmp_path / "alone" / EPISODES.file)} == {"care"}
+
+
+def test_a_condition_has_one_value_or_several(capsys, tmp_path):
+    rates = ["--false-negative-rate", "0.3", "--false-negative-rates", "0.1", "0.2"]
+    code, _, err = run(capsys, "sweep", *rates, "--out", tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "give false_negative_rate one value or several, not both" in err
+
+
+def test_the_lists(capsys):
+    assert "care-sbf" in run(capsys, "policies")[1]
+    out = run(capsys, "scenarios")[1]
+    assert "dartout" in out
+    assert "vehicles=7" in out
+    assert "ego_speed_mps=(8.03, 8.63)" in out
+
+
+def test_an_installed_policy_that_does_not_load_is_listed_with_the_reason(capsys, tmp_path, monkeypatch):
+    info = tmp_path / "torn-1.5.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: torn\nVersion: 1.5\n")
+    (info / "entry_points.txt").write_text("[care_sim.policies]\ntorn = torn_policy:Torn\nzeta = care_sim:Policy\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    code, out, _ = run(capsys, "policies")
+    assert code == 0
+    assert "No module named 'torn_policy' [torn 1.5]" in out
+    assert "zeta" in out
+
+
+def test_the_defaults_are_those_of_an_episode():
+    usual = EpisodeConfig("dense", "care")
+    assert all(getattr(usual, name) == value for name, value in Options().arguments().items())
+
+
+@pytest.mark.parametrize("command", ["", "run", "sweep", "reproduce", "ablate", "faults", "crowding", "report"])
+def test_help_is_quick_and_complete(command):
+    code = "import sys; from care_sim.cli import main; main(sys.argv[1:])"
+    started = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", code, *command.split(), "--help"], capture_output=True, text=True, check=True
+    )
+    assert time.perf_counter() - started < 5
+    assert "--help" in done.stdout
+    assert "pyarrow" not in done.stderr
+
+
+def test_a_picture_of_the_braking_car(capsys, tmp_path):
+    from PIL import Image
+
+    picture = tmp_path / "deep" / "keyframe.png"
+    with pytest.raises(SystemExit) as end:
+        main(["run", "dartout", "--policy", "care", "--seed", "0", "--picture", str(picture)])
+    assert end.value.code == 0
+    assert Image.open(picture).size == (960, 720)
+
+
+def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
+    picture = tmp_path / "keyframe.png"
+    with pytest.raises(SystemExit):
+        main(["run", "dartout", "--picture", str(picture), "--scenario-parameters", "duration_s=0.2"])
+    assert "no picture" in capsys.readouterr().err
+    assert not picture.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["sweep", "--seeds", "9" * 22], "seeds"),
+        (["sweep", "--seeds", "9" * 5000], "seeds"),
+        (["reproduce", "--seeds", "1000000000"], "seeds"),
+        (["run", "dense", "--seed", str(2**64)], "seed"),
+        (["run", "dense", "--floor-seed", str(2**64)], "floor_seed"),
+        (["run", "dense", "--false-negative-burst", str(10**19)], "false_negative_burst"),
+        (["run", "dense", "--ego-speed-sigma", "1e19"], "ego_speed_sigma"),
+        (["run", "dense", "--scenario-parameters", "ego_speed_mps=(1e300,1e300)"], "ego_speed_mps of dense"),
+        (["run", "dense", "--scenario-parameters", "self=1"], "parameter of dense"),
+        (["run", "dense", "--policy-parameters", "a={[1]}"], "unknown parameter"),
+        (["run", "dense", "--policy-parameters", "a=" + "-" * 5000 + "1"], "unknown parameter"),
+        (["run", "dense", "--policy-parameters", "name=x"], "unknown parameter"),
+        (["run", "dense", "--policy", "care-sbf", "--policy-parameters", "k_safe={1}"], "k_safe"),
+        (["run", "\ud800"], "no text"),
+        (["run", "a\0b"], "no text"),
+        (["run", "dense", "--policy", "\udcff\x1b[31m"], r"\udcff\x1b[31m"),
+        (["run", "dense", "--video", ""], "an argument is empty"),
+        (["sweep", "--out="], "an argument is empty"),
+        (["run", "dense", "--export", "a" * 300], "path must be a path"),
+        (["protocol", "--scenes", "9" * 5000], "scenes"),
+        (["sweep", "--workers", str(10**30)], "workers"),
+        (["bench", "--seconds", "inf"], "seconds"),
+        (["parity", "--scenes", str(2**70)], "scenes"),
+    ],
+)
+def test_absurd_input_is_one_line_and_exit_code_2(arguments, named, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("care-sim: ")
+    assert err.rstrip("\n").isprintable()
+    assert named in err
+    assert len(err) < 2100
+
+
+@pytest.mark.parametrize("fault", [TypeError, RecursionError, MemoryError, OverflowError])
+def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, capsys, monkeypatch):
+    def fails(self):
+        raise fault("deep\ninside")
+
+    monkeypatch.delenv("CARE_SIM_DEBUG", raising=False)
+    monkeypatch.setattr("care_sim.cli.Scenarios.__call__", fails)
+    code, _, err = run(capsys, "scenarios")
+    assert code == 70
+    assert err.startswith(f"care-sim: unexpected {fault.__name__}: deep inside; please report it")
+    assert err.count("\n") == 1
+    with pytest.raises(fault):
+        main(["scenarios", "--debug"])
+    monkeypatch.setenv("CARE_SIM_DEBUG", "1")
+    with pytest.raises(fault):
+        main(["scenarios"])
+
+
+@pytest.mark.parametrize(
+    ("shell", "code", "complaint"),
+    [
+        ("{} policies | true; exit ${{PIPESTATUS[0]}}", 141, ""),
+        ("{} policies > /dev/full", 2, "care-sim: [Errno 28] No space left on device\n"),
+        ("{} policies >&-", 0, ""),
+        ("{} policies >&- 2>&-", 0, ""),
+        ("COLUMNS=1 timeout 60 {} run --help > /dev/null", 0, ""),
+        ("PYTHONIOENCODING=ascii {} policies > /dev/null", 0, ""),
+        ("PYTHONIOENCODING=ascii {} bench --x", 2, "care-sim: Unrecognized options: --x\n"),
+        ("PYTHONIOENCODING=ascii {} bench --seconds 0", 2, "care-sim: seconds must lie in [0.001, 3600], got 0.0\n"),
+    ],
+)
+def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):
+    command = shell.format(f"{sys.executable} -c 'from care_sim.cli import main; main()'")
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
+    assert (ended.returncode, ended.stderr) == (code, complaint)

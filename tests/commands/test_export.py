@@ -1,0 +1,130 @@
+import json
+
+import numpy as np
+import pytest
+
+from care_sim.cli import main
+from care_sim.core.frames import turned
+from care_sim.core.types import CLASSES
+from tests.helpers.nuscenes_database import change
+from tests.helpers.nuscenes_drive import KEYFRAMES, OBJECTS, SPLIT, write_drive
+
+TOKENS = [f"{scene}-{n}" for scene in SPLIT for n in range(KEYFRAMES)]
+
+
+@pytest.fixture
+def drive(tmp_path):
+    return write_drive(tmp_path / "nuscenes")
+
+
+def export(capsys, drive, out, *options):
+    """Exit code, output and error lines of the command."""
+    with pytest.raises(SystemExit) as end:
+        main(["export", "--source", f"nuscenes:{drive}", "--out", str(out), *map(str, options)])
+    return end.value.code, *capsys.readouterr()
+
+
+def test_a_full_scan_finds_every_object_in_every_sample_where_it_is_and_as_fast_as_it_is(capsys, tmp_path, drive):
+    path = tmp_path / "new" / "full.json"
+    code, out, err = export(capsys, drive, path, "--policy", "full")
+    assert (code, err) == (0, "")
+    assert out == f"{len(TOKENS) * len(OBJECTS)} boxes in {len(TOKENS)} samples of 2 scenes are in {path}\n"
+    content = json.loads(path.read_text())
+    assert [*content["results"]] == TOKENS
+    for scene, heading in SPLIT.items():
+        for number in range(KEYFRAMES):
+            assert seen(content["results"][f"{scene}-{number}"], heading) == pytest.approx(true(number), abs=1e-3)
+
+
+def seen(found, heading):
+    """(n, 5) class, place and velocity along and across the drive, in order."""
+    places = turned(np.array([box["translation"][:2] for box in found]), -heading)
+    velocities = turned(np.array([box["velocity"] for box in found]), -heading)
+    return in_order([CLASSES.index(box["detection_name"]) for box in found], places, velocities)
+
+
+def true(number):
+    """The same of the objects; the first keyframe tells no velocity."""
+    speeds = np.array([velocity for _, _, velocity, _, _ in OBJECTS])
+    places = np.array([place for _, place, _, _, _ in OBJECTS]) + 0.5 * number * speeds
+    return in_order([CLASSES.index(name) for name, *_ in OBJECTS], places, speeds * (number > 0))
+
+
+def in_order(classes, places, velocities):
+    rows = np.column_stack([classes, places, velocities])
+    return rows[np.lexsort((places[:, 0].round(2), classes))]
+
+
+def test_the_origin_is_told(capsys, tmp_path, drive):
+    options = ["--policy", "care-sbf", "--policy-parameters", "k_safe=1.5", "--budget", "0.2", "--floor-seed", "2"]
+    options += ["--camera-latency", "1"]
+    export(capsys, drive, tmp_path / "out.json", *options)
+    meta = json.loads((tmp_path / "out.json").read_text())["meta"]
+    own = meta.pop("care_sim")
+    assert meta == {
+        "use_camera": True, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False,
+    }  # fmt: skip
+    assert (own["policy"], own["policy.k_safe"], own["budget"]) == ("care-sbf", 1.5, 0.2)
+    assert (own["floor_seed"], own["camera_latency"]) == (2, 1)
+    assert (own["split"], own["detector"], own["source"]) == ("val", "returns", "nuscenes")
+    assert str(tmp_path) not in json.dumps(own)
+
+
+def test_the_same_command_writes_the_same_file_and_another_floor_another(capsys, tmp_path, drive):
+    paths = [tmp_path / name for name in ("a.json", "b.json", "c.json")]
+    for path, floor in zip(paths, (0, 0, 1), strict=True):
+        export(capsys, drive, path, "--policy", "random", "--budget", 0.05, "--floor-seed", floor)
+    a, b, c = (json.loads(path.read_text())["results"] for path in paths)
+    assert a == b != c
+
+
+def test_samples_in_which_nothing_is_found_are_there_and_a_file_without_a_box_is_told(capsys, tmp_path, drive):
+    code, _, err = export(capsys, drive, tmp_path / "out.json", "--policy", "random", "--budget", "0.0005")
+    assert code == 0
+    assert err == "care-sim: the official devkit refuses results without a box\n"
+    assert json.loads((tmp_path / "out.json").read_text())["results"] == {token: [] for token in TOKENS}
+
+
+def test_a_split_of_splits_json_and_camera_detections_from_a_file(capsys, tmp_path, drive):
+    (drive / "v1.0-trainval" / "splits.json").write_text('{"mine": ["scene-0916"]}')
+    (tmp_path / "found.json").write_text("[]")
+    options = ["--split", "mine", "--camera-detections", tmp_path / "found.json", "--version", "v1.0-trainval"]
+    code, _, _ = export(capsys, drive, tmp_path / "out.json", *options)
+    content = json.loads((tmp_path / "out.json").read_text())
+    assert code == 0
+    assert [*content["results"]] == TOKENS[KEYFRAMES:]
+    assert len(content["meta"]["care_sim"]["camera_detections"]) == 16, "a hash of the file"
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        (["--source", "argoverse2:x"], ["nuscenes:FOLDER", "'argoverse2:x'"]),
+        (["--source", "nuscenes:nowhere"], ["nowhere is no folder"]),
+        (["--split", "train"], ["'train'", "val"]),
+        (["--version", "v9"], ["v9"]),
+        (["--policy", "best"], ["'best'", "care"]),
+        (["--policy-parameters", "k=3"], ["care", "k"]),
+        (["--budget", "0"], ["budget", "(0, 1]"]),
+        (["--detector", "magic"], ["'magic'", "cluster"]),
+        (["--detector-parameters", "depth"], ["NAME=VALUE", "'depth'"]),
+        (["--camera-detections", "gone.json"], ["gone.json: no such file"]),
+        (["--floor-seed", "-1"], ["floor_seed", ">= 0"]),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, drive, options, names):
+    code, _, err = export(capsys, drive, tmp_path / "out.json", *options)
+    assert code == 2
+    assert err.startswith("care-sim: ")
+    assert err.count("\n") == 1
+    for name in names:
+        assert name in err
+    assert not (tmp_path / "out.json").exists()
+
+
+def test_a_damaged_scene_ends_it_since_the_devkit_asks_for_every_sample(capsys, tmp_path, drive):
+    change(drive, "sample_data", lambda rows: rows[-7].update(filename="samples/gone.bin"))
+    code, _, err = export(capsys, drive, tmp_path / "out.json")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "samples/gone.bin: no such file" in err
+    assert not (tmp_path / "out.json").exists()

@@ -1,0 +1,97 @@
+"""`care-sim report FOLDER -o FILE`: what it writes, and the one line it says where it cannot."""
+
+import sys
+
+import pytest
+
+from care_sim.cli import main
+from care_sim.study.rows import write_rows
+from tests.helpers.made_rows import STUDY
+
+
+def report(capsys, *arguments):
+    """Exit code, output and errors."""
+    with pytest.raises(SystemExit) as end:
+        main(["report", *map(str, arguments)])
+    return end.value.code, *capsys.readouterr()
+
+
+@pytest.fixture
+def results(tmp_path):
+    folder = tmp_path / "results"
+    folder.mkdir()
+    write_rows(STUDY, folder / "episodes.parquet")
+    return folder
+
+
+def test_a_page_is_written_and_the_folder_left_alone(results, tmp_path, capsys):
+    path = tmp_path / "deep" / "report.html"
+    code, out, err = report(capsys, results, "-o", path, "--episodes", 0)
+    assert code == 0
+    assert out.startswith(f"{path}: 0.")
+    assert out.endswith("MB, 0 episodes to watch\n")
+    assert "config.json is missing" in err
+    page = path.read_text()
+    assert page.startswith("<!doctype html>")
+    assert "No episode was played again for this page" in page
+    assert [file.name for file in results.iterdir()] == ["episodes.parquet"]
+    assert "src=" not in page
+    assert "@import" not in page
+
+
+def test_the_same_results_make_the_same_page(results, tmp_path, capsys):
+    for name in ("one.html", "two.html"):
+        report(capsys, results, "-o", tmp_path / name, "--episodes", 0)
+    assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ({}, "no results at"),
+        ({"journal.jsonl": b"{}\n"}, "holds an unfinished study; the command that began it goes on there"),
+        ({"episodes.parquet": b"PAR1 torn"}, "is not a readable Parquet file"),
+    ],
+)
+def test_what_is_no_results_is_one_line(content, says, tmp_path, capsys):
+    for name, text in content.items():
+        (tmp_path / name).write_bytes(text)
+    path = tmp_path / "report.html"
+    code, out, err = report(capsys, tmp_path, "-o", path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert says in err
+    assert not path.exists()
+
+
+def test_results_of_another_version_are_one_line(results, tmp_path, capsys):
+    write_rows(
+        [{name: value for name, value in row.items() if name != "floor"} for row in STUDY], results / "episodes.parquet"
+    )
+    code, _, err = report(capsys, results, "-o", tmp_path / "report.html")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "it lacks floor" in err
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [(["--episodes", -1], "episodes must be"), (["--workers", 0], "workers must be")],
+)
+def test_bad_numbers_are_one_line(options, says, results, tmp_path, capsys):
+    code, _, err = report(capsys, results, "-o", tmp_path / "report.html", *options)
+    assert (code, err.count("\n")) == (2, 1)
+    assert says in err
+
+
+def test_a_folder_in_the_place_of_the_page_is_one_line(results, tmp_path, capsys):
+    code, _, err = report(capsys, results, "-o", tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "is a folder, a file is wanted" in err
+
+
+@pytest.mark.parametrize("library", ["altair", "jinja2", "vl_convert"])
+def test_a_missing_library_names_the_extra(library, results, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    code, _, err = report(capsys, results, "-o", tmp_path / "report.html")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "needs the extra 'page': pip install 'care-sim[page]'" in err

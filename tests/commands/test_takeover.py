@@ -1,0 +1,215 @@
+"""A folder of results is taken over by nobody who was not told to."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.cli import main
+from care_sim.commands.shared.takeover import check_results
+from care_sim.evaluation.sightings import PRESENCES
+from care_sim.reports.report import JOURNAL, conduct, write_report
+from care_sim.reports.studies import STUDIES
+from care_sim.sources.scenes import source_of
+from care_sim.study.episode_config import PLAIN_FIELDS, grid
+from care_sim.study.journal import Journal
+from care_sim.study.play_config import PLAY_FIELDS, play_grid
+from care_sim.study.results_files import _PARAMETERS, EPISODES, KINDS, PLAYS
+from care_sim.study.rows import read_notes, read_rows, write_rows
+from tests.helpers.made_rows import STUDY, rows
+
+SHORT = (("duration_s", 0.1),)
+PAPER, SWEEP = STUDIES["paper"], STUDIES["sweep"]
+
+
+def short(policies=("history",), seeds=(0,), **conditions):
+    return grid(["dartout"], policies, [0.1], seeds, scenario_parameters=SHORT, **conditions)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Results of twenty episodes of the paper's study, with figures."""
+    write_rows(STUDY, tmp_path / EPISODES.file, "paper")
+    write_report(STUDY, tmp_path, PAPER)
+    (tmp_path / "dense-budget.png").write_text("a figure")
+    return tmp_path
+
+
+def held(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_another_study_is_refused_in_a_line_that_names_both_and_touches_nothing(folder):
+    before = held(folder)
+    assert any(name.endswith(".png") for name in before)
+    with pytest.raises(InvalidInput) as refused:
+        conduct(short(), folder, workers=1)
+    assert str(refused.value) == (
+        f"{folder} holds the study paper, 20 episodes, which the study sweep, 1 episode, would replace: "
+        "give another --out, or --force to replace it"
+    )
+    assert held(folder) == before
+
+
+def test_rows_that_nobody_asks_for_now_are_named(folder):
+    asked = grid(["dense"], ["history", "care"], [0.03], range(5))
+    with pytest.raises(InvalidInput) as refused:
+        check_results(folder, asked, PAPER)
+    assert "holds 20 episodes of the study paper; 10 of them, the first dense all-camera 0.03, would be gone" in str(
+        refused.value
+    )
+    whole = grid(["dense"], ["history", "all-camera", "care", "full"], [0.03], range(5))
+    check_results(folder, whole, PAPER)
+    check_results(folder, [*whole, *short()], PAPER)
+    with pytest.raises(
+        InvalidInput, match=r"; 4 of them, the first dense history 0\.03 seed 4, .* asked for, 16 episodes"
+    ):
+        check_results(folder, [config for config in whole if config.seed < 4], PAPER)
+    late = grid(["dense"], ["history", "all-camera", "care", "full"], [0.03], range(5), camera_latencies=(1,))
+    with pytest.raises(InvalidInput, match="; 15 of them"):
+        check_results(folder, late, PAPER)
+
+
+def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_the_code(tmp_path, monkeypatch):
+    assert conduct(short(lidar_dead_rows=(3, 4)), tmp_path, workers=1) == []
+    assert conduct(short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), tmp_path, workers=1) == []
+    monkeypatch.setattr("care_sim.study.task.code_digest", lambda: "edited")
+    check_results(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), SWEEP)
+    with pytest.raises(InvalidInput, match=r"; 1 of them, the first dartout care 0\.1 seed 1"):
+        check_results(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4))[:3], SWEEP)
+
+
+def test_force_replaces_at_the_end_and_keeps_the_journal(folder, tmp_path, capsys):
+    sweep = ["sweep", "--scenarios", "dartout", "--policies", "random", "--seeds", "1", "--workers", "1"]
+    command = [*sweep, "--scenario-parameters", "duration_s=0.1", "--out", str(folder)]
+    with pytest.raises(SystemExit) as end:
+        main(command)
+    said = capsys.readouterr().err
+    assert (end.value.code, said.count("\n")) == (2, 1)
+    assert "holds the study paper, 20 episodes" in said
+    with pytest.raises(SystemExit) as end:
+        main([*command, "--force"])
+    assert end.value.code == 0
+    assert read_notes(folder / EPISODES.file)[0] == "sweep"
+    assert len(read_rows(folder / EPISODES.file)) == 1
+    assert not [path for path in folder.iterdir() if path.suffix in (".png", ".svg")]
+
+
+def test_a_study_that_cannot_be_shown_replaces_nothing(folder, monkeypatch):
+    before = held(folder)
+
+    def broken(_rows):
+        raise InvalidInput("two films")
+
+    with pytest.raises(InvalidInput, match="two films"):
+        conduct(short(), folder, 1, study=replace(SWEEP, figures=broken), force=True)
+    assert {name: content for name, content in held(folder).items() if name != JOURNAL} == before
+    with pytest.raises(InvalidInput, match="holds the study paper"):
+        conduct(short(), folder, 1)
+
+
+MOODY = """
+from pathlib import Path
+from care_sim.policies.paper.history import History
+
+class Moody(History):
+    def demand(self, belief):
+        if (Path(__file__).parent / "mood.txt").read_text() == "bad":
+            raise RuntimeError("no")
+        return super().demand(belief)
+"""
+
+
+def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
+    """The same command after a file of the policy has changed, by which it fails."""
+    install("moody_policy", MOODY, moody="Moody")
+    mood, out = tmp_path / "moody_policy" / "mood.txt", tmp_path / "out"
+    mood.write_text("good")
+    configs = short(("history", "moody"))
+    assert conduct(configs, out, workers=1) == []
+    before = held(out)
+    del before[JOURNAL]
+    mood.write_text("bad")
+    capsys.readouterr()
+    (failure,) = conduct(short(("history", "moody")), out, workers=1)
+    assert failure.config.policy == "moody"
+    assert [line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line] == [
+        f"the results in {out} stay as they were: 1 of their 2 episodes, the first dartout moody 0.1, would be gone, "
+        "since this time only 1 episode did not fail; the journal keeps what was played: mend what failed, or "
+        "--force to replace them"
+    ]
+    assert {name: content for name, content in held(out).items() if name != JOURNAL} == before
+    conduct(short(("history", "moody")), out, workers=1, force=True)
+    assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
+
+
+def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
+    with Journal(tmp_path / JOURNAL, "faults") as journal:
+        journal.append({"digest": "a"})
+    with pytest.raises(InvalidInput, match="holds the unfinished study faults, 1 row, beside which the study sweep"):
+        conduct(short(), tmp_path, workers=1)
+    assert conduct(short(), tmp_path, workers=1, force=True) == []
+    assert conduct(short(), tmp_path, workers=1) == []
+
+
+def test_the_folder_is_locked_until_its_results_are_written(tmp_path, monkeypatch):
+    locked = []
+
+    def write(rows, path, *more):
+        with pytest.raises(InvalidInput, match="another study writes"):
+            Journal(tmp_path / JOURNAL)
+        locked.append(path.name)
+        write_rows(rows, path, *more)
+
+    monkeypatch.setattr("care_sim.reports.report.write_rows", write)
+    conduct(short(), tmp_path, workers=1)
+    assert locked == [EPISODES.file]
+
+
+def test_a_damaged_line_is_played_again_and_said(tmp_path, capsys):
+    conduct(short(seeds=(0, 1)), tmp_path, workers=1)
+    path = tmp_path / JOURNAL
+    first, second = path.read_text().splitlines()
+    seed = json.loads(second)["rays_fired"]
+    path.write_text(f"{first}\n{second.replace(str(seed), str(seed + 1))}\n")
+    capsys.readouterr()
+    assert conduct(short(seeds=(0, 1)), tmp_path, workers=1) == []
+    said = capsys.readouterr().err
+    assert f"1 line of {path} passed over, damaged or of a version that wrote no checksums" in said
+    assert "1 of 2 episodes found" in said
+    assert [row["rays_fired"] for row in read_rows(tmp_path / EPISODES.file)] == [seed, seed]
+
+
+def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
+    """A range, a parameter and a condition come back from Parquet as what was asked."""
+    made = rows("care-sbf", [3.0], changes={"scenario.gap_m": (0.5, 0.6), "policy.k_safe": 1, "camera_latency": 2})
+    write_rows(made, tmp_path / EPISODES.file)
+    asked = grid(
+        ["dense"],
+        ["care-sbf"],
+        [0.03],
+        [0],
+        camera_latencies=(2,),
+        scenario_parameters=(("gap_m", [0.5, 0.6]),),
+        policy_parameters=(("k_safe", 1.0),),
+    )
+    check_results(tmp_path, asked, SWEEP)
+
+
+def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tmp_path):
+    streets = source_of("streets")
+    by = {name: play_grid(streets, streets.scenes()[:2], ["care"], [0.1], presence=name) for name in PRESENCES}
+    for own, other in (PRESENCES, PRESENCES[::-1]):
+        write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
+        check_results(tmp_path, by[own], STUDIES["protocol"])
+        check_results(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
+        with pytest.raises(InvalidInput, match="; 2 of them, the first street-0000-straight care"):
+            check_results(tmp_path, by[other], STUDIES["protocol"])
+
+
+def test_every_parameter_is_a_column_that_is_read():
+    """What a reader drops is no part of what a row was asked with."""
+    known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in KINDS}
+    assert {*PLAIN_FIELDS} <= known[EPISODES.file]
+    assert {*PLAY_FIELDS} | (_PARAMETERS - {*PLAIN_FIELDS}) <= known[PLAYS.file]

@@ -1,0 +1,146 @@
+"""`care-sim view`, and the commands that record."""
+
+import re
+import signal
+import socket
+import sys
+import time
+from urllib.error import URLError
+from urllib.request import urlopen
+
+import pytest
+
+from care_sim.cli import main
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_play import run_episode
+from tests.helpers.descendants import Marked
+
+SHORT = ["--scenario-parameters", "duration_s=0.5"]
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return end.value.code, out, err
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recordings") / "deep" / "out.rrd"
+    with pytest.raises(SystemExit):
+        main(["run", "dartout", "--record", str(path), *SHORT])
+    return path
+
+
+@pytest.mark.parametrize(
+    ("content", "named"), [(None, "No such file"), (b"", "no recording"), (b"PK..", "no recording")]
+)
+def test_what_is_no_recording_is_one_line(content, named, capsys, tmp_path):
+    file = tmp_path / "out.rrd"
+    if content is not None:
+        file.write_bytes(content)
+    code, _, err = run(capsys, "view", file)
+    assert (code, err.count("\n")) == (2, 1)
+    assert named in err
+    assert "out.rrd" in err
+
+
+def test_a_place_that_cannot_be_written_is_one_line(capsys, tmp_path):
+    (tmp_path / "file").touch()
+    code, _, err = run(capsys, "run", "dartout", "--record", tmp_path / "file" / "out.rrd", *SHORT)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "file" in err
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "name"),
+    [
+        ("run", "--record", "out.rrd"),
+        ("run", "--video", "out.gif"),
+        ("run", "--export", "scans"),
+        ("compare", "--record", "out.rrd"),
+        ("compare", "--video", "out.gif"),
+    ],
+)
+def test_what_stands_in_the_way_is_one_line_and_nothing_is_played(command, option, name, capsys, tmp_path, request):
+    if option == "--export":
+        request.getfixturevalue("open3d")
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "000.pcd").touch()
+    code, out, err = run(capsys, command, "dartout", option, tmp_path / name, *SHORT)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert name in err
+
+
+def test_without_a_display_the_browser_is_recommended(recording, capfd, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    code, _, err = run(capfd, "view", recording)
+    assert code == 1
+    assert err.splitlines()[-1].endswith("with --web a browser shows the recording")
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+def test_the_web_viewer_is_served_and_ends_with_its_children(recording, end):
+    command = [sys.executable, "-c", "from care_sim.cli import main; main()", "view", str(recording), "--web"]
+    with Marked(command, stderr=None) as started:
+        server = started.process
+        url = re.search(r"http://(127\.0\.0\.1):(\d+)/\S*", server.stdout.readline())
+        page = fetched(url.group())
+        assert b"re_viewer" in page
+        assert len(fetched(f"http://{url[1]}:{url[2]}/re_viewer_bg.wasm")) > 1e6
+        server.send_signal(end)
+        assert server.wait(timeout=20) == (-end if end == signal.SIGKILL else 0)
+        assert started.all_end_within(30)
+    with socket.socket() as client:
+        assert client.connect_ex((url[1], int(url[2]))) != 0
+
+
+def fetched(url):
+    for attempt in range(200):
+        try:
+            with urlopen(url, timeout=10) as page:
+                return page.read()
+        except URLError:
+            if attempt == 199:
+                raise
+            time.sleep(0.1)
+    raise AssertionError
+
+
+def test_compare_prints_and_records_the_same_seed_under_every_policy(capsys, tmp_path, read):
+    file = tmp_path / "both.rrd"
+    names = ("history", "all-camera", "care")
+    options = ["--budget", "0.05", "--seed", "2", "--scenario-parameters", "duration_s=4"]
+    code, out, _ = run(capsys, "compare", "dartout", "--policies", *names, *options, "--record", file)
+    assert code == 0
+    assert f"care-sim view {file}" in out
+    found = read(file)
+    for name in names:
+        config = EpisodeConfig("dartout", name, 0.05, 2, scenario_parameters=(("duration_s", 4.0),))
+        row = run_episode(config)
+        (line,) = (line for line in out.splitlines() if line.split()[:1] == [name])
+        assert line.split()[2] == f"{row['detection_distance_m']:.2f}"
+        assert line.split()[-1] == str(row["rays_fired"])
+        assert len(found.numbers(f"{name}/measures/speed")) == row["keyframes"] == 40
+        states = found.rows[f"{name}/states/actor"]
+        seen = min(n for n, change in states.items() if change["StateChange:state"] == ["detected"])
+        assert found.numbers(f"{name}/measures/distance")[seen] == row["detection_distance_m"]
+    sighted = {name: found.column(f"{name}/world/bodies", "Boxes3D:centers")[0] for name in names}
+    assert sighted["history"] == sighted["care"] == sighted["all-camera"]
+
+
+def test_compare_without_a_recording_writes_nothing(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run(capsys, "compare", "cutin", *SHORT)
+    assert code == 0
+    assert "history" in out
+    assert not list(tmp_path.iterdir())
+
+
+def test_run_exports_every_scan(capsys, tmp_path, open3d):
+    code, _, _ = run(capsys, "run", "dartout", "--export", tmp_path / "scans", "--record", tmp_path / "out.rrd", *SHORT)
+    assert code == 0
+    assert len(list((tmp_path / "scans").glob("*.pcd"))) == 5
+    assert (tmp_path / "out.rrd").stat().st_size > 10_000

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_sim.core.allocation import allocate, fired_cells, scores_of
+from care_sim.core.budget_shares import CHOSEN, EXPLOITATION, FLOOR, NOT_FIRED, RESERVE, shares_of
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import Demand, Rig
+
+GRID = AngularGrid(columns=4, rows=3)
+RIG = Rig(GRID, budget=6, reserve_fraction=0.5)
+FLOOR_ORDER = np.array([11, 10, 0, 9, 8, 7, 6, 5, 4, 3, 2, 1])
+DEMAND = Demand([np.array([0, 1, 2, 3, 4])], [[np.array([2, 3])]])
+"""Three of six cells are for exploitation: 0, 1, 2. The reserve wants 2, which is taken, and 3."""
+
+
+def shares(demand, behind, rig=RIG):
+    """Of the cells that `demand` fires; `behind` is the demand that the watcher believes in."""
+    action = scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
+    return shares_of(fired_cells(action, rig.budget, FLOOR_ORDER), action, behind, rig)
+
+
+def test_every_cell_has_the_share_that_took_it():
+    expected = np.full(12, NOT_FIRED)
+    expected[[0, 1, 2]], expected[3], expected[[11, 10]] = EXPLOITATION, RESERVE, FLOOR
+    np.testing.assert_array_equal(shares(DEMAND, DEMAND), expected.reshape(3, 4))
+
+
+@pytest.mark.parametrize("behind", [None, Demand([np.array([7])])], ids=["raw", "another demand"])
+def test_without_the_demand_behind_it_an_action_tells_no_more_than_what_it_chose(behind):
+    expected = np.full(12, NOT_FIRED)
+    expected[[0, 1, 2, 3]], expected[[11, 10]] = CHOSEN, FLOOR
+    np.testing.assert_array_equal(shares(DEMAND, behind), expected.reshape(3, 4))
+
+
+def test_scored_cells_beyond_the_budget_have_no_share():
+    action = np.linspace(1, 0.1, 12, dtype=np.float32).reshape(3, 4)
+    found = shares_of(fired_cells(action, 6, FLOOR_ORDER), action, None, RIG)
+    np.testing.assert_array_equal(found.ravel(), [CHOSEN] * 6 + [NOT_FIRED] * 6)
+
+
+cells = st.lists(st.integers(0, 11), max_size=6, unique=True).map(np.array).map(lambda a: a.astype(np.int64))
+demands = st.builds(Demand, st.lists(cells, max_size=3), st.lists(st.lists(cells, max_size=2), max_size=2))
+
+
+@given(demands, st.integers(1, 12), st.floats(0, 1))
+def test_shares_are_the_order_of_the_allocator(demand, budget, reserve_fraction):
+    rig = Rig(GRID, budget=budget, reserve_fraction=reserve_fraction)
+    found = shares(demand, demand, rig).ravel()
+    order = allocate(demand, budget, reserve_fraction)
+    kinds = found[order].tolist()
+    assert kinds == sorted(kinds)
+    assert set(kinds) <= {EXPLOITATION, RESERVE}
+    assert kinds.count(EXPLOITATION) <= round((1 - reserve_fraction) * budget)
+    wanted = {int(cell) for cells in demand.exploitation for cell in cells}
+    assert {int(cell) for cell in order if found[cell] == EXPLOITATION} <= wanted
+    assert np.count_nonzero(found) == budget
+    assert np.count_nonzero(found == FLOOR) == budget - len(order)

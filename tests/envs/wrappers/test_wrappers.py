@@ -1,0 +1,133 @@
+"""Sectors as actions and coarse pictures as observation, over the environments of both loops."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.envs.wrappers.grid_observation import GridObservation
+from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
+
+NAMES = ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-Street-v0", "CARE-Replay-v0"]
+ORDERS = [
+    lambda env: GridObservation(SectorReserve(env)),
+    lambda env: SectorReserve(GridObservation(env)),
+    lambda env: GridObservation(SectorScores(env)),
+    lambda env: SectorScores(GridObservation(env)),
+]
+
+
+@pytest.fixture(params=NAMES)
+def env(request):
+    place = {"source": f"argoverse2:{request.getfixturevalue('drive')}"} if request.param == "CARE-Replay-v0" else {}
+    made = gymnasium.make(request.param, disable_env_checker=True, budget=0.03, **place)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("wrap", ORDERS)
+def test_stable_baselines3_and_gymnasium_find_nothing_to_complain_about(env, wrap):
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wrapped = wrap(env)
+        checker.check_env(wrapped)
+        again = gymnasium.make(wrapped.spec, disable_env_checker=True)
+        assert (again.observation_space, again.action_space) == (wrapped.observation_space, wrapped.action_space)
+        again.close()
+    observation, _ = wrapped.reset(seed=1)
+    for _ in range(5):
+        assert wrapped.observation_space.contains(observation)
+        observation, *_ = wrapped.step(wrapped.action_space.sample())
+
+
+def fired(env, actions, seed=3):
+    """The cells of every keyframe; an action, or what maps an observation to one."""
+    observation, _ = env.reset(seed=seed)
+    cells = []
+    for action in actions:
+        observation, *_, info = env.step(action(observation) if callable(action) else action)
+        cells.append(info["fired"].tolist())
+    return cells
+
+
+def test_nothing_in_reserve_is_the_history_policy_cell_for_cell(env):
+    history = care_sim.make_policy("history", env)
+    plain = fired(env, [history] * 8)
+    assert fired(SectorReserve(env), [np.zeros((4, 32), np.float32)] * 8) == plain
+    assert fired(GridObservation(SectorReserve(env)), [-np.ones((4, 32), np.float32)] * 8) == plain
+
+
+def test_the_reserve_goes_to_the_best_sector_and_exploitation_stays():
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03)
+    wrapped = SectorReserve(env)
+    scores = np.zeros((4, 32), np.float32)
+    scores[1, 15], scores[2, 16] = 0.9, 0.5
+    best, second = wrapped.sectors.cells[32 + 15], wrapped.sectors.cells[64 + 16]
+    wrapped.reset(seed=0)
+    for _ in range(10):
+        rig, belief = env.unwrapped.rig, env.unwrapped.belief
+        hulls = care_sim.Demand(rig.hulls(belief.tracks.boxes))
+        exploited = care_sim.allocate(hulls, rig.budget, rig.reserve_fraction)[: round(0.7 * rig.budget)]
+        cells = set(wrapped.step(scores)[-1]["fired"].tolist())
+        assert len(cells) == rig.budget
+        assert set(exploited.tolist()) <= cells
+        assert set(best.tolist()) <= cells
+    left = rig.budget - len(set(exploited.tolist()) | set(best.tolist()))
+    unexploited = [cell for cell in second.tolist() if cell not in set(exploited.tolist())]
+    assert set(unexploited[:left]) <= cells
+    env.close()
+
+
+def test_scores_of_sectors_fire_the_best_sectors():
+    env = SectorScores(gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03))
+    scores = np.full((4, 32), -1, np.float32)
+    scores[3, 31], scores[0, 0] = 0.2, 0.1
+    (cells,) = fired(env, [scores])
+    tiles = env.sectors.cells
+    assert set(tiles[3 * 32 + 31].tolist()) | set(tiles[0].tolist()) <= set(cells)
+    assert len(cells) == 492
+    env.close()
+
+
+def test_wrapping_leaves_the_environment_as_it_is(env):
+    care = care_sim.make_policy("care", env)
+    before = fired(env, [care] * 5)
+    wrapped = GridObservation(SectorReserve(env))
+    fired(wrapped, [wrapped.action_space.sample()] * 3)
+    assert fired(env, [care] * 5) == before
+
+
+@pytest.mark.parametrize("wrapper", [SectorReserve, SectorScores, GridObservation])
+def test_what_does_not_fit_is_refused_in_one_line(wrapper):
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True)
+    with pytest.raises(InvalidInput, match="azimuths must divide the 512 of the grid, got 30"):
+        wrapper(env, 30, 4)
+    with pytest.raises(InvalidInput, match="need one of its environments"):
+        wrapper(gymnasium.make("CartPole-v1"))
+    env.close()
+
+
+@pytest.mark.parametrize("action", [np.zeros((32, 4), np.float32), np.full((4, 32), np.nan, np.float32)])
+@pytest.mark.parametrize("wrapper", [SectorReserve, SectorScores])
+def test_a_wrong_action_is_refused(wrapper, action):
+    env = wrapper(gymnasium.make("CARE-Dense-v0", disable_env_checker=True))
+    env.reset(seed=0)
+    with pytest.raises(InvalidInput, match="action must"):
+        env.step(action)
+    env.close()
+
+
+def test_before_the_first_reset_there_is_nothing_to_act_on():
+    env = SectorReserve(gymnasium.make("CARE-Dense-v0", disable_env_checker=True))
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros((4, 32), np.float32))
+
+
+@pytest.mark.parametrize("wrapper", [SectorReserve, SectorScores, GridObservation])
+def test_they_document_themselves(wrapper):
+    for heading in ("### Action", "### Observation", "### Arguments"):
+        assert heading in wrapper.__doc__

@@ -1,0 +1,1 @@
+"""What several tests make: logs, databases, rows, processes."""

@@ -1,0 +1,42 @@
+"""Rows made by hand."""
+
+from care_sim.study.episode_config import grid
+
+NEAREST_M = 3.0
+"""How near an actor came that was never detected."""
+
+
+def row(config, distance, **changes):
+    """The row of an episode with this detection distance, None for never."""
+    outcome = {
+        "detection_distance_m": distance,
+        "undetected_to_m": NEAREST_M if distance is None else None,
+        "braked": True,
+        "min_distance_m": 5.0,
+        "clearance_m": 3.0,
+        "collision": False,
+        "impact_speed_mps": None,
+        "rays_fired": 1000,
+    }
+    return config.row() | outcome | changes
+
+
+def rows(policy, distances, scenario="dense", budget=0.03, changes=None, **conditions):
+    """One row a distance, of seeds from 0."""
+    configs = grid([scenario], [policy], [budget], range(len(distances)), **conditions)
+    return [row(config, distance, **(changes or {})) for config, distance in zip(configs, distances, strict=True)]
+
+
+STUDY = [
+    *rows("history", [4.0, None, 8.0, 6.0, None]),
+    *rows("all-camera", [10.0, 11.0, 12.0, 13.0, 14.0]),
+    *rows("care", [15.0, 16.0, 17.0, 18.0, 19.0]),
+    *rows("full", [15.0, 16.0, 17.0, 18.0, 19.5]),
+]
+
+CROWD = [
+    each
+    for vehicles, camera in ((0, 15.0), (5, 14.5), (9, 8.0), (12, None))
+    for policy, distance in (("all-camera", camera), ("care", 15.0), ("full", 15.0))
+    for each in rows(policy, [distance] * 5, scenario_parameters=(("vehicles", vehicles),))
+]

@@ -1,0 +1,31 @@
+"""Weights that have learned nothing: real files for the policy `ppo`, of any budget."""
+
+import numpy as np
+
+from care_sim.core.grid import AngularGrid
+from care_sim.policies.learned.grid_features import CHANNELS, EGO
+from care_sim.policies.learned.score_map import MARGIN
+from care_sim.policies.learned.weights import Card, save
+from care_sim.policies.learned.wrapper_text import Wrapping
+
+USUAL = Wrapping()
+
+
+def shapes(wrapping, hidden=5):
+    tall, wide = wrapping.blocks_a_sector
+    return {
+        "window.weight": (hidden, len(CHANNELS), tall + 2 * MARGIN, wide + 2 * MARGIN),
+        "window.bias": (hidden,),
+        "ego.weight": (hidden, len(EGO)),
+        "hidden.weight": (hidden, hidden),
+        "hidden.bias": (hidden,),
+        "score.weight": (hidden,),
+        "place": (wrapping.elevations, wrapping.azimuths),
+    }
+
+
+def untrained(path, wrapping=USUAL, seed=0, **card):
+    rng = np.random.default_rng(seed)
+    arrays = {name: rng.normal(0, 0.5, shape).astype(np.float32) for name, shape in shapes(wrapping).items()}
+    save(path, arrays, Card(**{"kind": "ppo", "grid": AngularGrid(), "wrapper": str(wrapping)} | card))
+    return path

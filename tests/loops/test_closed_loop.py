@@ -1,0 +1,306 @@
+"""The closed loop on small worlds made by hand: when it reads the truth, and what its sensing does."""
+
+import numpy as np
+import pytest
+
+from care_sim.core.conditions import Sensing
+from care_sim.core.types import CLASSES, Rig
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.perception.tracker import MemoryRules
+from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.traffic import Traffic
+from care_sim.world.world import World
+
+SPEED = 10.0
+RIG = Rig(cameras=(FRONT_CAMERA,))
+EVERYTHING = np.arange(RIG.grid.size)
+NOTHING = np.array([], dtype=np.int64)
+BUMPER = CATALOGUE["ego"].size[0] / 2
+BUS = CATALOGUE["bus"].size[0] / 2
+
+
+@pytest.fixture
+def street():
+    """Makes worlds of one lane, the ego driving at SPEED."""
+    made = []
+
+    def make():
+        made.append(World(Traffic((1,), 0, 3.5, 14.0), SPEED))
+        return made[-1]
+
+    yield make
+    for world in made:
+        world.close()
+
+
+@pytest.fixture
+def row_of_cars(street):
+    """Makes the same world again and again: six cars abreast, all in view and none in the way."""
+
+    def make():
+        world = street()
+        for n in range(6):
+            world.add(f"car {n}", "car", (25.0, 6.0 * n - 15.0, 0.0))
+        return world
+
+    return make
+
+
+def loop_in(world, seeds=(0, 1, 2), **sensing):
+    return ClosedLoop(world, RIG, Sensing(**sensing), tuple(np.random.SeedSequence(seed) for seed in seeds))
+
+
+def cells_on(loop, actor):
+    return RIG.grid.hulls(loop.sensor.boxes_to_local(loop.world.boxes([actor])), 0, 0)[0]
+
+
+def test_a_keyframe_tells_time_speed_and_distance_at_its_scan(street):
+    """The bus makes the car brake, 0.3 s later at 5 m/s^2."""
+    world = street()
+    world.first_sighting = world.add("bus", "bus", (BUMPER + 12.0 + BUS, 0.0, 0.0))
+    loop = loop_in(world)
+    frames, travelled = [], []
+    for _ in range(6):
+        travelled.append(world.ego.pose[0])
+        frames.append(loop.keyframe(EVERYTHING))
+    ahead = BUMPER + 12.0 + BUS - LIDAR_POSITION[0]
+    assert [frame.index for frame in frames] == list(range(6))
+    assert all(frame.braking for frame in frames)
+    assert [frame.time_s for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert [frame.speed_mps for frame in frames] == pytest.approx([10.0, 10.0, 10.0, 10.0, 9.5, 9.0])
+    assert [frame.distance_m for frame in frames] == pytest.approx([ahead - x for x in travelled])
+    assert [frame.distance_m for frame in frames[:4]] == pytest.approx([ahead, ahead - 1, ahead - 2, ahead - 3])
+    assert [frame.nearest_m for frame in frames[:3]] == pytest.approx(
+        [frame.distance_m + LIDAR_POSITION[0] for frame in frames[1:4]]
+    )
+
+
+def test_without_a_first_sighting_there_is_nothing_to_score(street):
+    world = street()
+    world.add("car", "car", (15.0, 5.0, 0.0))
+    frame = loop_in(world).keyframe(EVERYTHING)
+    assert (frame.in_view, frame.detected, frame.distance_m) == (False, False, np.inf)
+
+
+def test_the_next_belief_forecasts_a_moving_body_where_the_sensor_then_is(street):
+    world = street()
+    start, velocity = np.array([20.0, 6.0]), np.array([-3.0, 4.0])
+    world.add("car", "car", lambda time: (*(start + velocity * time), 0.0))
+    loop = loop_in(world)
+    assert len(loop.belief.tracks) == 0
+    loop.keyframe(EVERYTHING)
+    once = loop.belief.tracks
+    loop.keyframe(EVERYTHING)
+    twice = loop.belief.tracks
+
+    sensor = np.array([SPEED * 0.1 + LIDAR_POSITION[0], 0.0])
+    assert once.hits.tolist() == [1]
+    assert once.boxes[0, :2] == pytest.approx(start - sensor)
+    sensor[0] += SPEED * 0.1
+    assert twice.hits.tolist() == [2]
+    assert twice.velocities[0] == pytest.approx(velocity)
+    assert twice.boxes[0, :2] == pytest.approx(start + velocity * 0.2 - sensor)
+
+
+def test_a_body_that_is_not_fired_at_any_more_is_forecast_on_and_on_and_then_forgotten(street):
+    world = street()
+    world.add("car", "car", lambda time: (20.0 + 9.0 * time, 6.0, 0.0))
+    loop = loop_in(world)
+    for _ in range(2):
+        loop.keyframe(EVERYTHING)
+    for misses in range(1, 6):
+        loop.keyframe(NOTHING)
+        assert loop.belief.tracks.misses.tolist() == [misses]
+        assert loop.belief.tracks.boxes[0, 0] == pytest.approx(20.0 - LIDAR_POSITION[0] - 1.0 * world.time)
+    for _ in range(round(MemoryRules().coast_s / RIG.keyframe_s) - 4):
+        loop.keyframe(NOTHING)
+    assert len(loop.belief.tracks) == 0
+
+
+def test_the_ego_that_has_turned_sees_its_tracks_turned(street):
+    world = street()
+    world.add("car", "car", (20.0, 0.0, 0.0))
+    loop = loop_in(world)
+    loop.keyframe(EVERYTHING)
+    world.ego._vehicle.heading = -0.2
+    loop.keyframe(EVERYTHING)
+    x, y, heading = world.ego.pose
+    assert heading == pytest.approx(0.2)
+    ahead, left = 20.0 - x, 0.0 - y
+    expected = ahead * np.cos(0.2) + left * np.sin(0.2) - LIDAR_POSITION[0], left * np.cos(0.2) - ahead * np.sin(0.2)
+    assert loop.belief.tracks.boxes[0, :2] == pytest.approx(expected)
+    assert loop.belief.tracks.boxes[0, 6] == pytest.approx(-0.2)
+
+
+@pytest.mark.parametrize(("x", "in_view"), [(12.0, True), (20.0, False)])
+def test_the_first_sighting_is_in_view_before_a_hoarding_and_not_behind_it(street, x, in_view):
+    world = street()
+    world.add("hoarding", "hoarding", (16.0, 0.0, np.pi / 2))
+    world.first_sighting = world.add("person", "pedestrian", (x, 0.0, 0.0))
+    frame = loop_in(world).keyframe(EVERYTHING)
+    assert (frame.in_view, frame.detected) == (in_view, in_view)
+
+
+def test_in_view_is_what_the_camera_saw_before_the_scan(street):
+    """The person steps out from behind the hoarding while the world moves on."""
+    world = street()
+    world.add("hoarding", "hoarding", (16.0, 0.0, np.pi / 2))
+    world.first_sighting = world.add("person", "pedestrian", lambda time: (20.0 if time < 0.15 else 12.0, 0.0, 0.0))
+    loop = loop_in(world)
+    assert [loop.keyframe(NOTHING).in_view for _ in range(3)] == [False, False, True]
+
+
+def test_in_view_is_about_the_first_sighting_and_nobody_else(street):
+    world = street()
+    world.add("bystander", "pedestrian", (12.0, 3.0, 0.0))
+    world.first_sighting = world.add("person", "pedestrian", (-12.0, 3.0, 0.0))
+    loop = loop_in(world)
+    assert len(loop.belief.detections) == 1
+    assert not loop.keyframe(NOTHING).in_view
+
+
+def test_only_the_first_sighting_counts_as_detected(street):
+    world = street()
+    car = world.add("car", "car", (14.0, 5.0, 0.0))
+    person = world.first_sighting = world.add("person", "pedestrian", (14.0, -5.0, 0.0))
+    loop = loop_in(world)
+    fired = [cells_on(loop, car), NOTHING, cells_on(loop, person)]
+    frames, classes = [], []
+    for cells in fired:
+        frames.append(loop.keyframe(cells))
+        classes.append(loop.belief.tracks.classes[loop.belief.tracks.misses == 0].tolist())
+    assert classes == [[CLASSES.index("car")], [], [CLASSES.index("pedestrian")]]
+    assert [frame.detected for frame in frames] == [False, False, True]
+    for frame, cells in zip(frames, fired, strict=True):
+        np.testing.assert_array_equal(frame.fired, cells)
+
+
+def test_late_detections_tell_how_far_the_car_has_turned_since_their_picture(street):
+    world = street()
+    world.add("car", "car", (20.0, 0.0, 0.0))
+    loop = loop_in(world, camera_latency=1)
+    changes = [loop.belief.detections.yaw_changes.tolist()]
+    for heading in (0.1, 0.1, 0.05):
+        world.ego._vehicle.heading = -heading
+        loop.keyframe(NOTHING)
+        changes.append(loop.belief.detections.yaw_changes.tolist())
+        assert loop.belief.detections.ages.tolist() == pytest.approx([0.1])
+    assert changes[0] == []
+    assert np.ravel(changes[1:]) == pytest.approx([0.1, 0.0, -0.05])
+
+
+def test_fresh_detections_are_of_the_picture_just_taken(street):
+    world = street()
+    person = world.add("person", "pedestrian", (12.0, 2.0, 0.0))
+    loop = loop_in(world)
+    for _ in range(2):
+        loop.keyframe(NOTHING)
+        expected = FRONT_CAMERA.project_boxes(loop.sensor.boxes_to_local(world.boxes([person])))[0]
+        detections = loop.belief.detections
+        assert (detections.ages.tolist(), detections.yaw_changes.tolist()) == ([0.0], [0.0])
+        assert detections.boxes[0] == pytest.approx(expected, abs=4.0)
+
+
+def misses_and_losses(world, seeds):
+    """The camera's detections and the scans of three keyframes with faults of both sensors."""
+    loop = loop_in(world, seeds, false_negative_rate=0.5, lidar_dropout=0.5)
+    detections, scans = [loop.belief.detections.rows().tolist()], []
+    for _ in range(3):
+        loop.keyframe(EVERYTHING)
+        detections.append(loop.belief.detections.rows().tolist())
+        scans.append(loop.belief.ranges.tolist())
+    return detections, scans
+
+
+def test_equal_seeds_miss_and_lose_alike(row_of_cars):
+    assert misses_and_losses(row_of_cars(), (7, 8, 9)) == misses_and_losses(row_of_cars(), (7, 8, 9))
+
+
+def test_the_camera_misses_by_its_own_seed(row_of_cars):
+    (misses, losses), (other_misses, same_losses) = (misses_and_losses(row_of_cars(), (s, 8, 9)) for s in (7, 9))
+    assert misses != other_misses
+    assert losses == same_losses
+
+
+def test_the_lidar_loses_by_its_own_seed(row_of_cars):
+    (misses, losses), (same_misses, other_losses) = (misses_and_losses(row_of_cars(), (7, s, 9)) for s in (8, 9))
+    assert misses == same_misses
+    assert all(one != other for one, other in zip(losses, other_losses, strict=True))
+
+
+def test_losses_differ_between_keyframes():
+    world = World(Traffic((1,), 0, 3.5, 14.0), 0.0)
+    loop = loop_in(world, lidar_dropout=0.5)
+    lost = []
+    for _ in range(2):
+        loop.keyframe(EVERYTHING)
+        lost.append(loop.belief.ranges)
+    world.close()
+    assert not np.array_equal(*lost)
+
+
+def test_flawless_sensors_see_every_car_at_every_keyframe(row_of_cars):
+    loop = loop_in(row_of_cars())
+    for _ in range(2):
+        assert len(loop.belief.detections) == 6
+        loop.keyframe(EVERYTHING)
+        assert len(loop.belief.tracks) == 6
+
+
+def test_a_camera_that_misses_everything_detects_nothing_but_the_truth_stays_in_view(row_of_cars):
+    world = row_of_cars()
+    world.first_sighting = world.actors[0]
+    loop = loop_in(world, false_negative_rate=1.0)
+    for _ in range(3):
+        assert len(loop.belief.detections) == 0
+        assert loop.keyframe(EVERYTHING).in_view
+
+
+def test_a_lidar_that_loses_everything_gives_no_return_and_no_track(row_of_cars):
+    world = row_of_cars()
+    world.first_sighting = world.actors[0]
+    loop = loop_in(world, lidar_dropout=1.0)
+    for _ in range(3):
+        assert not loop.keyframe(EVERYTHING).detected
+        assert len(loop.belief.tracks) == 0
+        assert np.all(loop.belief.ranges == RIG.grid.range_m)
+
+
+def test_range_noise_reaches_the_belief(row_of_cars):
+    scans = []
+    for sigma in (0.0, 0.1):
+        loop = loop_in(row_of_cars(), lidar_range_sigma=sigma)
+        loop.keyframe(EVERYTHING)
+        scans.append(loop.belief.ranges)
+    near = scans[0] < RIG.grid.range_m - 1.0
+    assert (scans[1] - scans[0])[near].std() == pytest.approx(0.1, rel=0.1)
+
+
+def test_the_belief_shows_the_scan_in_its_cells_and_zero_elsewhere(row_of_cars):
+    world = row_of_cars()
+    loop = loop_in(world)
+    assert not loop.belief.ranges.any()
+    cells = cells_on(loop, world.actors[0])
+    loop.keyframe(cells)
+    np.testing.assert_array_equal(np.flatnonzero(loop.belief.ranges), cells)
+
+
+@pytest.mark.parametrize(("min_returns", "detected"), [(3, True), (10**6, False)])
+def test_a_detector_that_asks_for_too_many_returns_stays_silent_and_the_car_drives_on(street, min_returns, detected):
+    world = street()
+    world.first_sighting = world.add("bus", "bus", (BUMPER + 12.0 + BUS, 0.0, 0.0))
+    loop = loop_in(world, min_returns=min_returns)
+    frame = loop.keyframe(EVERYTHING)
+    assert (frame.detected, frame.braking, len(loop.belief.tracks)) == (detected, detected, int(detected))
+
+
+def test_a_collision_is_told_at_its_keyframe_with_the_speed_of_the_contact(street):
+    """Braking from 0.3 s on covers 3.65 m by 0.70 s and 4.05 m by 0.75 s, when 7.75 m/s are left."""
+    world = street()
+    world.add("bus", "bus", (BUMPER + 3.0 + 3.85 + BUS, 0.0, 0.0))
+    loop = loop_in(world)
+    impacts = [loop.keyframe(EVERYTHING).impact_speed_mps for _ in range(8)]
+    assert impacts[:7] == [None] * 7
+    assert impacts[7] == pytest.approx(7.75)

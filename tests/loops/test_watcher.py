@@ -1,0 +1,118 @@
+"""What a witness tells of an episode whose camera errs."""
+
+from types import SimpleNamespace
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.envs.wrappers.watching import Watching
+from care_sim.sensors.confidence import MIN_PIXELS
+
+
+class Notes(Watching):
+    """Keeps the moments, and how many bodies the camera showed at each."""
+
+    def begin(self, loop, episode):
+        self.moments, self.shown = [], []
+
+    def look(self, loop):
+        labelled = [actor.body for actor in loop.world.actors if actor.label is not None]
+        seen = np.isin(loop.picture.bodies, labelled) & (loop.picture.pixels >= MIN_PIXELS)
+        self.shown.append(int(np.count_nonzero(seen)))
+
+    def keep(self, moment):
+        self.moments.append(moment)
+
+    def end(self, outcome):
+        self.outcome = outcome
+
+
+def watch(name="CARE-Dense-v0", seed=0, keyframes=30, **conditions):
+    env = gymnasium.make(name, budget=0.05, **conditions)
+    policy = care_sim.make_policy("care", env)
+    with Notes(env, policy) as notes:
+        observation, _ = notes.reset(seed=seed)
+        for _ in range(keyframes):
+            observation, *_ = notes.step(policy(observation))
+    return notes
+
+
+def counts(notes):
+    """Of every keyframe: detections that arrived, false ones among them, missed ones."""
+    stances = [moment.stance for moment in notes.moments]
+    return [SimpleNamespace(given=len(s.belief.detections), false=s.false.sum(), missed=len(s.missed)) for s in stances]
+
+
+def test_a_camera_without_faults_misses_nothing_and_invents_nothing():
+    notes = watch()
+    assert [(c.given, c.false, c.missed) for c in counts(notes)] == [(shown, 0, 0) for shown in notes.shown]
+    assert sum(notes.shown) > 60
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"false_negative_rate": 0.4},
+        {"false_negative_rate": 0.4, "camera_rotation_sigma_deg": 1.0},
+        {"blackout_s": 2.0},
+    ],
+    ids=["misses", "misses of a crooked camera", "blackout"],
+)
+def test_what_is_missed_and_what_is_given_are_all_there_is_to_see(fault):
+    notes = watch(**fault)
+    found = counts(notes)
+    assert all(c.false == 0 for c in found)
+    if "camera_rotation_sigma_deg" not in fault:  # which may move an object out of its picture
+        assert [c.given + c.missed for c in found] == notes.shown
+    assert sum(c.missed for c in found) > 20
+
+
+def test_ghosts_are_false_and_hide_nothing():
+    notes = watch(false_positive_rate=1.0)
+    found = counts(notes)
+    assert [c.given - c.false for c in found] == notes.shown
+    assert sum(c.false for c in found) > 10
+    assert all(c.missed == 0 for c in found)
+
+
+def test_a_late_camera_misses_whom_it_has_not_shown_yet_and_nobody_else():
+    late = watch(camera_latency=2)
+    found = counts(late)
+    assert [c.missed for c in found[:2]] == late.shown[:2]
+    assert all(c.false == 0 for c in found)
+    appeared = next(n for n, moment in enumerate(late.moments) if moment.frame.in_view)
+    assert appeared >= 2
+    assert [c.missed for c in found[2:appeared]] == [0] * (appeared - 2)
+    assert [c.missed for c in found[appeared : appeared + 3]] == [1, 1, 0]
+
+
+def test_a_moment_holds_the_truth_of_its_keyframe():
+    notes = watch("CARE-Dartout-v0", seed=3)
+    for moment in notes.moments:
+        stance, frame = moment.stance, moment.frame
+        assert stance.time_s == frame.time_s
+        assert stance.names[stance.target] == "person"
+        x, y = stance.bodies[stance.target, :2]
+        assert np.hypot(x - stance.sensor.x, y - stance.sensor.y) == pytest.approx(frame.distance_m)
+        np.testing.assert_array_equal(np.flatnonzero(moment.shares), frame.fired)
+        np.testing.assert_array_equal(np.flatnonzero(moment.ranges), frame.fired)
+    first, last = notes.moments[0].stance, notes.moments[-1].stance
+    travelled = sum(moment.frame.speed_mps * 0.1 for moment in notes.moments[:-1])
+    assert last.ego[0] - first.ego[0] == pytest.approx(travelled, abs=0.5)
+    assert notes.outcome is None
+
+
+def test_a_refused_action_does_not_confuse_the_witness():
+    env = gymnasium.make("CARE-Dense-v0", budget=0.05, camera_latency=1)
+    with Notes(env) as notes:
+        notes.reset(seed=0)
+        action = np.zeros(notes.action_space.shape, np.float32)
+        notes.step(action)
+        with pytest.raises(care_sim.InvalidInput):
+            notes.step(action[:2])
+        for _ in range(5):
+            notes.step(action)
+        assert all(not moment.stance.false.any() for moment in notes.moments)
+        assert len(notes.moments) == 6

@@ -1,0 +1,116 @@
+"""The whole measure: every figure is there and adds up; how large it is, is the machine's business."""
+
+import json
+import sys
+
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.envs import CLOSED_LOOP
+from care_sim.measure.bench.config import BenchConfig
+from care_sim.measure.bench.growth import BUDGETS, COUNTS, GRIDS
+from care_sim.measure.bench.keyframe import POLICY, REST, STAGES, WHOLE, stages
+from care_sim.measure.bench.measure import measure
+from care_sim.measure.bench.ratios import TWO_OVER_ONE
+from care_sim.measure.bench.run import run
+from care_sim.measure.bench.steps import DRIVING, REACHING, makers
+from care_sim.measure.bench.tables import tables
+from care_sim.perception.tracker import TrackMemory
+from care_sim.policies.base import Policy
+from care_sim.policies.paper.care import Care
+from care_sim.sensors.camera import Picture
+from care_sim.sensors.engines.engine import ENGINES
+from care_sim.study.episode_config import EpisodeConfig
+from tests.helpers.places import ROOT
+
+TINY = {"seeds": 0, "seconds": 0.01, "repeats": 2, "samples": 3, "resets": 3}
+PUBLISHED = ROOT / "results" / "bench.json"
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    out = tmp_path_factory.mktemp("bench") / "new" / "bench.json"
+    assert run(BenchConfig(**TINY, out=out)) == 0
+    assert all(out.with_suffix(suffix).stat().st_size > 1000 for suffix in (".png", ".svg"))
+    return json.loads(out.read_text())
+
+
+def test_the_stages_add_up_to_the_keyframe_and_leave_the_classes_as_they_were():
+    kept = (Policy.__call__, vars(Picture)["of"], TrackMemory.update)
+    parts = stages(EpisodeConfig("dense", "care", 0.1, 0))
+    assert (Care.__call__, vars(Picture)["of"], TrackMemory.update) == kept
+    whole = parts.pop(WHOLE)
+    assert set(parts) == {POLICY, *STAGES, REST}
+    assert sum(parts.values()) == pytest.approx(whole)
+    assert min(parts.values()) > 0
+
+
+def test_a_peer_without_its_library_is_left_out_in_one_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "panda_gym", None)
+    made, (skipped,) = makers(BenchConfig())
+    assert next(iter(made)) == "CARE-Dense-v0"
+    assert {*CLOSED_LOOP, DRIVING} <= set(made)
+    assert len(made) == len(CLOSED_LOOP) + len(ENGINES)
+    assert skipped.startswith(f"{REACHING}: panda-gym needs the extra 'bench': pip install 'care-sim[bench]'")
+
+
+@pytest.mark.slow
+def test_everything_is_measured_in_every_round(measured):
+    left_out = {line.partition(":")[0] for line in measured["skipped"]}
+    assert {*CLOSED_LOOP, DRIVING, REACHING} <= {*measured["speed"], *left_out}
+    for figures in (*measured["speed"].values(), measured["vectorised"], measured["stages"], measured["choices"]):
+        assert all(len(values) == 2 and min(values) > 0 for values in figures.values())
+    for figures in measured["speed"].values():
+        for wall, core in zip(figures["steps_per_s"], figures["steps_per_cpu_s"], strict=True):
+            assert core > 0.95 * wall
+    assert set(measured["vectorised"]) == {"1", "2"}
+
+
+@pytest.mark.slow
+def test_the_growth_curves_have_a_time_for_every_point(measured):
+    for name, values in (("budget", BUDGETS), ("bodies", COUNTS), ("grid", GRIDS)):
+        curves = measured["growth"][name]
+        assert len(curves["values"]) == len(curves["labels"]) == len(values)
+        assert set(curves["ms"]) == set(measured["scans"]["engines"])
+        assert all(len(times) == len(values) and min(times) > 0 for times in curves["ms"].values())
+    assert measured["growth"]["grid"]["values"][0] == 512 * 32
+
+
+@pytest.mark.slow
+def test_machine_versions_targets_and_what_is_left_out_are_printed(measured):
+    assert measured["machine"]["cores"] >= 1
+    assert {"python", "pybullet", "highway-env", "gymnasium"} <= set(measured["versions"])
+    shown = tables({**measured, "skipped": ["PandaReach-v3: not here"]})
+    words = " ".join(str(part) for table in shown for part in (*table.rows, *table.notes))
+    assert measured["machine"]["processor"] in words
+    assert "left out: PandaReach-v3: not here" in words
+    for target in measured["targets"]:
+        assert target["name"] in words
+        assert target["met"] or target["holder"] in words
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"seconds": 0.0}, "seconds"),
+        ({"repeats": 0}, "repeats"),
+        ({"samples": 0}, "samples"),
+        ({"resets": 0}, "resets"),
+        ({"policy": "wisest"}, "policy"),
+    ],
+)
+def test_bad_input_is_named(wrong, named):
+    with pytest.raises(InvalidInput, match=named):
+        measure(BenchConfig(**{**TINY, **wrong}))
+
+
+@pytest.mark.slow
+def test_no_ratio_has_fallen_behind_the_published_ones():
+    """Ratios of medians within one run, so that the machine's speed does not matter; a third is what sharing it with
+    others may cost one side. Two processes need two free cores, which a test does not have.
+    """
+    published = json.loads(PUBLISHED.read_text())["ratios"]
+    ratios = measure(BenchConfig(seconds=0.5, repeats=3, samples=100, resets=3, seeds=0))["ratios"]
+    compared = set(ratios) & set(published) - {TWO_OVER_ONE}
+    assert compared
+    assert {name: (ratios[name], published[name]) for name in compared if ratios[name] < published[name] * 2 / 3} == {}

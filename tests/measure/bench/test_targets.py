@@ -1,0 +1,84 @@
+"""Ratios and targets, from a report written by hand."""
+
+import pytest
+
+from care_sim.measure.bench.ratios import OVER_DRIVING, OVER_REACHING, TWO_OVER_ONE, over, ratios, same_on_grid
+from care_sim.measure.bench.targets import targets
+
+
+def engine(scan, poses=0.01):
+    return {"poses_ms": [poses], "cast_ms": [scan - poses], "scan_ms": [scan]}
+
+
+@pytest.fixture
+def report():
+    report = {
+        "main": "CARE-Dense-v0",
+        "config": {"scenario": "dense", "policy": "care", "budget": 0.1},
+        "study": {"episodes": 49.0, "seconds": 10.0},
+        "speed": {
+            "CARE-Dense-v0": {"steps_per_s": [250.0, 400.0, 900.0], "steps_per_cpu_s": [500.0, 600.0, 900.0]},
+            "highway-fast-v0": {"steps_per_s": [20.0], "steps_per_cpu_s": [30.0]},
+            "PandaReach-v3": {"steps_per_s": [250.0], "steps_per_cpu_s": [300.0]},
+        },
+        "stages": {"cast": [0.2], "camera": [1.2], "the rest": [0.6], "whole keyframe": [2.0]},
+        "vectorised": {"1": [500.0], "2": [950.0]},
+        "choices": {"p50": [0.3], "p99": [0.6], "demand": [0.1], "allocation": [0.15]},
+        "scans": {"engines": {"bullet": engine(2.0), "fast": engine(0.1, 0.06), "Embree (Open3D)": engine(0.25)}},
+        "growth": {"grid": {"ms": {"bullet": [2.0, 2.0, 2.0], "fast": [0.1, 0.1, 0.2]}}},
+        "memory": {"resets": 2000, "begun_mb": 180.0, "early_mb": 230.0, "peak_mb": 260.0},
+    }
+    return {**report, "ratios": ratios(report)}
+
+
+def test_ratios_are_of_medians_and_larger_is_better(report):
+    assert report["ratios"] == pytest.approx(
+        {
+            OVER_DRIVING: 20.0,
+            OVER_REACHING: 2.0,
+            over("fast", "bullet"): 20.0,
+            over("fast", "Embree (Open3D)"): 2.5,
+            same_on_grid("fast"): 0.5,
+            TWO_OVER_ONE: 1.9,
+        }
+    )
+
+
+def test_what_is_missed_names_what_holds_it(report):
+    made = targets(report)
+    assert {target.name: target.holder for target in made if not target.met} == {
+        "CARE-Dense-v0: steps/s": "camera, 60%",
+        OVER_DRIVING: "camera, 60%",
+        over("fast", "Embree (Open3D)"): "poses, 60%",
+        same_on_grid("fast"): "poses, 60%",
+        "policy + allocation, p99 in ms": "allocation, 50%",
+        "a worker, MB": "libraries, 69%",
+        "a worker, MB gained by resets": "",
+    }
+    assert len(made) == 11
+    assert made[-1].figure == pytest.approx(50.0)
+
+
+def test_without_engine_and_peer_nothing_is_said_of_them(report):
+    del report["scans"]["engines"]["fast"], report["growth"]["grid"]["ms"]["fast"], report["speed"]["PandaReach-v3"]
+    report["ratios"] = ratios(report)
+    assert set(report["ratios"]) == {
+        OVER_DRIVING,
+        over("bullet", "Embree (Open3D)"),
+        same_on_grid("bullet"),
+        TWO_OVER_ONE,
+    }
+    assert [target.name for target in targets(report)] == [
+        "CARE-Dense-v0: steps/s",
+        OVER_DRIVING,
+        TWO_OVER_ONE,
+        "policy + allocation, p99 in ms",
+        "a worker, MB",
+        "a worker, MB gained by resets",
+        "the paper's 245 episodes on 2 cores, s",
+    ]
+
+
+def test_another_scenario_is_held_against_nothing(report):
+    report["config"]["scenario"] = "dartout"
+    assert targets(report) == []

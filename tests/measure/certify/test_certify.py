@@ -1,0 +1,319 @@
+"""The certificate: the list holds all that can meet, no mode changes an episode, and a break is named where it is."""
+
+import sys
+from dataclasses import fields, replace
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.conditions import CameraFaults, LidarFaults
+from care_sim.core.types import Scan
+from care_sim.driving.braking import BrakingController
+from care_sim.envs import sensing
+from care_sim.measure.certify import design, needs, published, run
+from care_sim.measure.certify.config import EPISODES, CertifyConfig
+from care_sim.measure.certify.design import CLOSED, FAULTS, MODES, POLICIES, REPLAY, SETTINGS, STREET, drawn, modes
+from care_sim.measure.certify.drive import write_drive
+from care_sim.measure.certify.modes import in_turns, play
+from care_sim.measure.certify.needs import FARTHEST, playable
+from care_sim.measure.certify.playing import batches, played
+from care_sim.measure.certify.trail import CONFIGURATION, DIGEST_BYTES, OUTCOME, STAGES, stage
+from care_sim.measure.certify.verdict import compare
+from care_sim.perception.tracker import TrackMemory
+from care_sim.policies import BUILT_IN
+from care_sim.sensors.camera import CameraDetector
+from care_sim.sensors.lidar import Lidar
+from care_sim.sensors.recorded_lidar import RecordedLidar
+from care_sim.world.world import World
+from tests.helpers.places import ROOT
+
+LIST = [drawn(number) for number in range(1000)]
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return write_drive(tmp_path_factory.mktemp("drive"))
+
+
+def of(episodes, count):
+    return [episode for episode in episodes if episode.keyframes <= 8][:count]
+
+
+def alone(episode, source=""):
+    (trail,) = in_turns([episode], source)
+    assert isinstance(trail, bytes), trail
+    return trail
+
+
+def test_a_thousand_episodes_hold_every_pair_that_can_meet():
+    met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
+    assert {(e, p) for e, p, _, _ in met} == set(product({*CLOSED, STREET, REPLAY}, POLICIES))
+    possible = {(e, m) for e, p in product({*CLOSED, STREET, REPLAY}, POLICIES) for m in modes(e, p)}
+    assert {(e, m) for e, _, m, _ in met} == possible
+    names = {name for one in (*FAULTS.values(), *SETTINGS.values()) for name in one}
+    assert {(p, n) for _, p, _, given in met for n in given} >= set(product(POLICIES, names))
+    assert {(m, n) for _, _, m, given in met for n in given} >= set(product(MODES, names))
+    faults = {name for one in FAULTS.values() for name in one}
+    together = {pair for _, _, _, given in met for pair in combinations(sorted(given), 2)}
+    assert together >= set(combinations(sorted(faults), 2))
+
+
+def test_every_fault_of_the_conditions_is_in_the_list():
+    faults = {field.name for kind in (CameraFaults, LidarFaults) for field in fields(kind)} | {"ego_speed_sigma"}
+    assert {name for one in FAULTS.values() for name in one} == faults
+
+
+def test_every_built_in_policy_is_in_the_list():
+    """One that is missing is added at the end of POLICIES, and the list is published anew."""
+    assert [name for name in BUILT_IN if name not in POLICIES] == []
+
+
+def test_an_episode_of_the_list_does_not_move():
+    assert drawn(0).text == LIST[0].text
+    assert len({(e.text, e.mode) for e in LIST}) == len(LIST)
+
+
+def test_no_mode_changes_a_trail(source):
+    closed = of([e for e in LIST if e.environment in CLOSED and e.mode == "async"], 4)
+    trails = [alone(episode) for episode in closed]
+    assert {mode: play(mode, closed, source) for mode in MODES} == dict.fromkeys(MODES, trails)
+
+
+def test_recordings_and_privileged_policies_play_in_vectors_too(source):
+    recorded = of([e for e in LIST if e.environment == REPLAY and e.mode == "subprocess"], 2)
+    trails = [alone(episode, source) for episode in recorded]
+    assert play("async", recorded, source) == play("sync", recorded, source) == trails
+    beyond = replace(recorded[0], policy="history-oracle", keyframes=40)
+    assert play("sync", [beyond], source) == [alone(beyond, source)]
+    privileged = of([e for e in LIST if e.policy == "history-oracle" and e.environment in CLOSED], 3)
+    assert play("sync", privileged, source) == [alone(episode) for episode in privileged]
+
+
+def test_batches_hold_every_episode_once_and_a_street_together():
+    made = batches(LIST)
+    assert sorted(episode.number for batch in made for episode in batch) == list(range(1000))
+    streets = [{e.seed for e in batch} for batch in made if batch[0].environment == STREET]
+    assert all(len(seeds) == 1 for seeds in streets)
+    assert len(streets) == len(design.STREETS)
+
+
+def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch):
+    good, bad = of([e for e in LIST if e.environment in CLOSED], 2)
+    broken = replace(bad, policy="nobody")
+    from care_sim.measure.certify.playing import attempt
+
+    found = attempt([replace(good, mode="sync"), replace(broken, mode="sync")], source)
+    assert found[good.number] == alone(good)
+    assert "nobody" in found[bad.number]
+    verdict = compare(found | {0: found[bad.number]}, [found[good.number]] * 1000)
+    assert verdict.differing[bad.number] == ("not played", None)
+    assert verdict.hash is None
+
+
+@pytest.mark.parametrize(("module", "extra"), [("open3d", "open3d"), ("stable_baselines3", "rl")])
+def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(module, extra, monkeypatch, capsys):
+    able, lines = playable(LIST)
+    assert (able, lines) == (LIST, [])
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(needs, "find_spec", lambda name: None if name == module else name)
+    able, (line,) = playable(LIST)
+    missing = len(LIST) - len(able)
+    assert line.startswith(f"{missing} of 1,000 not played: ")
+    assert f"extra '{extra}'" in line
+    trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(1000)]
+    monkeypatch.setattr(run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers})
+    monkeypatch.setattr(run, "read", lambda: trails)
+    assert run.run(CertifyConfig(workers=1)) == 0
+    told = capsys.readouterr()
+    assert told.err.splitlines() == [f"care-sim: {line}"]
+    left = published.combined([trails[episode.number] for episode in able])
+    assert told.out == f"{len(able)} of 1,000 episodes: {left}, as published\n"
+    lacking = next(one.number for one in LIST if one not in able)
+    for config in (CertifyConfig(episode=lacking), CertifyConfig(every=True, write=True)):
+        with pytest.raises(MissingExtra, match=f"extra '{extra}'"):
+            run.run(config)
+
+
+def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    closed = [episode for episode in playable(LIST)[0] if episode.environment in CLOSED]
+    policies = {episode.policy: replace(episode, keyframes=2) for episode in closed}
+    assert set(POLICIES) - set(policies) == {FARTHEST}
+    for episode in policies.values():
+        alone(episode)
+
+
+MADE = replace(
+    drawn(0),
+    environment="CARE-Dense-v0",
+    arguments=(("budget", 0.05),),
+    policy="care",
+    seed=3,
+    keyframes=5,
+    mode="single",
+)
+
+
+def moved_by_a_millimetre(monkeypatch):
+    step = World._step
+
+    def moved(self, acceleration):
+        passage = step(self, acceleration)
+        if self._steps == 4:
+            self.ego._vehicle.position[0] += 0.001
+        return passage
+
+    monkeypatch.setattr(World, "_step", moved)
+
+
+def one_box_a_pixel_wider(monkeypatch):
+    detect = CameraDetector.detect
+
+    def widened(self, sights, heading, ranges, time_s):
+        seen = detect(self, sights, heading, ranges, time_s)
+        boxes = seen.boxes.copy()
+        boxes[:1, 2] += time_s > 0.15
+        return replace(seen, boxes=boxes)
+
+    monkeypatch.setattr(CameraDetector, "detect", widened)
+
+
+def a_track_that_has_moved(monkeypatch):
+    predict, calls = TrackMemory.predict, []
+
+    def moved(self):
+        predict(self)
+        calls.append(0)
+        self._tracks.boxes[:1, 0] += 0.001 * (len(calls) == 2)
+
+    monkeypatch.setattr(TrackMemory, "predict", moved)
+
+
+def another_cell(monkeypatch):
+    choose, calls = sensing.fired_cells, []
+
+    def other(scores, budget, floor):
+        cells = choose(scores, budget, floor)
+        calls.append(0)
+        free = np.setdiff1d(np.arange(scores.size), cells)[:1]
+        return np.sort(np.concatenate([cells[:-1], free])) if len(calls) == 3 else cells
+
+    monkeypatch.setattr(sensing, "fired_cells", other)
+
+
+def one_range_a_centimetre_longer(monkeypatch):
+    fire, calls = Lidar.fire, []
+
+    def longer(self, cells, sensor):
+        scan, bodies = fire(self, cells, sensor)
+        calls.append(0)
+        ranges = scan.ranges.copy()
+        ranges[np.flatnonzero(np.isfinite(ranges))[:1]] += 0.01 * (len(calls) == 3)
+        return Scan(scan.cells, ranges), bodies
+
+    monkeypatch.setattr(Lidar, "fire", longer)
+
+
+def a_brake_that_is_said_to_be_on(monkeypatch):
+    command, calls = BrakingController.command, []
+
+    def braking(self, tracks, ego):
+        calls.append(0)
+        given = command(self, tracks, ego)
+        return replace(given, braking=not given.braking) if len(calls) == 3 else given
+
+    monkeypatch.setattr(BrakingController, "command", braking)
+
+
+def another_outcome(monkeypatch):
+    from care_sim.measure.certify import trail
+
+    judge = trail.outcome
+    monkeypatch.setattr(trail, "outcome", lambda keyframes: replace(judge(keyframes), clearance_m=12.3))
+
+
+@pytest.mark.parametrize(
+    ("broken", "where"),
+    [
+        (moved_by_a_millimetre, (STAGES[0], 2)),
+        (one_box_a_pixel_wider, (STAGES[1], 2)),
+        (a_track_that_has_moved, (STAGES[2], 2)),
+        (another_cell, (STAGES[3], 2)),
+        (one_range_a_centimetre_longer, (STAGES[4], 2)),
+        (a_brake_that_is_said_to_be_on, (STAGES[5], 2)),
+        (another_outcome, (OUTCOME, None)),
+    ],
+)
+def test_what_is_broken_is_named(broken, where, monkeypatch):
+    sound = alone(MADE)
+    broken(monkeypatch)
+    assert stage(sound, alone(MADE)) == where
+
+
+def test_what_is_broken_in_a_recording_is_named(source, monkeypatch):
+    recorded = replace(MADE, environment=REPLAY)
+    sound = alone(recorded, source)
+    fire, calls = RecordedLidar.fire, []
+
+    def longer(self, cells, cloud):
+        returned = fire(self, cells, cloud)
+        calls.append(0)
+        return replace(returned, points=returned.points * (1 + 0.001 * (len(calls) == 3)))
+
+    monkeypatch.setattr(RecordedLidar, "fire", longer)
+    assert stage(sound, alone(recorded, source)) == (STAGES[4], 2)
+
+
+def test_another_configuration_is_named():
+    assert stage(alone(MADE), alone(replace(MADE, seed=4))) == (CONFIGURATION, None)
+
+
+def test_the_first_that_differs_is_told_with_a_command(capsys):
+    trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(6)]
+    other = trails[4][:-3] + b"abc"
+    verdict = compare(dict(enumerate(trails)) | {4: other, 5: trails[0]}, trails)
+    text = "\n".join(verdict.lines())
+    assert not verdict.as_published
+    assert "episode 4" in text
+    assert "care-sim certify --episode 4" in text
+    assert drawn(4).environment in text
+    assert compare(dict(enumerate(trails)), trails).as_published
+
+
+def test_the_combined_hash_is_over_the_order_of_the_numbers():
+    one, two = b"a" * 20, b"b" * 20
+    assert compare({1: two, 0: one}, [one, two]).hash == published.combined([one, two])
+    assert published.combined([one, two]) != published.combined([two, one])
+
+
+def test_a_missing_or_damaged_list_is_one_line(tmp_path):
+    file = tmp_path / "list.parquet"
+    with pytest.raises(InvalidInput, match=r"^the list of certify is missing: install the package again$"):
+        published.read(file)
+    published.write([b"12345678" + b"x"], file)
+    assert published.read(file) == [b"12345678x"]
+    file.write_bytes(b"no")
+    with pytest.raises(ValueError, match="not a readable Parquet"):
+        published.read(file)
+
+
+def test_some_of_the_list_goes_as_published():
+    """A short form of the certificate; `care-sim certify` is the whole."""
+    short = [episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12]
+    chosen = [one.number for mode in MODES for one in [e for e in short if e.mode == mode][:5]]
+    verdict = compare(played(chosen, 1), published.read())
+    assert verdict.as_published, "\n".join(verdict.lines())
+
+
+@pytest.mark.slow
+def test_an_episode_of_a_street_goes_as_published():
+    number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
+    verdict = compare(played([number], 1), published.read())
+    assert verdict.as_published, "\n".join(verdict.lines())
+
+
+def test_the_readme_tells_the_hash_of_the_list():
+    readme = ROOT / "README.md"
+    assert f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}" in readme.read_text()

@@ -1,0 +1,45 @@
+"""The certificate as a processor of fewer features plays it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from care_sim.measure.certify.design import STREET, drawn
+from care_sim.measure.certify.drive import write_drive
+from care_sim.measure.certify.modes import in_turns
+from care_sim.measure.certify.trail import stage
+from tests.helpers.places import ROOT
+from tests.helpers.processor_features import reduced
+
+NUMBERS = [n for n in range(150) if drawn(n).environment != STREET and drawn(n).keyframes <= 16][:60]
+ALIKE = 0.95
+"""The share of episodes that nothing of a processor changes, at the least: a last bit still decides where the edge of a
+picture lies on a border between columns, and Bullet's rays against round bodies differ by more than last bits."""
+
+
+def played(folder):
+    source = write_drive(Path(folder))
+    return {n: in_turns([drawn(n)], source)[0] for n in NUMBERS}
+
+
+@pytest.mark.slow
+def test_a_processor_of_fewer_features_plays_most_episodes_as_this_one(tmp_path):
+    line = (
+        "import json; from tests.measure.certify import test_certify_elsewhere as t; "
+        f"print(json.dumps({{n: trail.hex() for n, trail in t.played({str(tmp_path / 'there')!r}).items()}}))"
+    )
+    child = subprocess.run(
+        [sys.executable, "-c", line],
+        cwd=ROOT,
+        env=reduced(tmp_path / "code"),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    theirs = {int(n): bytes.fromhex(trail) for n, trail in json.loads(child.stdout.splitlines()[-1]).items()}
+    ours = played(tmp_path / "here")
+    apart = {n: (drawn(n).text, *stage(ours[n], theirs[n])) for n in NUMBERS if ours[n] != theirs[n]}
+    assert len(apart) <= (1 - ALIKE) * len(NUMBERS), apart

@@ -1,0 +1,231 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from care_sim.cli import main
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.measure.parity import outcomes as parity_outcomes
+from care_sim.measure.parity.answers import Millimetres, aside
+from care_sim.measure.parity.keyframes import Compared, compare_episode
+from care_sim.measure.parity.outcomes import Outcomes
+from care_sim.measure.parity.pictures import Pictures
+from care_sim.measure.parity.run import agree, unexplained
+from care_sim.measure.parity.scenes import GRIDS, draw_bodies, draw_scene
+from care_sim.measure.parity.tally import GROUPS, Tally, groups
+from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
+from care_sim.scenarios import SCENARIOS
+from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.engines.engine import ENGINES
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.world.bodies import CATALOGUE
+
+GRID = AngularGrid(columns=180, rows=24)
+LEVEL = AngularGrid(columns=4, rows=3, top=0.5, bottom=-0.5)
+"""Cell 6 fires level, to the left of the sensor's front by 45 degrees."""
+AHEAD = -np.pi / 4
+
+
+class Askew:
+    """A real engine that believes its sensor to be a centimetre ahead."""
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def cast(self, sensor, cells):
+        return self.engine.cast(replace(sensor, x=sensor.x + 0.01), cells)
+
+
+@pytest.fixture
+def street(bullet):
+    """A bus ahead, and the three engines over it."""
+    frames = [Frame(20.0, 0.0, 0.0, 0.0)]
+    bullet.add(CATALOGUE["bus"], frames[0])
+    exact = Millimetres([CATALOGUE["bus"]], GRID)
+    exact.place(frames)
+    yield Engines(ENGINES["fast"](bullet, GRID), ENGINES["bullet"](bullet, GRID), exact)
+    exact.close()
+
+
+SENSOR, CELLS = Frame(0.0, 0.0, 1.84, 0.0), np.arange(GRID.size)
+
+
+def test_engines_that_agree_are_told_the_same(street):
+    compared = compare(street, SENSOR, CELLS)
+    assert np.isin(1, compared.fast[1])
+    assert set(compared.on_exact.tolist()) == {SAME}
+
+
+def test_a_centimetre_is_seen_and_not_excused(street):
+    compared = compare(replace(street, fast=Askew(street.fast)), SENSOR, CELLS)
+    on_bus = compared.fast[1] == 1
+    assert np.all(compared.on_exact[on_bus] == UNEXPLAINED)
+    assert np.all(compared.on_bullet[on_bus] == UNEXPLAINED)
+
+
+def test_what_bullet_alone_answers_otherwise_is_its_tolerance(street):
+    compared = compare(replace(street, bullet=Askew(street.bullet)), SENSOR, CELLS)
+    assert np.all(compared.on_bullet[compared.bullet[1] == 1] == TOLERANCE)
+
+
+@pytest.mark.parametrize(("above", "grazes"), [(0.5e-6, True), (2e-6, False)])
+def test_a_ray_grazes_within_a_micrometre_of_an_edge(bullet, above, grazes):
+    bus = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
+    engine, sensor = ENGINES["fast"](bullet, LEVEL), Frame(0.0, 0.0, 3.47 + above, AHEAD)
+    assert engine.cast(sensor, np.array([6]))[1].item() != bus
+    assert aside(engine, sensor, 6, (np.array([20 - 11.19 / 2]), np.array([bus]))) == grazes
+
+
+def test_rays_count_where_they_end(street):
+    compared, tally = compare(street, SENSOR, CELLS), Tally()
+    frames = [Frame(20.0, 0.0, 0.0, 0.0)]
+    tally.add(compared, groups([CATALOGUE["bus"]], frames), {"scene": 3})
+    counts = tally.figures()["references"]["Bullet in millimetres"]
+    assert counts["boxes, upright"]["rays"] == counts["boxes, upright"]["same"] == np.sum(compared.fast[1] == 1)
+    assert sum(count["rays"] for count in counts.values()) == GRID.size
+    assert tally.listed == []
+
+
+def test_a_difference_is_listed_with_its_scene(street):
+    tally = Tally()
+    askew = compare(replace(street, fast=Askew(street.fast)), SENSOR, np.array([6 * 180 + 90]))
+    tally.add(askew, groups([CATALOGUE["bus"]], [Frame(20.0, 0.0, 0.0, 0.0)]), {"scene": 3})
+    (line,) = tally.listed
+    assert (line["scene"], line["ray"], line["meets"], line["on_exact"]) == (3, 0, "boxes, upright", "unexplained")
+    assert line["exact"]["m"] - line["fast"]["m"] == pytest.approx(0.01, abs=1e-3)
+    assert unexplained({"scans": {"one": tally.figures()}}) == 1
+
+
+def test_bodies_are_grouped_by_shape_and_stance():
+    kinds = [CATALOGUE["bus"], CATALOGUE["pedestrian"]]
+    upright, tilted = Frame(0.0, 0.0, 0.0, 1.0), Frame(0.0, 0.0, 0.0, 1.0, 0.0, 0.1)
+    named = [GROUPS[place] for place in groups(kinds, [tilted, upright])]
+    assert named == ["road or nothing", "road or nothing", "boxes, tilted", "both, upright"]
+
+
+def test_a_scene_is_drawn_again_from_its_number():
+    kinds = draw_bodies(3, 0)
+    one, other = (draw_scene(3, 17, draw_bodies(3, 0), GRIDS[0]) for _ in range(2))
+    assert one.frames == other.frames
+    assert one.sensor == other.sensor
+    assert one.cells.tolist() == other.cells.tolist() == sorted(set(one.cells.tolist()))
+    assert one.frames != draw_scene(3, 18, kinds, GRIDS[0]).frames
+
+
+def test_every_keyframe_of_an_episode_is_scanned_in_full():
+    compared = Compared()
+    compare_episode(EpisodeConfig("dense", "care", 0.1, 0, scenario_parameters=(("duration_s", 0.2),)), compared)
+    tally = compared.rays
+    assert tally.scans == compared.pictures.pictures == 3
+    assert compared.pictures.boxes > 10
+    assert compared.pictures.widest_px <= 1
+    on_bullet, on_exact = tally.verdicts.sum(axis=1)
+    assert on_exact.tolist() == [3 * 16384, 0, 0, 0, 0]
+    assert on_bullet[UNEXPLAINED] == 0
+    assert on_bullet[[GRAZING, TOLERANCE]].sum() < 1e-3 * 3 * 16384
+
+
+def test_the_command_prints_and_writes(tmp_path, capsys):
+    out = tmp_path / "new" / "parity.json"
+    with pytest.raises(SystemExit) as end:
+        main(["parity", "--scenes", "20", "--episodes", "0", "--out", str(out)])
+    assert end.value.code == 0
+    report = json.loads(out.read_text())
+    assert report["config"] == {"scenes": 20, "episodes": 0, "seed": 0}
+    assert report["scans"]["random scenes"]["scans"] == 20
+    assert "random scenes: 20 scans" in capsys.readouterr().out
+
+
+def test_a_number_below_zero_is_refused(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["parity", "--scenes", "-1"])
+    assert end.value.code == 2
+    assert "scenes must be a whole number >= 0" in capsys.readouterr().err
+
+
+class Shifted:
+    """A real engine that draws what a camera two pixels to the left of it shows."""
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def body_ids(self, camera, sensor, window):
+        left, top, right, bottom = window
+        return self.engine.body_ids(camera, sensor, (left + 2, top, right + 2, bottom))
+
+
+def test_pictures_that_agree_and_that_do_not(bullet):
+    body = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
+    fast, reference = ENGINES["fast"](bullet, GRID), ENGINES["bullet"](bullet, GRID)
+    seen = Pictures()
+    seen.compare(fast, reference, [FRONT_CAMERA, PinholeCamera(100, 80)], SENSOR)
+    assert body == 1
+    counts = {"pictures": 2, "boxes": 2, "other_boxes": 0, "other_pixels": 0, "in_one_only": 0, "widest_px": 0}
+    assert {name: seen.figures()[name] for name in counts} == counts
+    seen.compare(Shifted(fast), reference, [FRONT_CAMERA], SENSOR)
+    assert (seen.figures()["other_boxes"], seen.figures()["widest_px"]) == (1, 2)
+    assert seen.figures()["other_pixels"] > 10
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("changes", [{}, {"camera_latency": 1, "camera_rotation_sigma_deg": 1.0, "lidar_dropout": 0.1}])
+def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
+    outcomes = Outcomes()
+    outcomes.compare(EpisodeConfig(scenario, "care", 0.05, 7, **changes))
+    assert outcomes.figures() == {
+        "episodes": 1, "keyframes": outcomes.keyframes, "other_outcomes": [], "other_keyframes": [],
+        "other_than_exact": [],
+    }  # fmt: skip
+    assert outcomes.keyframes > 20
+
+
+def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
+    monkeypatch.setattr(parity_outcomes, "COMPARED", ("fast", "nearsighted"))
+    monkeypatch.setitem(ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid)))
+    config, outcomes = EpisodeConfig("dense", "care", 0.1, 0), Outcomes()
+    outcomes.compare(config)
+    label = config.changed(engine="fast").label
+    assert outcomes.other_outcomes == outcomes.other_keyframes == [label]
+    assert outcomes.other_than_exact == []
+
+
+def test_a_ray_that_bullet_alone_widens_is_decided_in_millimetres():
+    """The third ray that meets the person at keyframe 39 passes her head by less than Bullet's tolerance."""
+    outcomes = Outcomes()
+    outcomes.compare(EpisodeConfig("dense", "all-camera", 0.03, 25))
+    assert len(outcomes.other_outcomes) == 1
+    assert outcomes.other_than_exact == []
+
+
+class Nearsighted:
+    """A real engine whose rays end after 5 m."""
+
+    def __init__(self, engine):
+        self.engine, self.body_ids = engine, engine.body_ids
+
+    def cast(self, sensor, cells):
+        ranges, ids = self.engine.cast(sensor, cells)
+        return np.where(ranges < 5, ranges, np.inf), np.where(ranges < 5, ids, -1)
+
+
+def report_of(rays=0, box_px=1.0, outcomes=()):
+    counts = {"references": {"Bullet in millimetres": {"boxes, upright": {"unexplained": rays}}}}
+    ended = {"other_outcomes": list(outcomes), "other_keyframes": ["a"], "other_than_exact": []}
+    return {"scans": {"one": counts}, "pictures": {"dense": {"widest_px": box_px}}, "outcomes": ended}
+
+
+def test_engines_agree_when_nothing_is_left_to_explain():
+    assert agree(report_of())
+    assert agree({**report_of(), "pictures": {}})
+    for wrong in ({"rays": 1}, {"box_px": 2.0}, {"outcomes": ["a"]}):
+        assert not agree(report_of(**wrong))
+
+
+def test_a_folder_is_no_file_for_the_figures(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["parity", "--scenes", "0", "--episodes", "0", "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    assert "is a folder, a file is wanted" in capsys.readouterr().err

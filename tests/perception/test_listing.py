@@ -1,0 +1,197 @@
+"""Detectors by name: ours, those of installed packages, and one from a TorchScript file that the test writes."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.loops.film import Annotations, Cloud
+from care_sim.perception.listing import ENTRY_POINTS, detector_names, make_detector
+from care_sim.perception.points_only import BrokenDetector, PointsOnly
+from care_sim.perception.proxy import ReturnsProxy
+from tests.helpers.made_points import HEIGHT, shell
+
+POINTS = shell(8, 6, 0.4, 4.61, 1.95, 1.72)
+CLOUD = Cloud(np.arange(len(POINTS)), POINTS, np.full(len(POINTS), 3))
+CAR = Annotations(np.array([3]), np.array([0]), np.array([[8, 6, -1, 4.61, 1.95, 1.72, 0.4]]))
+
+MODULE = '''
+import numpy as np
+from care_sim.core.types import Detections
+
+module = 3
+
+
+class Middle:
+    """One person amid the points."""
+
+    def __init__(self, label=4):
+        self.label = label
+
+    def detect(self, points, sensor_height_m):
+        box = [*points.mean(axis=0)[:2], 0.9 - sensor_height_m, 0.7, 0.7, 1.8, 0.0]
+        return Detections(np.array([self.label]), np.array([box]), np.array([len(points)]))
+
+
+class Stubborn(Middle):
+    def __init__(self):
+        raise RuntimeError("no weights")
+
+
+def listed(*places):
+    return Middle(len(places))
+
+
+def loose(**things):
+    return Middle(things["label"])
+
+
+def quits():
+    raise SystemExit(2)
+
+
+class Blind:
+    """Detects nothing, by nothing."""
+'''
+
+
+@pytest.fixture
+def installed(install):
+    things = {"middle": "Middle", "stubborn": "Stubborn", "blind": "Blind", "number": "module", "lost": "Nowhere"}
+    things |= {"listed": "listed", "loose": "loose", "quits": "quits"}
+    install("own_detectors", MODULE, ENTRY_POINTS, returns="Middle", torchscript="Middle", **things)
+
+
+def test_ours_are_known():
+    assert detector_names() == ["returns", "cluster", "torchscript"]
+    assert isinstance(make_detector("returns", HEIGHT, min_returns=5), ReturnsProxy)
+
+
+def test_the_cluster_detector_finds_a_car_and_names_the_object(open3d):
+    found, objects = make_detector("cluster", HEIGHT).detect(CLOUD, CAR)
+    assert (found.classes.tolist(), objects.tolist()) == ([0], [3])
+
+
+def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
+    assert detector_names()[3:] == ["blind", "listed", "loose", "lost", "middle", "number", "quits", "stubborn"]
+    detector = make_detector("middle", HEIGHT, label=0)
+    assert isinstance(detector, PointsOnly)
+    found, _ = detector.detect(CLOUD, CAR)
+    assert found.boxes[0, :2] == pytest.approx(POINTS.mean(axis=0)[:2])
+    assert found.classes.tolist() == [0]
+
+
+def test_a_maker_that_takes_any_number_of_things_needs_none(installed):
+    assert make_detector("listed", HEIGHT).detect(CLOUD, CAR)[0].classes.tolist() == [0]
+
+
+def test_a_maker_that_takes_parameters_by_any_name_is_handed_them(installed):
+    assert make_detector("loose", HEIGHT, label=2).detect(CLOUD, CAR)[0].classes.tolist() == [2]
+
+
+def test_a_built_in_name_is_taken(installed):
+    assert isinstance(make_detector("returns", HEIGHT), ReturnsProxy)
+    with pytest.raises(InvalidInput, match="detector torchscript needs the parameter file"):
+        make_detector("torchscript", HEIGHT)
+
+
+def test_of_two_with_one_name_the_first_on_the_path_counts(install):
+    install("behind", MODULE, ENTRY_POINTS, twin="Stubborn")
+    install("ahead", MODULE, ENTRY_POINTS, twin="Middle")
+    assert len(make_detector("twin", HEIGHT).detect(CLOUD, CAR)[0]) == 1
+
+
+def test_a_package_that_ends_the_program_gets_one_line(install):
+    install("rude_detectors", "raise SystemExit('no device')", ENTRY_POINTS, rude="Any")
+    with pytest.raises(BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"):
+        make_detector("rude", HEIGHT)
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("stubborn", r"detector stubborn refuses \{\}: RuntimeError: no weights"),
+        ("quits", r"detector quits refuses \{\}: SystemExit: 2"),
+        ("blind", "detector blind is no PointDetector: Blind has no method detect"),
+        ("number", "detector number cannot be loaded: own_detectors:module makes nothing"),
+        ("lost", "detector lost cannot be loaded: AttributeError: .*Nowhere"),
+    ],
+)
+def test_a_broken_one_gets_one_line(installed, name, line):
+    with pytest.raises(BrokenDetector, match=f"^{line}") as error:
+        make_detector(name, HEIGHT)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "line"),
+    [
+        ("yolo", {}, "unknown detector 'yolo'; known: cluster, returns, torchscript"),
+        ("returns", {"least": 3}, "unknown parameter of detector returns 'least'; known: min_returns"),
+        ("returns", {"min_returns": 0}, "min_returns must be a whole number >= 1, got 0"),
+        ("cluster", {"eps": 1}, "unknown parameter of detector cluster 'eps'; known: grid"),
+        ("torchscript", {}, "detector torchscript needs the parameter file"),
+    ],
+)
+def test_names_and_parameters_are_checked(name, parameters, line):
+    with pytest.raises(InvalidInput, match=f"^{line}$"):
+        make_detector(name, HEIGHT, **parameters)
+
+
+def scripted(torch, path):
+    """A module that sees one person amid the points, or none where there are no points; in training it is unsure."""
+
+    class Middle(torch.nn.Module):
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            assert points.dtype == torch.float32
+            if points.shape[0] == 0:
+                return torch.zeros(0, dtype=torch.int64), torch.zeros(0, 7), torch.zeros(0)
+            x, y = points[:, 0].mean(), points[:, 1].mean()
+            rest = torch.tensor([0.9 - sensor_height_m, 4.0, 4.0, 4.0, 0.0])
+            boxes = torch.cat([torch.stack([x, y]), rest]).unsqueeze(0)
+            return torch.tensor([4]), boxes, torch.tensor([0.0 if self.training else 0.75])
+
+    torch.jit.script(Middle()).save(str(path))
+    return path
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_torchscript_file_that_gives_no_boxes_is_named(tmp_path):
+    torch = pytest.importorskip("torch")
+
+    class Flat(torch.nn.Module):
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            return torch.zeros(2, dtype=torch.int64), points[:2], torch.zeros(2)
+
+    torch.jit.script(Flat()).save(str(tmp_path / "flat.pt"))
+    detector = make_detector("torchscript", HEIGHT, file=tmp_path / "flat.pt")
+    with pytest.raises(BrokenDetector, match=r"torchscript fails .* boxes must have the shape \(n, 7\), got \(2, 3\)"):
+        detector.detect(CLOUD, CAR)
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_torchscript_file_detects(tmp_path):
+    torch = pytest.importorskip("torch")
+    detector = make_detector("torchscript", HEIGHT, file=scripted(torch, tmp_path / "middle.pt"))
+    found, objects = detector.detect(CLOUD, CAR)
+    assert (found.classes.tolist(), found.scores.tolist(), objects.tolist()) == ([4], [0.75], [3])
+    assert found.boxes[0, :3] == pytest.approx([*POINTS.mean(axis=0)[:2], 0.9 - HEIGHT], abs=1e-5)
+    near = np.abs(POINTS - found.boxes[0, :3]) <= 2.0
+    assert found.returns.tolist() == [np.count_nonzero(near.all(axis=1))]
+    assert len(detector.detect(CLOUD.take(np.zeros(len(CLOUD), bool)), CAR)[0]) == 0
+
+
+def test_a_file_that_is_none_is_named(tmp_path):
+    pytest.importorskip("torch")
+    broken = tmp_path / "broken.pt"
+    broken.write_bytes(b"PK nothing")
+    for file, line in ((tmp_path / "absent.pt", "no such file"), (broken, "no TorchScript module")):
+        with pytest.raises(InvalidInput, match=f"{file.name}: {line}"):
+            make_detector("torchscript", HEIGHT, file=file)
+
+
+def test_without_torch_one_line_names_the_extra(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(MissingExtra, match=r"pip install 'care-sim\[rl\]'"):
+        make_detector("torchscript", HEIGHT, file=tmp_path / "any.pt")

@@ -1,0 +1,45 @@
+"""Which object a track is, told to the privileged: two objects that are now at 100 and 200 m."""
+
+import numpy as np
+
+from care_sim.loops.film import NOBODY
+from care_sim.perception.track_objects import Identities
+
+PRESENT = {30: np.full(7, 100.0), 7: np.full(7, 200.0)}
+
+
+def present(objects):
+    return {number: PRESENT[number] for number in objects if number in PRESENT}
+
+
+def noted(*pairs):
+    identities = Identities()
+    for tracks, objects in pairs:
+        identities.note(np.array(tracks), np.array(objects))
+    return identities
+
+
+def places(identities, tracks):
+    """Where the objects behind the tracks are; -1 where the forecast was kept."""
+    boxes = identities.boxes(tracks, present)
+    return [-1 if np.array_equal(box, kept) else box[0] for box, kept in zip(boxes, tracks.boxes, strict=True)]
+
+
+def test_a_track_is_where_its_object_is_and_one_without_stays(tracks_at):
+    tracks = tracks_at(*[("car", x, 0.0, 0.0, 0.0) for x in (1.0, 2.0, 3.0, 4.0)])
+    known = noted(([0, 1, 2], [7, 30, NOBODY]))
+    assert places(known, tracks) == [200, 100, -1, -1]
+
+
+def test_the_last_detection_counts_and_the_gone_stay_at_their_forecast(tracks_at):
+    tracks = tracks_at(("car", 1.0, 0.0, 0.0, 0.0), ("car", 2.0, 0.0, 0.0, 0.0))
+    assert places(noted(([0, 1], [7, 7]), ([0], [30])), tracks) == [100, 200]
+    assert places(noted(([0, 1], [7, 99])), tracks) == [200, -1]
+
+
+def test_forecasts_are_left_as_they_are(tracks_at):
+    tracks = tracks_at(("car", 1.0, 0.0, 0.0, 0.0))
+    before = tracks.boxes.copy()
+    noted(([0], [7])).boxes(tracks, present)
+    assert np.array_equal(tracks.boxes, before)
+    assert noted().boxes(tracks_at(), present).shape == (0, 7)

@@ -1,0 +1,113 @@
+"""What an agent does that looks the episode up, and that a secret leaves it nothing to look up."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.selection import expanded
+from care_sim.core.types import Belief
+from care_sim.policies import contenders, policy_names, tags_of
+
+BLIND = {"budget": 0.03, "false_negative_rate": 1.0}
+ENVIRONMENTS = {"dartout": "CARE-Dartout-v0", "dense": "CARE-Dense-v0", "cutin": "CARE-CutIn-v0"}
+
+
+@pytest.fixture
+def make():
+    envs = []
+
+    def made(scenario="dense", **arguments):
+        envs.append(gymnasium.make(ENVIRONMENTS[scenario], disable_env_checker=True, **arguments))
+        return envs[-1]
+
+    yield made
+    for env in envs:
+        env.close()
+
+
+def played(env, name, seed=3, watch=lambda *_: None, **parameters):
+    """The outcome, `watch` having seen every action before it was taken."""
+    policy = care_sim.make_policy(name, env, **parameters)
+    observation, _ = env.reset(seed=seed)
+    policy.reset()
+    ended = False
+    while not ended:
+        action = policy(observation)
+        watch(policy, observation, action)
+        observation, _, terminated, truncated, info = env.step(action)
+        ended = terminated or truncated
+    return info["outcome"]
+
+
+@pytest.mark.parametrize("scenario", ENVIRONMENTS)
+def test_it_finds_the_seed_and_expects_the_hidden_one_where_it_is_even_when_the_car_brakes(make, scenario):
+    env = make(scenario, budget=0.2)
+    braked = []
+
+    def watch(policy, observation, _):
+        loop = env.unwrapped.loop
+        (true,) = loop.sensor.boxes_to_local(loop.world.boxes([loop.world.first_sighting]))
+        (expected,) = policy._expected()
+        np.testing.assert_allclose(expected, true, atol=0.25)  # 8 m/s lost, in steps of 0.05 s
+        assert policy.found == 3
+        braked.append(observation["ego"][2] < -1)
+
+    played(env, "seed-finder", watch=watch, scenario=scenario)
+    assert any(braked)
+
+
+def test_blind_it_is_as_early_as_the_full_scan_and_with_a_secret_it_is_history(make):
+    full = played(make(budget=1.0), "full")
+    finder = played(make(**BLIND), "seed-finder")
+    assert finder["detection_distance_m"] > full["detection_distance_m"] - 0.5
+    secret = {**BLIND, "secret": "a secret"}
+    history = care_sim.make_policy("history", make(**secret))
+
+    def watch(policy, observation, action):
+        assert policy.found is None
+        np.testing.assert_array_equal(action, history(observation))
+
+    closed = played(make(**secret), "seed-finder", watch=watch)
+    assert closed == played(make(**secret), "history")
+
+
+@pytest.mark.parametrize("known", [{"seeds": 3}, {"scenario": "cutin", "seeds": 3}])
+def test_a_seed_that_it_does_not_know_is_played_as_history(make, known):
+    env = make(**BLIND)
+    finder, history = care_sim.make_policy("seed-finder", env, **known), care_sim.make_policy("history", env)
+    observation, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(finder(observation), history(observation))
+    assert finder.found is None
+
+
+def test_after_reset_it_looks_again(make):
+    env = make(**BLIND)
+    finder = care_sim.make_policy("seed-finder", env)
+    for seed in (2, 7):
+        observation, _ = env.reset(seed=seed)
+        finder.reset()
+        finder.demand(Belief.from_observation(observation))
+        assert finder.found == seed
+
+
+def test_all_leaves_controls_out_unless_they_are_named():
+    assert "control" in tags_of("seed-finder")
+    assert contenders() == [name for name in policy_names() if name != "seed-finder"]
+    assert expanded(["all", "seed-finder", "care"], contenders()) == [*contenders(), "seed-finder"]
+    assert expanded(["care"], contenders()) == ["care"]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"scenario": "moon"}, "unknown scenario 'moon'"),
+        ({"scenario": ["moon"]}, "unknown scenario"),
+        ({"seeds": 0}, "seeds must be"),
+        ({"seeds": 1.5}, "seeds must"),
+    ],
+)
+def test_other_parameters_are_refused(make, parameters, message):
+    with pytest.raises(InvalidInput, match=message):
+        care_sim.make_policy("seed-finder", make(), **parameters)

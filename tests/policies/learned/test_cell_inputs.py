@@ -1,0 +1,111 @@
+"""What is seen of a cell, on beliefs made by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import wedges
+from care_sim.core.types import CLASSES, ImageDetections, Rig
+from care_sim.policies.learned.cell_inputs import CUES, MARKS, OUTLOOKS, Cues
+from care_sim.sensors.surround import SURROUND_CAMERAS
+
+GRID = AngularGrid()
+RIG = Rig(GRID, SURROUND_CAMERAS)
+BARE = replace(RIG, azimuth_margin=0, elevation_margin=0)
+(UNEXPLAINED, BOX, SMALL, EXPLAINED, HULL, FIRED, STANDING, NEAR), SIZE, NEARNESS = range(8), 8, 9
+AHEAD = 8 * GRID.columns + 256
+"""A cell that looks straight ahead and level: row 8 is 0.003 degrees above the horizon."""
+DOWN = 20 * GRID.columns + 256
+"""16 degrees down: it meets the road 6.7 m away."""
+
+
+@pytest.fixture
+def seen_of(belief_of):
+    """Makes the cues (N, `CUES`) of a belief from camera detections, tracks and ranges by cell."""
+
+    def make(pictures=(), tracks=(), ranges=None):
+        scan = np.zeros(GRID.size, np.float32)
+        scan[list(ranges or {})] = list((ranges or {}).values())
+        table = [[CLASSES.index(name), 0.9, *box, 0, 0, 0] for name, *box in pictures]
+        detections = ImageDetections.from_rows(np.array(table, float).reshape(-1, 9))
+        belief = replace(belief_of(tracks, ranges=scan.reshape(GRID.shape)), detections=detections)
+        seen = Cues(RIG).of(belief, RIG.hulls(belief.tracks.boxes))
+        return belief, seen.rows(np.arange(GRID.size))
+
+    return make
+
+
+def cells_with(seen, cue):
+    return np.flatnonzero(seen[:, cue]).tolist()
+
+
+def test_of_an_empty_belief_nothing_is_seen(seen_of):
+    _, seen = seen_of()
+    assert seen.shape == (GRID.size, CUES)
+    assert len(MARKS) + 2 == CUES
+    assert not seen.any()
+
+
+def test_an_unexplained_box_marks_its_wedge_and_what_is_in_the_box(seen_of):
+    belief, seen = seen_of([("pedestrian", 150, 80, 160, 110)])
+    (wedge,), (bare,) = wedges(belief.detections, RIG), wedges(belief.detections, BARE)
+    assert cells_with(seen, UNEXPLAINED) == cells_with(seen, SMALL) == wedge.tolist()
+    assert cells_with(seen, BOX) == bare.tolist()
+    assert set(bare) < set(wedge)
+    assert seen[wedge, SIZE] == pytest.approx(np.log2(len(wedge) + 1) / 10)
+    assert not seen[:, [EXPLAINED, HULL, FIRED, STANDING, NEAR, NEARNESS]].any()
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_where_wedges_overlap_the_smallest_says_size_and_kind(seen_of, order):
+    pictures = [("car", 120, 80, 200, 120), ("pedestrian", 150, 80, 160, 110)]
+    belief, seen = seen_of([pictures[n] for n in order])
+    large, small = sorted(wedges(belief.detections, RIG), key=len, reverse=True)
+    around = np.setdiff1d(large, small)
+    assert cells_with(seen, SMALL) == small.tolist()
+    assert seen[small, SIZE] == pytest.approx(np.log2(len(small) + 1) / 10)
+    assert seen[around, SIZE] == pytest.approx(np.log2(len(large) + 1) / 10)
+
+
+def test_a_detection_that_a_forecast_explains_is_marked_as_such_and_its_hull(seen_of, car):
+    belief, seen = seen_of([("car", 140, 80, 180, 120)], [car(1, 12.0)])
+    assert cells_with(seen, EXPLAINED) == wedges(belief.detections, RIG)[0].tolist()
+    assert cells_with(seen, HULL) == RIG.hulls(belief.tracks.boxes)[0].tolist()
+    assert not seen[:, [UNEXPLAINED, BOX, SMALL, SIZE]].any()
+
+
+def test_a_standing_return_marks_its_surroundings_across_the_seam_too(seen_of):
+    seam = 8 * GRID.columns
+    _, seen = seen_of(ranges={seam: 10.0})
+    around = [row * GRID.columns + column for row in (7, 8, 9) for column in (0, 1, 2, 510, 511)]
+    assert cells_with(seen, FIRED) == cells_with(seen, STANDING) == [seam]
+    assert cells_with(seen, NEAR) == around
+    assert seen[seam, NEARNESS] == pytest.approx(0.8)
+
+
+def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
+    _, seen = seen_of((), [car(1, 12.0)], {DOWN: 6.7, AHEAD + 100: GRID.range_m, AHEAD: 12.0})
+    assert cells_with(seen, FIRED) == sorted([DOWN, AHEAD + 100, AHEAD])
+    assert cells_with(seen, NEARNESS) == sorted([DOWN, AHEAD])
+    assert seen[AHEAD, HULL] == 1
+    assert not seen[:, [STANDING, NEAR]].any()
+
+
+def test_outlooks_are_those_of_the_ray():
+    elevation, ground, cosine, sine, covered = Cues(RIG).outlooks.T.reshape(len(OUTLOOKS), *GRID.shape)
+    assert elevation[:, 0] == pytest.approx(np.linspace(GRID.top, GRID.bottom, 32) / 0.5, abs=1e-6)
+    assert ground[7, 3] == 0
+    assert ground[20, 3] == pytest.approx(1 - 1.84 / np.sin(np.deg2rad(16)) / 50, abs=1e-3)
+    assert cosine[0, 256] == pytest.approx(1, abs=1e-4)
+    assert cosine[0, 0] == pytest.approx(-1, abs=1e-4)
+    assert sine == pytest.approx(sine[:, ::-1], abs=1e-6)
+    assert covered[8].all()
+
+
+def test_a_front_camera_covers_what_is_ahead():
+    covered = Cues(Rig(GRID, SURROUND_CAMERAS[:1])).outlooks[:, 4].reshape(GRID.shape)
+    assert covered[8, 256 - 40 : 256 + 40].all()
+    assert not covered[:, :150].any()
+    assert not covered[:, 362:].any()

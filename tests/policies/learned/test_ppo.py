@@ -1,0 +1,184 @@
+"""The learned allocator as a policy of the benchmark: weights in, the learner's choices out, without PyTorch."""
+
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.core.grid import AngularGrid
+from care_sim.envs.wrappers.grid_observation import GridObservation
+from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
+from care_sim.policies.learned.grid_features import CHANNELS
+from care_sim.policies.learned.score_map import ScoreMap
+from care_sim.policies.learned.weights import Card, Weights, load, save, shipped
+from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.training.validation import evaluate, rule
+from tests.helpers.untrained import shapes, untrained
+
+ACTIONS = {"SectorReserve": SectorReserve, "SectorScores": SectorScores}
+
+
+@pytest.fixture
+def env():
+    made = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03)
+    yield made
+    made.close()
+
+
+def score_map(wrapping, **arrays):
+    """A map of zeros but for the arrays."""
+    zeros = {name: np.zeros(shape, np.float32) for name, shape in shapes(wrapping, hidden=1).items()}
+    given = {name: np.asarray(array, np.float32) for name, array in arrays.items()}
+    return ScoreMap(Weights("hand", zeros | given, None), wrapping)
+
+
+def observation(wrapping, channel, *blocks):
+    grid = np.zeros((len(CHANNELS), wrapping.rows, wrapping.columns), np.float32)
+    for row, column in blocks:
+        grid[channel, row, column] = 1.0
+    return {"grid": grid.ravel(), "ego": np.array([0.5, 0, 0, 0], np.float32)}
+
+
+def test_every_sector_sees_its_blocks_and_one_more_on_each_side_over_the_seam():
+    wrapping = Wrapping(azimuths=4, elevations=2, columns=8, rows=4)
+    kernel = np.zeros((1, len(CHANNELS), 4, 4))
+    kernel[0, 1] = 1.0
+    scores = score_map(wrapping, **{"window.weight": kernel, "hidden.weight": [[1.0]], "score.weight": [0.1]})
+    lit = np.tanh(0.1)
+    for blocks, expected in {
+        (0, 0): [[lit, 0, 0, lit], [0, 0, 0, 0]],
+        (1, 3): [[0, lit, lit, 0], [0, lit, lit, 0]],
+        (3, 7): [[0, 0, 0, 0], [lit, 0, 0, lit]],
+    }.items():
+        np.testing.assert_allclose(scores(observation(wrapping, 1, blocks)), expected, atol=1e-6)
+    assert not scores(observation(wrapping, 0, (0, 0))).any()
+
+
+def test_the_cars_own_motion_and_the_place_count():
+    wrapping = Wrapping(azimuths=2, elevations=1, columns=2, rows=1)
+    own = {"ego.weight": [[2, 0, 0, 0]], "window.bias": [-0.25], "hidden.weight": [[2]], "hidden.bias": [0.5]}
+    scores = score_map(wrapping, **own, **{"score.weight": [0.5], "place": [[0.0, -1.0]]})
+    np.testing.assert_allclose(scores(observation(wrapping, 0)), [np.tanh([1.0, 0.0])], atol=1e-6)
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_it_fires_what_its_learner_would_behind_the_wrappers(tmp_path, env, action):
+    wrapping = Wrapping(action, azimuths=16, elevations=2, columns=32, rows=4)
+    path = untrained(tmp_path / "w.npz", wrapping)
+    policy = care_sim.make_policy("ppo", env, path=path)
+    behind = GridObservation(ACTIONS[action](env, 16, 2), 32, 4)
+    learned = ScoreMap(load(path), wrapping)
+    fired = []
+    for wrapped, choose in ((env, policy), (behind, learned)):
+        seen, _ = wrapped.reset(seed=4)
+        cells = []
+        for _ in range(30):
+            seen, *_, info = wrapped.step(choose(seen))
+            cells.append(info["fired"].tolist())
+        fired.append(cells)
+    assert fired[0] == fired[1]
+
+
+def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
+    pytest.importorskip("stable_baselines3")
+    from care_sim.training.algorithms import make
+    from care_sim.training.config import Ppo
+    from care_sim.training.environments import side_by_side
+
+    config = Ppo(environments=2, rollout=32, batch=32, hidden=8)
+    envs = side_by_side(config)
+    model = make(config, envs).learn(128)
+    save(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
+    numpy = ScoreMap(load(tmp_path / "w.npz"), config.wrapping)
+    observations = envs.reset()
+    for _ in range(20):
+        actions, _ = model.predict(observations, deterministic=True)
+        for number, expected in enumerate(actions):
+            one = {name: array[number] for name, array in observations.items()}
+            np.testing.assert_allclose(numpy(one), expected, atol=2e-6)
+            assert np.array_equal(np.argsort(-numpy(one).ravel())[:3], np.argsort(-expected.ravel())[:3])
+        observations, *_ = envs.step(actions)
+    assert np.abs(actions).max() > 0.01
+    envs.close()
+
+
+WITHOUT_TORCH = """
+import sys
+import gymnasium, care_sim
+env = gymnasium.make("CARE-Dense-v0", budget=0.03)
+policy = care_sim.make_policy("ppo", env, path=sys.argv[1])
+observation, _ = env.reset(seed=0)
+for _ in range(3):
+    observation, *_ = env.step(policy(observation))
+assert not {"torch", "stable_baselines3"} & set(sys.modules)
+"""
+
+
+def test_it_acts_without_torch(tmp_path):
+    path = untrained(tmp_path / "w.npz")
+    subprocess.run([sys.executable, "-c", WITHOUT_TORCH, str(path)], check=True, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("card", "message"),
+    [
+        ({"budget": 819}, r"budget is 819 cells \(0.04999\), needed is 492"),
+        ({"grid": AngularGrid(columns=256)}, "grid is columns 256"),
+        ({"kind": "learned-scorer"}, "kind is 'learned-scorer', needed is 'ppo'"),
+        ({"wrapper": "GridObservation"}, "wrapper 'GridObservation' is none of the form 'SectorReserve 32 x 4, Grid"),
+        ({"wrapper": "SectorReserve 16 x 4, GridObservation 64 x 8"}, "array 'window.weight' has the shape"),
+        ({"wrapper": "SectorReserve 0 x 4, GridObservation 64 x 8"}, "azimuths must be a whole number >= 1"),
+        ({"wrapper": "SectorReserve 32 x 4, GridObservation 48 x 8"}, "azimuths must divide columns, got 32 and 48"),
+    ],
+)
+def test_weights_for_something_else_are_refused_in_one_line(tmp_path, env, card, message):
+    path = untrained(tmp_path / "w.npz", **card)
+    with pytest.raises(InvalidInput, match=message) as error:
+        care_sim.make_policy("ppo", env, path=path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["ppo", "ppo-dartout"])
+@pytest.mark.parametrize("budget", [0.03, 0.2])
+def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budget):
+    """Earlier on average than `history` by metres; nobody may be missed."""
+    distances = {}
+    for policy in (name, "history"):
+        env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=budget)
+        score = evaluate(env, rule(policy, env), range(3))
+        distances[policy] = score.distance_m
+        env.close()
+    assert distances[name] > distances["history"] + 2
+
+
+def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env):
+    """What the results say of the shipped weights: without pictures as early, without the place nearly so."""
+    weights = load(shipped("ppo-dense"))
+    paths = [shipped("ppo-dense")]
+    for name in ("window.weight", "place"):
+        paths.append(tmp_path / f"without-{name}.npz")
+        save(paths[-1], weights.arrays | {name: np.zeros_like(weights.arrays[name])}, weights.card)
+    distances = []
+    for path in paths:
+        policy = care_sim.make_policy("ppo", env, path=path)
+        distances.append(evaluate(env, lambda seen, _, policy=policy: policy(seen), range(3)).distance_m)
+    assert distances[0] == distances[1] > 15
+    assert distances[2] > distances[0] - 1
+
+
+def test_it_is_no_policy_behind_wrappers_of_learners(env):
+    for wrapped in (SectorReserve(env), GridObservation(env), GridObservation(SectorScores(env))):
+        with pytest.raises(InvalidInput, match=r"policy ppo plays .*: give and step env\.unwrapped"):
+            care_sim.make_policy("ppo", wrapped)
+    care_sim.make_policy("ppo", SectorReserve(env).unwrapped)
+
+
+def test_the_observation_of_a_wrapped_environment_is_refused_in_one_line(env):
+    policy = care_sim.make_policy("ppo", env)
+    seen, _ = GridObservation(env).reset(seed=0)
+    with pytest.raises(InvalidInput, match="an observation of CARE-Sim's environments is needed"):
+        policy(seen)

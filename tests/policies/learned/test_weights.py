@@ -1,0 +1,221 @@
+"""The files of learned weights: what is written is read back, and anything else is refused in one line."""
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import Rig
+from care_sim.policies.learned.weights import Card, load, save
+
+ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}
+CARD = Card("learned-scorer", AngularGrid(), budget=492, wrapper="SectorReserve 32 x 4", seeds={"train": [1]})
+RIG = Rig(budget=492)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    save(tmp_path / "w.npz", ARRAYS, CARD)
+    return tmp_path / "w.npz"
+
+
+def test_what_is_written_is_read_back_bit_for_bit(saved):
+    weights = load(saved)
+    assert weights.card == CARD
+    assert list(weights.arrays) == list(ARRAYS)
+    for name, array in ARRAYS.items():
+        assert weights.arrays[name].dtype == np.float32
+        np.testing.assert_array_equal(weights.arrays[name], array)
+
+
+def test_the_same_weights_give_the_same_bytes(saved, tmp_path):
+    save(tmp_path / "again", ARRAYS, CARD)
+    assert (tmp_path / "again").read_bytes() == saved.read_bytes()
+
+
+def test_weights_that_fit_are_accepted(saved):
+    load(saved).check("learned-scorer", RIG)
+
+
+def test_without_a_budget_any_will_do(tmp_path):
+    save(tmp_path / "w.npz", ARRAYS, replace(CARD, budget=None))
+    load(tmp_path / "w.npz").check("learned-scorer", Rig(budget=7))
+
+
+@pytest.mark.parametrize(
+    ("kind", "rig", "message"),
+    [
+        ("ppo", RIG, "kind is 'learned-scorer', needed is 'ppo'"),
+        (
+            "learned-scorer",
+            Rig(budget=1638),
+            r"budget is 492 cells \(0.03003\), needed is 1638 cells \(0.09998\)",
+        ),
+        (
+            "learned-scorer",
+            Rig(AngularGrid(columns=256), budget=492),
+            "grid is columns 512 rows 32 .*, needed is columns 256",
+        ),
+        ("learned-scorer", Rig(AngularGrid(top=0.2), budget=492), "grid is .*needed is .*top 0.2 "),
+    ],
+)
+def test_weights_that_do_not_fit_are_refused_with_what_they_are(saved, kind, rig, message):
+    with pytest.raises(InvalidInput, match=f"w.npz: {message}") as refusal:
+        load(saved).check(kind, rig)
+    assert "\n" not in str(refusal.value)
+
+
+class Trap:
+    """Makes a file when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (self.path,)
+
+
+def pickled(path: Path) -> None:
+    np.savez(path, card=np.array([print], object))
+
+
+def without_card(path: Path) -> None:
+    np.savez(path, **ARRAYS)
+
+
+def other_json(path: Path) -> None:
+    np.savez(path, card=np.frombuffer(b'{"kind": "x"}', np.uint8))
+
+
+def other(said: str, instead: str):
+    """A card that says something else."""
+
+    def spoil(path: Path) -> None:
+        assert said in CARD.to_json()
+        np.savez(path, card=np.frombuffer(CARD.to_json().replace(said, instead).encode(), np.uint8))
+
+    return spoil
+
+
+def large(path: Path) -> None:
+    np.savez_compressed(path, card=np.zeros(1, np.uint8), weight=np.zeros(2**24 + 1, np.float32))
+
+
+def twice(path: Path) -> None:
+    save(path, ARRAYS, CARD)
+    with ZipFile(path, "a") as file, pytest.warns(UserWarning, match="Duplicate"):
+        file.writestr("bias.npy", file.read("bias.npy"))
+
+
+def squeezed(path: Path) -> None:
+    """Damaged within a compressed entry."""
+    np.savez_compressed(path, **ARRAYS, card=np.frombuffer(CARD.to_json().encode(), np.uint8))
+    content = bytearray(path.read_bytes())
+    start = content.index(b"weight.npy") + 30
+    content[start : start + 8] = b"\xff" * 8
+    path.write_bytes(content)
+
+
+def broken_header(path: Path) -> None:
+    save(path, ARRAYS, CARD)
+    path.write_bytes(path.read_bytes().replace(b"{'descr'", b"{'descr(", 1))
+
+
+def locked(path: Path) -> None:
+    """Marked as encrypted."""
+    save(path, ARRAYS, CARD)
+    content = bytearray(path.read_bytes())
+    for signature, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(signature) + flags] |= 1
+    path.write_bytes(content)
+
+
+def doubles(path: Path) -> None:
+    save(path, {}, CARD)
+    card = np.load(path)["card"]
+    np.savez(path, card=card, weight=np.zeros(3))
+
+
+def not_finite(path: Path) -> None:
+    save(path, {"weight": np.array([np.nan])}, CARD)
+
+
+def cut(path: Path) -> None:
+    save(path, ARRAYS, CARD)
+    path.write_bytes(path.read_bytes()[:-40])
+
+
+def flipped(path: Path) -> None:
+    save(path, ARRAYS, CARD)
+    content = bytearray(path.read_bytes())
+    content[content.index(ARRAYS["weight"].tobytes())] ^= 1
+    path.write_bytes(content)
+
+
+def one_array(path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda path: path.write_text("hello"),
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(pickle.dumps(print)),
+        lambda path: path.mkdir(),
+        one_array,
+        pickled,
+        without_card,
+        other_json,
+        other('"steps"', '"stepz"'),
+        other('"budget": 492', '"budget": "x"'),
+        other('"budget": 492', '"budget": true'),
+        other('"budget": 492', '"budget": 1' + 400 * "0"),
+        other('"columns": 512', '"columns": "x"'),
+        other('"columns": 512', '"column": 512'),
+        other('"steps": 0', '"steps": "x"'),
+        large,
+        twice,
+        squeezed,
+        broken_header,
+        locked,
+        doubles,
+        not_finite,
+        cut,
+        flipped,
+    ],
+)
+def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
+    path = tmp_path / "spoilt.npz"
+    spoil(path)
+    with pytest.raises(InvalidInput, match=r"spoilt\.npz: no \.npz of weights .*, or damaged") as refusal:
+        load(path)
+    assert "\n" not in str(refusal.value)
+
+
+def test_what_would_run_when_it_is_unpickled_does_not_run(tmp_path):
+    card, sprung = np.frombuffer(CARD.to_json().encode(), np.uint8), tmp_path / "sprung"
+    np.savez(tmp_path / "w.npz", card=card, weight=np.array([Trap(sprung)], object))
+    with pytest.raises(InvalidInput, match="allow_pickle=False"):
+        load(tmp_path / "w.npz")
+    assert not sprung.exists()
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InvalidInput, match=r"nowhere\.npz: no such file"):
+        load(tmp_path / "nowhere.npz")
+
+
+def test_arrays_are_taken_by_name_and_shape(saved):
+    weights = load(saved)
+    assert weights.array("weight", 2, None) is weights.arrays["weight"]
+    with pytest.raises(InvalidInput, match=r"'weight' has the shape \(2, 3\), needed is any x 4"):
+        weights.array("weight", None, 4)
+    with pytest.raises(InvalidInput, match="no array 'gain'; it has weight, bias"):
+        weights.array("gain")

@@ -1,0 +1,177 @@
+"""Clips read back: how many pictures, how long each, what they show; and that filming changes nothing."""
+
+import re
+import sys
+from itertools import accumulate, count
+
+import gymnasium
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+import care_sim
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.cli import main
+from care_sim.commands.compare import play
+from care_sim.core.types import Keyframe
+from care_sim.policies.paper.care import Care
+from care_sim.reports.episodes.clips import Film
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_play import run_episode, trace
+from care_sim.viewer.pictures import comparison as panel
+from care_sim.viewer.pictures import keyframe as picture
+from care_sim.viewer.pictures.clip_files import ENDINGS, write_clip
+
+SIZE = (64, 48)
+COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]
+PICTURES = [Image.new("RGB", SIZE, colour) for colour in COLOURS]
+SHORT = (("duration_s", 0.3),)
+
+
+def frames_of(path):
+    """Arrays of a clip's pictures, each as often as it is shown for a tenth of a second."""
+    if path.suffix == ".mp4":
+        ffmpeg = pytest.importorskip("imageio_ffmpeg")
+        reader = ffmpeg.read_frames(str(path))
+        about = next(reader)
+        assert about["fps"] == 10
+        width, height = about["size"]
+        return [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in reader]
+    with Image.open(path) as clip:
+        assert clip.info["loop"] == 0
+        shown = [(np.asarray(frame.convert("RGB")), frame.info["duration"]) for frame in ImageSequence.Iterator(clip)]
+    return [frame for frame, duration in shown for _ in range(round(duration / 100))]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_clip_shows_every_picture_in_turn_and_holds_the_last(ending, tmp_path):
+    path = tmp_path / "deeper" / f"clip{ending}"
+    if ending == ".mp4":
+        pytest.importorskip("imageio_ffmpeg")
+    write_clip(path, PICTURES, 0.1, 0.3)
+    frames = frames_of(path)
+    assert len(frames) == 5
+    for frame, colour in zip(frames, [COLOURS[0], COLOURS[1], *[COLOURS[2]] * 3], strict=True):
+        assert frame.shape == (*SIZE[::-1], 3)
+        assert np.abs(frame.reshape(-1, 3).mean(axis=0) - colour).max() < 12
+
+
+def test_a_clip_that_cannot_be_written_is_refused_before_an_episode_is_played(tmp_path, monkeypatch):
+    with pytest.raises(InvalidInput, match=r"unknown ending of a clip '\.avi'; known: \.gif, \.mp4, \.png, \.webp"):
+        Film(tmp_path / "clip.avi")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(MissingExtra, match=r"extra 'video': pip install 'care-sim\[video\]'"):
+        Film(tmp_path / "clip.mp4")
+
+
+def test_filming_leaves_the_episode_as_it_was(tmp_path):
+    config = EpisodeConfig("dartout", "care", scenario_parameters=SHORT)
+    film = Film(tmp_path / "clip.png")
+    filmed, _ = trace(config, film.episode("care"))
+    film.write()
+    assert filmed["episode_hash"] == trace(config)[0]["episode_hash"]
+    with Image.open(tmp_path / "clip.png") as clip:
+        assert (clip.n_frames, clip.size) == (3, (picture.WIDTH, picture.HEIGHT))
+
+
+def test_a_folder_is_no_clip_and_what_was_there_stays_until_the_new_one_is_whole(tmp_path):
+    (tmp_path / "clip.mp4").mkdir()
+    with pytest.raises(InvalidInput, match="is a folder"):
+        Film(tmp_path / "clip.mp4")
+    path = tmp_path / "clip.gif"
+    path.write_text("GIF8 old")
+    with pytest.raises(ZeroDivisionError):
+        write_clip(path, (PICTURES[1 // (2 - number)] for number in range(3)), 0.1, 0.3)
+    assert path.read_text() == "GIF8 old"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def care_fails_with(error, monkeypatch):
+    """Let the policy raise at its third keyframe."""
+    demand = Care.demand
+
+    def failing(policy, belief):
+        if next(keyframes) == 2:
+            raise error
+        return demand(policy, belief)
+
+    keyframes = count()
+    monkeypatch.setattr(Care, "demand", failing)
+
+
+def test_a_policy_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, capsys):
+    care_fails_with(RuntimeError("no idea"), monkeypatch)
+    options = ["--scenario-parameters", "duration_s=0.4", "--video", str(tmp_path / "clip.png")]
+    with pytest.raises(SystemExit) as end:
+        main(["compare", "dartout", "--policies", "history", "care", "full", *options])
+    out, err = capsys.readouterr()
+    assert end.value.code == 1
+    assert re.findall("^ ?(history|care|full|Filmed) ", out, re.M) == ["history", "full", "Filmed"]
+    assert err.count("failed: ") == 1
+    assert "RuntimeError: no idea" in err
+    with Image.open(tmp_path / "clip.png") as clip:
+        assert clip.n_frames == 4
+        assert clip.width > 3 * panel.WIDTH
+
+
+def test_what_was_played_is_printed_when_the_rest_is_interrupted(monkeypatch, capsys):
+    care_fails_with(KeyboardInterrupt, monkeypatch)
+    with pytest.raises(SystemExit) as end:
+        main(["compare", "dartout", "--policies", "history", "care", "--scenario-parameters", "duration_s=0.4"])
+    assert end.value.code == 130
+    assert re.findall("^ ?(history|care) ", capsys.readouterr().out, re.M) == ["history"]
+
+
+def test_episodes_side_by_side_end_together(tmp_path, capsys):
+    """The shorter one keeps its last picture; the rows are those of the episodes on their own."""
+    lengths = {"history": 0.2, "care": 0.4}
+    configs = [
+        EpisodeConfig("dartout", policy, scenario_parameters=(("duration_s", length),))
+        for policy, length in lengths.items()
+    ]
+    assert play(configs, video=tmp_path / "clip.png") == []
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    fired = {words[0]: int(words[-1]) for words in rows if words[:1] and words[0] in lengths}
+    assert fired == {config.policy: run_episode(config)["rays_fired"] for config in configs}
+    assert fired["care"] == 2 * fired["history"]
+    with Image.open(tmp_path / "clip.png") as clip:
+        pictures = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(clip)]
+    assert len(pictures) == 4
+    left, right = zip(*((each[:, : panel.WIDTH], each[:, -panel.WIDTH :]) for each in pictures), strict=True)
+    assert np.array_equal(left[1], left[3])
+    assert not np.array_equal(left[0], left[1])
+    assert not np.array_equal(right[1], right[3])
+
+
+def keyframes(*states, distance_m=20.0):
+    """A record a tenth of a second from (in view, detected), the person 1 m nearer each time, clearance 2 m less."""
+    return [
+        Keyframe(n, 0.1 * n, np.arange(9), seen, found, found, 8.0, distance, distance, distance - 2.0, None)
+        for n, ((seen, found), distance) in enumerate(
+            zip(states, accumulate(states, lambda d, _: d - 1.0, initial=distance_m), strict=False)
+        )
+    ]
+
+
+def test_the_verdict_of_a_panel():
+    hidden, seen, found = (False, False), (True, False), (True, True)
+    assert panel.verdict(keyframes(hidden), 0.1)[0] == "not in view yet"
+    assert panel.verdict(keyframes(hidden, seen, seen), 0.1)[0] == "in view for 0.2 s, not detected"
+    late = panel.verdict(keyframes(hidden, seen, seen, found, found), 0.1)
+    assert late == ("detected at 17.0 m, 0.2 s late; least clearance 14.0 m", picture.DETECTED)
+    assert panel.verdict(keyframes(hidden, found), 0.1)[0] == "detected at 19.0 m; least clearance 17.0 m"
+
+
+def test_gymnasiums_wrapper_records_a_video(tmp_path):
+    pytest.importorskip("moviepy")
+    env = gymnasium.make("CARE-Dartout-v0", render_mode="rgb_array", duration_s=0.3)
+    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path / "videos"))
+    policy = care_sim.make_policy("care", env)
+    observation, _ = env.reset(seed=0)
+    truncated = False
+    while not truncated:
+        observation, _, _, truncated, _ = env.step(policy(observation))
+    env.close()
+    frames = frames_of(tmp_path / "videos" / "rl-video-episode-0.mp4")
+    assert len(frames) == 4
+    assert frames[0].shape == (picture.HEIGHT, picture.WIDTH, 3)

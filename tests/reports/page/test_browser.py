@@ -1,0 +1,318 @@
+"""Pages in a browser: Chromium without a screen, driven by Playwright."""
+
+import base64
+import json
+import re
+import shutil
+import zlib
+from concurrent.futures import ThreadPoolExecutor
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image, ImageColor
+
+from care_sim.reports.figures.styles import styles
+from care_sim.reports.page.build import write_page
+from care_sim.reports.page.replay import packed
+from care_sim.reports.tables import ablations, faults
+from care_sim.study.added_columns import annotated, tagged
+from care_sim.study.episode_config import grid
+from care_sim.study.episode_play import run_episode
+from care_sim.study.rows import write_rows
+from tests.helpers import made_plays
+from tests.helpers.made_rows import CROWD, STUDY, row, rows
+from tests.helpers.places import ROOT
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="the browser tests need the PyPI package playwright")
+CHROMIUM = shutil.which("chromium")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="the browser tests need Chromium: apt-get install chromium")
+
+SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+MOST_BYTES, MOST_MS = 5e6, 2000
+DRAWN = "!document.querySelector('.plot:not([data-drawn])')"
+READY = f"{DRAWN} && !!document.querySelector('#views figure')"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SWITCHES)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(chromium):
+    """Opens a file; at the end there must have been no error in the console and no request but for the file."""
+    pages, troubles, requests = [], [], []
+
+    def open_file(path, ready=DRAWN, **context):
+        page = chromium.new_context(**context).new_page()
+        page.on("console", lambda message: troubles.append(message.text))
+        page.on("pageerror", lambda error: troubles.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(path.as_uri())
+        page.wait_for_function(ready)
+        pages.append(path.as_uri())
+        return page
+
+    yield open_file
+    assert troubles == []
+    assert requests == pages
+
+
+def folder_of(rows, folder, study):
+    write_rows(rows, folder / ("plays.parquet" if study == "protocol" else "episodes.parquet"), study)
+    return folder
+
+
+def written(folder, rows, study, most=0):
+    path = folder / "report.html"
+    write_page(folder_of(rows, folder, study), path, most, 1, lambda _workers: ThreadPoolExecutor(1))
+    return path
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
+    """Episodes of two policies at two budgets on one seed, and one row that is not as it was played."""
+    configs = grid(["dartout"], ["history", "care", "full"], [0.05, 0.1], [0])
+    rows = annotated([run_episode(config) for config in configs])
+    rows[0] |= {"detection_distance_m": 1.25, "episode_hash": "0"}
+    return written(tmp_path_factory.mktemp("played"), rows, "sweep", most=5), rows
+
+
+def test_a_page_opens_at_once_and_says_what_was_played(opened, played):
+    path, _ = played
+    page = opened(path, READY)
+    assert page.evaluate("performance.now()") < MOST_MS
+    text = page.inner_text("body")
+    assert "Sweep of the closed loop" in text
+    assert "4 of 5 are the same as in the results" in text
+    assert "Episodes that end otherwise when played again here, which are marked: 1." in text
+    assert "config.json is missing" in text
+    assert "never" not in page.inner_text("table.episodes")
+
+
+def test_a_heading_sorts_its_column_up_and_down(opened, played):
+    page = opened(played[0], READY)
+    table = "table.sortable >> nth=0"
+    heading = page.locator(table).locator("th").nth(2)
+    before = page.locator(table).locator("tbody tr td:nth-child(3)").all_inner_texts()
+    values = [float(text.split()[0]) for text in before]
+    assert values != sorted(values, reverse=True)
+    heading.locator("button").click()
+    up = page.locator(table).locator("tbody tr td:nth-child(3)").all_inner_texts()
+    assert [float(text.split()[0]) for text in up] == sorted(values)
+    assert heading.get_attribute("aria-sort") == "ascending"
+    heading.locator("button").press("Enter")
+    down = page.locator(table).locator("tbody tr td:nth-child(3)").all_inner_texts()
+    assert [float(text.split()[0]) for text in down] == sorted(values, reverse=True)
+    assert heading.get_attribute("aria-sort") == "descending"
+
+
+def test_what_was_never_detected_is_the_least_of_a_column(opened, tmp_path):
+    medians = {"history": None, "care": 9.0, "all-camera": None, "full": 7.0, "random": None, "care-sbf": 8.0}
+    made = [each for policy, distance in medians.items() for each in rows(policy, [distance] * 3)]
+    table = opened(written(tmp_path, made, "sweep"), "true").locator("table.sortable >> nth=0")
+    heading = table.locator("th", has_text="first detection")
+    column = heading.evaluate("head => head.cellIndex") + 1
+
+    def sorted_by_a_click():
+        heading.locator("button").click()
+        return [text.split(" [")[0] for text in table.locator(f"tbody td:nth-child({column})").all_inner_texts()]
+
+    never = ["not detected"] * 3
+    assert sorted_by_a_click() == [*never, "7.0", "8.0", "9.0"]
+    assert sorted_by_a_click() == ["9.0", "8.0", "7.0", *never]
+
+
+def test_a_chart_is_drawn_and_a_name_in_its_legend_chosen(opened, played):
+    page = opened(played[0], READY)
+    marks = page.locator(".plot svg .mark-symbol.role-mark path")
+    assert marks.count() == 4
+    page.locator(".plot svg .role-legend-symbol path").first.click()
+    page.wait_for_function(
+        "[...document.querySelectorAll('.plot .mark-symbol.role-mark path')]"
+        ".filter(e => Number(e.getAttribute('opacity')) < 0.5).length === 2"
+    )
+
+
+def test_an_episode_plays_to_its_end(opened, played):
+    page = opened(played[0], READY)
+    page.locator("[data-episode]").nth(2).click()
+    page.wait_for_function("document.querySelector('.view h3').textContent.startsWith('care 5%')")
+    assert "detected" in page.inner_text(".now")
+    assert page.locator(".view .ring").first.get_attribute("class") == "ring found"
+    page.locator("#moment").fill("0")
+    assert page.inner_text(".now").startswith("0.0 s")
+    assert page.locator(".view .ring").first.get_attribute("class") == "ring unseen"
+    view = page.locator(".view svg").first.get_attribute("viewBox")
+    page.select_option("#speed", "1")
+    page.locator("#play").click()
+    page.wait_for_function("Number(document.querySelector('#moment').value) > 5")
+    assert page.locator(".view svg").first.get_attribute("viewBox") != view
+    page.locator("#play").click()
+    stopped = page.input_value("#moment")
+    assert page.inner_text("#play") == "Play"
+    page.keyboard.press("Space")
+    page.wait_for_function(f"Number(document.querySelector('#moment').value) > {stopped}")
+    last = page.get_attribute("#moment", "max")
+    page.locator("#moment").fill(str(int(last) - 3))
+    page.locator("#play").click()
+    page.wait_for_function(f"document.querySelector('#moment').value === '{last}'")
+    page.wait_for_function("document.querySelector('#play').textContent === 'Play'")
+
+
+def test_after_the_last_keyframe_nothing_is_said_of_the_actor(opened, played):
+    page = opened(played[0], READY)
+    last = int(page.get_attribute("#moment", "max"))
+    page.locator("#moment").fill(str(last - 1))
+    assert "m away" in page.inner_text(".now >> nth=0")
+    page.locator("#moment").fill(str(last))
+    assert re.fullmatch(r"[\d.]+ s, [\d.]+ m/s\.", page.inner_text(".now >> nth=0"))
+
+
+def test_a_distance_that_is_not_known_is_not_told(opened, tmp_path):
+    (row,) = annotated([run_episode(config) for config in grid(["dartout"], ["care"], [0.1], [0])])
+    path = written(tmp_path, [row], "sweep", most=1)
+    page = opened(path, READY)
+    assert "m away" in page.inner_text(".tale")
+    path.write_text(
+        re.sub(r'("story":")([^"]+)', lambda found: found[1] + without_distances(found[2]), path.read_text())
+    )
+    assert "m away" not in opened(path, READY).inner_text(".tale")
+
+
+def without_distances(text):
+    story = json.loads(zlib.decompress(base64.b64decode(text)))
+    return packed(story | {"distance": [None] * len(story["distance"])})
+
+
+def test_of_two_quick_clicks_the_later_wins(opened, played):
+    page = opened(played[0], READY)
+    page.evaluate(
+        "() => { const json = Response.prototype.json; let slow = true;"
+        "Response.prototype.json = async function () {"
+        "  const late = slow; slow = false;"
+        "  if (late) await new Promise((done) => setTimeout(done, 300));"
+        "  window.unpacked = (window.unpacked ?? 0) + 1;"
+        "  return json.call(this);"
+        "}; }"
+    )
+    page.evaluate("for (const n of [2, 4]) document.querySelectorAll('[data-episode]')[n].click()")
+    page.wait_for_function("window.unpacked === 2")
+    page.wait_for_timeout(100)
+    assert page.locator(".view h3").all_inner_texts() == ["full 100%, dartout, seed 0"]
+
+
+def test_two_policies_are_watched_side_by_side_and_a_changed_outcome_is_told(opened, played):
+    path, rows = played
+    page = opened(path, READY)
+    first, beside = page.locator(".view h3").all_inner_texts()
+    assert (first, beside) == ("history 5%, dartout, seed 0", "care 5%, dartout, seed 0")
+    assert "Ends otherwise than in the results: detection_distance_m 1.25 →" in page.inner_text(".view >> nth=0")
+    detected = f"detected by the LiDAR at 2.6 s ({rows[2]['detection_distance_m']:.1f} m away)"
+    assert detected in page.inner_text(".view >> nth=1")
+    page.select_option("#beside", "")
+    page.wait_for_function("document.querySelectorAll('.view').length === 1")
+
+
+def test_nobody_who_wants_calm_sees_a_body_between_two_keyframes(opened, played):
+    page = opened(played[0], READY, reduced_motion="reduce")
+    page.locator("#moment").fill("10")
+    page.evaluate(
+        "window.seen = new Set(); new MutationObserver(() => "
+        "seen.add(document.querySelector('.view svg').getAttribute('viewBox')))"
+        ".observe(document.querySelector('.view svg'), {attributes: true})"
+    )
+    page.locator("#play").click()
+    page.wait_for_function("Number(document.querySelector('#moment').value) > 13")
+    assert len(page.evaluate("[...seen]")) <= 6
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_fits_a_phone_and_reads_in_any_light(scheme, opened, played):
+    page = opened(played[0], READY, viewport={"width": 360, "height": 740}, color_scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    ink, paper = (page.evaluate(f"getComputedStyle(document.body).{name}") for name in ("color", "backgroundColor"))
+    assert contrast(ink, paper) > 7
+    quiet = page.evaluate("getComputedStyle(document.querySelector('.note')).color")
+    assert contrast(quiet, paper) > 4.5
+
+
+def test_a_colour_names_the_same_policy_in_light_and_dark(opened, played):
+    drawn = styles([("history", ("causal",)), ("care", ("causal",))])
+    colours = {policy: style.colour for policy, style in drawn.items()}
+    for scheme in ("light", "dark"):
+        page = opened(played[0], READY, color_scheme=scheme)
+        picture = Image.open(BytesIO(page.locator(".plot[data-drawn]").first.screenshot())).convert("RGB")
+        shown = np.array(picture).reshape(-1, 3)
+        for policy, colour in colours.items():
+            assert (shown == ImageColor.getrgb(colour)).all(axis=1).sum() > 50, (scheme, policy)
+
+
+def test_everything_is_open_in_print(opened, played):
+    page = opened(played[0], READY)
+    closed = page.locator("details:not([open])")
+    assert closed.count() > 0
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert closed.count() == 0
+    page.emulate_media(media="print", color_scheme="dark")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert not page.locator("#play").is_visible()
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert closed.count() > 0
+
+
+FAULTY = [row(config, 9.0) for config in faults.configurations([0]) if config.scenario == "dartout"]
+ABLATED = [row(config, 9.0) for config in ablations.configurations([0])[:12]]
+PLAYED = tagged(made_plays.study({"history": (4, 2), "care": (8, 4), "full": (9, 5)}))
+STUDIES = {
+    "paper": (STUDY + rows("care", [9.0, None], budget=0.1), "Collisions: 0 in 22 episodes", 1),
+    "crowding": (CROWD, "standing vehicles", 1),
+    "faults": (FAULTY, "Where the order of policies changes", 6),
+    "ablate": (ABLATED, "Collisions: 0 in 12 episodes", 0),
+    "protocol": (PLAYED, "There are none to watch", 2),
+}
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_every_study_has_a_page(study, opened, tmp_path):
+    made, says, charts = STUDIES[study]
+    page = opened(written(tmp_path, made, study))
+    assert says.lower() in page.inner_text("body").lower()
+    drawn = page.locator(".plot > svg, .plot > div > svg")
+    assert drawn.count() == charts
+    assert page.locator("#origin td").count() > 3
+
+
+def test_text_from_outside_is_text(opened, tmp_path):
+    evil = "</script><b id=evil>"
+    both = [*STUDY, *rows("care", [9.0], budget=0.1), *rows("history", [9.0], budget=0.1)]
+    made = [each | {"policy": evil, "tags": "causal"} if each["policy"] == "history" else each for each in both]
+    page = opened(written(tmp_path, [{"tags": "causal"} | each for each in made], "sweep"))
+    assert page.locator("#evil").count() == 0
+    assert evil in page.inner_text("#tables")
+    assert evil in page.inner_html("#charts svg").replace("&lt;", "<").replace("&gt;", ">")
+
+
+@pytest.mark.slow
+def test_the_page_of_the_papers_study_is_small_and_quick(opened, tmp_path):
+    path = tmp_path / "report.html"
+    made = write_page(ROOT / "results" / "closed-loop-5", path, 400, 2)
+    assert made.watchable == len(made.rows) == 245
+    assert path.stat().st_size < MOST_BYTES
+    assert min(opened(path, READY).evaluate("performance.now()") for _ in range(3)) < MOST_MS
+
+
+def contrast(one, other):
+    """The contrast of two colours, 1 to 21 (WCAG 2.2)."""
+    lighter, darker = sorted(map(luminance, (one, other)), reverse=True)
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def luminance(colour):
+    parts = [int(part) / 255 for part in re.findall(r"\d+", colour)[:3]]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))

@@ -1,0 +1,38 @@
+"""What a page is made of, and in which order."""
+
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.reports.page import build
+from care_sim.reports.page.budget_charts import budget_charts
+from care_sim.reports.page.build import CHARTS, write_page
+from care_sim.reports.page.crowding_charts import crowding_charts
+from care_sim.reports.studies import STUDIES
+from care_sim.study.rows import write_rows
+from tests.helpers.made_rows import CROWD, STUDY, rows
+
+
+def test_charts_are_those_of_studies_and_every_study_has_a_title():
+    assert {*CHARTS} <= {*STUDIES}
+    assert len({study.title for study in STUDIES.values()}) == len(STUDIES)
+
+
+def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkeypatch):
+    def broken(_rows):
+        raise InvalidInput("no chart of these rows")
+
+    monkeypatch.setitem(build.CHARTS, "sweep", broken)
+    write_rows(STUDY, tmp_path / "episodes.parquet")
+    with pytest.raises(InvalidInput, match="no chart"):
+        write_page(tmp_path, tmp_path / "report.html", 3, 1, lambda _workers: pytest.fail("an episode is played"))
+
+
+def test_one_is_singular(tmp_path):
+    once = rows("care", [9.0], budget=0.05) + rows("care", [9.0], budget=0.1)
+    (chart,) = budget_charts(once)
+    assert chart.title == "dense: first detection against the budget, 1 seed a point"
+    (chart,) = crowding_charts([row for row in CROWD if row["seed"] == 0])
+    assert chart.title.endswith("m, 1 seed")
+    write_rows(once[:1], tmp_path / "episodes.parquet")
+    write_page(tmp_path, tmp_path / "report.html", 0, 1)
+    assert "<small>1 configuration, 1 seed</small>" in (tmp_path / "report.html").read_text()

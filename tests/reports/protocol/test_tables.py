@@ -1,0 +1,332 @@
+"""Tables of the protocol on plays with known answers, and the paper's numbers beside them."""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from care_sim.evaluation.bootstrap import Interval
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
+from care_sim.reports.protocol.closing import protocol_closing
+from care_sim.reports.protocol.differences import Gap
+from care_sim.reports.protocol.formatting import verdict
+from care_sim.reports.protocol.paper import BUDGETS, LEVELS, statements_about
+from care_sim.reports.protocol.rows import Setting
+from care_sim.reports.protocol.tables import protocol_tables
+from care_sim.reports.report import print_report, write_report
+from care_sim.reports.studies import STUDIES
+from care_sim.reports.table import Bold
+from care_sim.study.rows import read_rows, with_tuples, write_rows
+from tests.helpers.made_plays import found, play, study
+
+FOUND = {
+    "history": (4, 6),
+    "all-camera": (6, 5),
+    "care": (6, 5),
+    "mine": (5, 5),
+    "history-oracle": (4, 6),
+    "full": (8, 8),
+}
+ROWS = study(FOUND)
+
+
+def tables(rows=ROWS):
+    return {table.title.rpartition(": ")[2]: table for table in protocol_tables(rows)}
+
+
+def block(table, heading):
+    """The lines under a heading."""
+    start = table.rows.index((heading,)) + 1
+    stop = next((n for n, row in enumerate(table.rows[start:], start) if len(row) == 1), len(table.rows))
+    return table.rows[start:stop]
+
+
+def test_contrasts_stand_above_the_papers():
+    table = tables()["care minus each policy"]
+    assert table.columns == ("care minus", "10%", "20%", "35%")
+    assert block(table, "First sightings") == (
+        ("history", *["+10.0 [10.0,10.0]"] * 3),
+        ("(paper)", "+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"),
+        ("all-camera", *["+0.0 [0.0,0.0]"] * 3),
+        ("(paper)", "tied", "tied", "tied"),
+        ("mine", *["+5.0 [5.0,5.0]"] * 3),
+        ("history-oracle †", *["+10.0 [10.0,10.0]"] * 3),
+        ("(paper)", *["+3.7 to 4.7"] * 3),
+    )
+    bold = [isinstance(line[1], Bold) for line in block(table, "First sightings")]
+    assert bold == [True, False, False, False, True, True, False]
+    assert block(table, "Overall recall")[0] == ("history", *["-10.0 [-10.0,-10.0]"] * 3)
+    assert block(table, "Censored TTFD")[0] == ("history", *["-0.60 [-0.60,-0.60]"] * 3)
+    assert any("6 scenes, 120 events, 1,200 object frames; 3 floor seeds" in note for note in table.notes)
+    assert any(note.startswith("†") for note in table.notes)
+    assert any(quote.startswith('Paper: "Table 1') for quote in table.quotes)
+
+
+def test_every_policy_is_held_against_history_right_after_care():
+    shown = tables()
+    assert list(shown)[:2] == ["care minus each policy", "each policy minus history"]
+    table = shown["each policy minus history"]
+    assert table.terminal
+    assert table.columns == ("minus history", "10%", "20%", "35%")
+    assert block(table, "First sightings") == (
+        ("all-camera", *["+10.0 [10.0,10.0]"] * 3),
+        ("care", *["+10.0 [10.0,10.0]"] * 3),
+        ("(paper)", "+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"),
+        ("mine", *["+5.0 [5.0,5.0]"] * 3),
+        ("history-oracle †", *["+0.0 [0.0,0.0]"] * 3),
+        ("(paper)", *["tied, at most 0.5"] * 3),
+    )
+    assert [isinstance(line[1], Bold) for line in block(table, "First sightings")][3:5] == [True, False]
+    overall = {line[0]: line[1] for line in block(table, "Overall recall")}
+    assert overall["mine"] == "-10.0 [-10.0,-10.0]"
+    assert block(table, "Censored TTFD")[-1] == ("history-oracle †", *["+0.00 [0.00,0.00]"] * 3)
+    assert table.notes == shown["care minus each policy"].notes
+
+
+def test_an_idea_is_held_against_history_without_care():
+    shown = tables(study({"history": (4, 6), "mine": (5, 5)}))
+    assert block(shown["each policy minus history"], "First sightings") == (("mine", *["+5.0 [5.0,5.0]"] * 3),)
+    assert "care minus each policy" not in shown
+    assert "each policy minus history" not in tables(study({"care": (6, 5), "mine": (5, 5)}))
+
+
+def test_equal_scene_weights_have_a_table_in_the_files():
+    table = tables()["care minus each policy, equal scene weights"]
+    assert not table.terminal
+    assert block(table, "First sightings, equal scenes")[:2] == (
+        ("history", *["+10.0 [10.0,10.0]"] * 3),
+        ("(paper)", "+5.3", "+5.2", "+4.2"),
+    )
+
+
+def test_levels_are_shares_of_what_the_full_scan_finds():
+    table = tables()["levels"]
+    lines = {(line[0], line[1]): line for line in table.rows}
+    assert lines["20%", "care"][2:7] == ("30.0", "75", "50.0", "62", "4.20")
+    assert lines["100%", "full"][2:7] == ("40.0", "100", "80.0", "100", "3.60")
+    assert lines["20%", "care"][7:] == ("30.0", "50.0", "4.20", "0.0", "0.0", "6")
+    said = [line for line in table.rows if line[1] == "(paper)"]
+    assert said[-1][2:7] == ("24.5", "100", "49.4", "100", "")
+    assert ("", "(paper)", "", "88", "", "94", "3.33") in {line[:7] for line in said}
+    assert "Of full" in tables(study({"care": (6, 5)}))["levels"].notes[0]
+
+
+def test_the_floor_seed_farthest_from_the_mean_is_named():
+    rows = [
+        play(f"{n}", "care", found(10, sighted), [sighted] * 10, floor_seed=seed)
+        for n in range(2)
+        for seed, sighted in enumerate((1, 2, 6))
+    ]
+    (line,) = [line for line in tables(rows)["levels"].rows if line[1] == "care"]
+    assert line[2] == "30.0"
+    assert line[-3:] == ("30.0", "30.0", "2")
+
+
+def test_the_share_of_the_ceiling_is_of_the_scenes_that_both_have():
+    rows = [play("a", "care", found(10, 2), [2] * 10), play("b", "care", found(10, 8), [8] * 10)]
+    rows += [play("a", "full", found(10, 4), [4] * 10)]
+    (line,) = [line for line in tables(rows)["levels"].rows if line[1] == "care"]
+    assert (line[2], line[3]) == ("50.0", "50")
+
+
+def test_a_scene_without_a_play_is_out_of_that_policys_contrasts_and_counted():
+    lacking = [row for row in ROWS if (row["scene"], row["policy"], row["budget"]) != ("scene 001", "mine", 0.2)]
+    shown = tables(lacking)
+    note = "Left out where a play is missing, of 6 scenes: mine 1 at 20%."
+    assert note in shown["care minus each policy"].notes
+    assert note in shown["levels"].notes
+    lines = {(line[0], line[1]): line[-1] for line in shown["levels"].rows}
+    assert (lines["20%", "mine"], lines["10%", "mine"]) == ("5", "6")
+
+
+def test_statements_are_judged_at_the_papers_budgets():
+    table = tables()["the paper's statements"]
+    lines = {line[0]: line[1::2] for line in block(table, "First sightings")}
+    assert lines["care minus history"] == ("+10.0 met (+5.2)", "+10.0 met (+5.2)", "+10.0 met (+4.3)")
+    assert lines["care minus all-camera"] == ("+0.0 met (tied)",) * 3
+    assert lines["history-oracle minus history"] == ("+0.0 met (tied)",) * 3
+    overall = {line[0]: line for line in block(table, "Overall recall")}
+    assert overall["care minus history"][5:] == ("-10.0 not met (+0.6)", "[-10.0,-10.0]")
+    assert overall["care minus all-camera"][1] == "+0.0 undecided (-0.13)"
+    assert table.notes[0] == "Of 27, each budget counted: 20 met, 1 not met, 6 undecided."
+    assert any("not played: uncertainty, beam-reduce, learned-scorer" in note for note in table.notes)
+    assert "the paper's statements" not in tables(study(FOUND, budgets=(0.05,)))
+    assert "the paper's statements" not in tables(study(FOUND, reserve_fraction=0.5))
+
+
+GAPS = {"above": Interval(1, 0.5, 2), "below": Interval(-1, -2, -0.5), "zero": Interval(0.2, -1, 1), "none": None}
+
+
+@pytest.mark.parametrize(
+    ("gap", "claimed", "says"),
+    [
+        *((gap, 1, says) for gap, says in zip(GAPS, ("met", "not met", "undecided", "undecided"), strict=True)),
+        *((gap, -1, says) for gap, says in zip(GAPS, ("not met", "met", "undecided", "undecided"), strict=True)),
+        *((gap, 0, says) for gap, says in zip(GAPS, ("not met", "not met", "met", "undecided"), strict=True)),
+    ],
+)
+def test_the_rule_of_met(gap, claimed, says):
+    assert verdict(Gap(OVERALL, 1.0, GAPS[gap]), claimed) == says
+
+
+def test_every_entry_of_the_paper_says_a_sign_or_nothing():
+    for said in statements_about(Setting("streets", "returns")).values():
+        assert all((said.sign(budget) is None) == (said.at(budget) == "") for budget in BUDGETS)
+        assert said.at(0.05) == ""
+    assert {budget for _, budget in LEVELS} == {*BUDGETS, 1.0}
+
+
+def test_the_strict_causal_variant_has_the_papers_own_numbers():
+    late = study({"care": (6, 5), "history": (4, 6)}, camera_latency=1)
+    shown = {table.title: table for table in protocol_tables([*ROWS, *late])}
+    title = "generated streets, detector returns, strict-causal (camera one keyframe old): care minus each policy"
+    assert shown[title].rows[2] == ("(paper)", "+4.6", "+5.3", "+2.6")
+    levels = shown[title.replace("care minus each policy", "levels")]
+    assert [line[3] for line in levels.rows if line[1] == "care"] == ["75"] * 3
+    assert not any(line[1] == "(paper)" for line in levels.rows)
+
+
+def test_strata_have_the_level_of_every_policy_and_contrasts():
+    table = tables()["first-sighting recall by stratum"]
+    assert [line[0] for line in table.rows if len(line) == 1] == ["range", "azimuth", "class"]
+    side = next(line for line in table.rows if line[:2] == ("side", "10%"))
+    assert dict(zip(table.columns, side, strict=True)) == {
+        "stratum": "side",
+        "budget": "10%",
+        "events": "42",
+        "history": "14.3",
+        "all-camera": "28.6",
+        "care": "28.6",
+        "mine": "28.6",
+        "history-oracle †": "14.3",
+        "care minus history": "+14.3 [14.3,14.3]",
+        "care minus all-camera": "+0.0 [0.0,0.0]",
+    }
+    assert any(note.startswith("†") for note in table.notes)
+    assert not table.terminal
+    overall = tables()["overall recall by stratum"]
+    assert overall.columns[2] == "object frames"
+    assert {line[2] for line in overall.rows if line[0] == "side"} == {"420"}
+
+
+def dense(scenes):
+    """CARE finds two frames more an event than all-camera in the third with the most tracks."""
+    better = [n >= 2 * scenes / 3 for n in range(scenes)]
+    care = [
+        play(f"{n:02d}", "care", found(10, 3), [7 if better[n] else 5] * 10, tracks=float(n), explained=float(n % 3))
+        for n in range(scenes)
+    ]
+    return [*care, *(play(f"{n:02d}", "all-camera", found(10, 3), [5] * 10) for n in range(scenes))]
+
+
+def test_thirds_are_shown_with_what_they_are_ranked_by():
+    table = tables(dense(15))["care minus all-camera in thirds of the scenes"]
+    assert block(table, "Tracked objects a keyframe") == (
+        ("dense third", "12.0"),
+        ("middle third", "7.0"),
+        ("sparse third", "2.0"),
+    )
+    lines = block(table, "Overall recall, by tracks")
+    assert [line[1] for line in lines if line[0] != "(paper)"] == [
+        "+20.0 [20.0,20.0]",
+        "+0.0 [0.0,0.0]",
+        "+0.0 [0.0,0.0]",
+        "+20.0 [20.0,20.0]",
+    ]
+    assert block(table, "First sightings, by explained")[0] == ("dense third", "+0.0 [0.0,0.0]")
+    statements = tables(dense(15))["the paper's statements"]
+    assert block(statements, "Overall recall, by tracks")[0][1] == "+20.0"
+
+
+def test_thirds_that_are_left_out_are_missed_once():
+    note = "No thirds of the scenes by traffic: they take all-camera and at least 9 scenes at every budget."
+
+    def missed(rows):
+        shown = tables(rows)
+        notes = [each for table in shown.values() for each in table.notes]
+        return "care minus all-camera in thirds of the scenes" not in shown, notes.count(note)
+
+    assert missed(dense(9)) == (False, 0)
+    assert missed(dense(8)) == (True, 1)
+    assert missed([row for row in dense(9) if row["policy"] == "care"]) == (True, 1)
+    assert missed(study({"history": (4, 6)})) == (True, 0)
+
+
+def test_differing_allocations_stand_above_the_papers():
+    table = tables()["keyframes on which the allocation differs from that of care"]
+    assert table.rows[:3] == (
+        ("history", *["10%, 50 cells"] * 3),
+        ("all-camera", *["10%, 50 cells"] * 3),
+        ("(paper)", "17%", "", "68%"),
+    )
+
+
+def test_one_policy_without_care_has_levels_and_strata():
+    shown = tables(study({"history": (4, 6), "full": (8, 8)}))
+    assert list(shown) == ["levels", "first-sighting recall by stratum", "overall recall by stratum"]
+    assert shown["overall recall by stratum"].columns == ("stratum", "budget", "object frames", "history")
+    assert list(tables(study({"full": (8, 8)}))) == ["levels"]
+
+
+def test_the_closing_counts_and_holds_the_gain_against_the_papers_gate():
+    size, gate = protocol_closing(ROWS)
+    assert size == ("Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 276.")
+    assert gate.endswith(
+        "Here, generated streets, detector returns: +10.0 [10.0,10.0] at 10% (met), +10.0 [10.0,10.0] at 20% (met), "
+        "+10.0 [10.0,10.0] at 35% (met)."
+    )
+    small = protocol_closing(study({"care": (5, 5), "history": (4, 5)}, events=25, budgets=(0.1,)))
+    assert small[1].endswith("+4.0 [4.0,4.0] at 10% (not met).")
+    assert len(protocol_closing(study({"care": (5, 5)}))) == 1
+
+
+def test_the_gate_is_held_to_the_papers_budgets():
+    both = {"care": (6, 5), "history": (4, 6)}
+    assert protocol_closing(study(both, budgets=(0.05, 0.1)))[1].endswith("returns: +10.0 [10.0,10.0] at 10% (met).")
+    assert len(protocol_closing(study(both, budgets=(0.05,)))) == 1
+
+
+def test_a_file_changes_nothing_in_the_tables(tmp_path):
+    rows = [*ROWS, play("empty", "care", [], []), play("empty", "history", [], [])]
+    write_rows(rows, tmp_path / "plays.parquet", "protocol")
+    read = read_rows(tmp_path / "plays.parquet")
+    assert [with_tuples(row) for row in read] == read
+    assert protocol_tables(read) == protocol_tables(rows)
+
+
+def test_the_study_is_shown_in_three_forms(tmp_path, capsys):
+    protocol = STUDIES["protocol"]
+    write_report(ROWS, tmp_path, protocol)
+    print_report(ROWS, Console(width=100), protocol)
+    printed, markdown, latex = (
+        capsys.readouterr().out,
+        *((tmp_path / name).read_text() for name in ("tables.md", "tables.tex")),
+    )
+    assert all("First-sighting recall: share of" in text for text in (printed, markdown, latex))
+    assert "by stratum" not in printed
+    assert all(f"## {table.title}\n" in markdown for table in protocol_tables(ROWS))
+    assert latex.count(r"\begin{table}") == len(protocol_tables(ROWS))
+    assert max(map(len, printed.splitlines())) <= 100
+
+
+def test_positive_favours_the_first_named():
+    """With noise: the mean of the contrast is that of the levels."""
+    rng = np.random.default_rng(3)
+    rows = [
+        play(f"{n}", policy, found(20, int(rng.integers(low, 12))), [5] * 20)
+        for n in range(12)
+        for policy, low in (("care", 5), ("history", 0))
+    ]
+    levels = {line[1]: float(line[2]) for line in tables(rows)["levels"].rows if line[0]}
+    (line, _) = block(tables(rows)["care minus each policy"], "First sightings")
+    assert float(line[1].split()[0]) == pytest.approx(levels["care"] - levels["history"], abs=0.11)
+    assert FIRST_SIGHTING.unit == "points"
+
+
+def test_at_budgets_of_which_the_paper_does_not_speak_it_has_no_line():
+    scarce = study(
+        {"care": (5, 5), "history": (4, 5), "all-camera": (5, 5), "full": (9, 9)}, scenes=9, budgets=(0.03, 0.05)
+    )
+    for table in protocol_tables(scarce):
+        if "levels" not in table.title:
+            assert not [row for row in table.rows if "(paper)" in row]
+            assert not table.quotes

@@ -1,0 +1,115 @@
+import pytest
+
+from care_sim.core.conditions import Sensing
+from care_sim.reports.figures.faults import NAMES, fault_figures
+from care_sim.reports.table import Bold
+from care_sim.reports.tables.faults import FAULTS, PLACES, Played, configurations, fault_tables, order
+from tests.helpers.made_rows import row
+
+SEEDS = range(5)
+BY_TITLE = {fault.title: fault for fault in FAULTS}
+DARTOUT, DENSE = PLACES
+
+
+def distance(config):
+    """A made-up law: CARE falls behind all-camera at 0.6 missed objects and behind history at 1."""
+    if config.policy in ("history", "full"):
+        return {"history": 8.0, "full": 16.0}[config.policy]
+    missed = config.false_negative_rate if config.false_negative_burst == 1 else 0.0
+    if config.policy == "all-camera":
+        return 14.0
+    return None if missed == 1.0 else 11.0 if missed >= 0.6 else 16.0 + config.ego_speed_sigma * 4.0
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return [row(config, distance(config), braked=config.policy != "history") for config in configurations(SEEDS)]
+
+
+def test_the_strength_at_which_the_order_changes_is_found(rows):
+    played = Played(rows)
+    missed = BY_TITLE["missed objects"]
+    assert order(("care", "history"), missed, DARTOUT, played) == ">, < from 1"
+    assert order(("care", "all-camera"), missed, DARTOUT, played) == "=, < from 0.6"
+    assert isinstance(order(("care", "all-camera"), missed, DARTOUT, played), Bold)
+    unchanged = order(("all-camera", "history"), missed, DENSE, played)
+    assert unchanged == ">"
+    assert not isinstance(unchanged, Bold)
+
+
+def test_the_tables_hold_every_fault_place_policy_and_strength(rows):
+    orders, *tables = fault_tables(rows)
+    assert [table.title for table in tables] == [fault.title for fault in FAULTS]
+    assert sum(len(line) > 1 for line in orders.rows) == len(PLACES) * len(FAULTS)
+    for table, fault in zip(tables, FAULTS, strict=True):
+        assert table.columns[1:] == tuple(level.label for level in fault.levels)
+        lines = [line for line in table.rows if len(line) > 1]
+        assert len(lines) == len(PLACES) * (3 * 4 + 3)
+        assert all(all(line) for line in lines)
+    detections, braked = tables[0].rows[1:5], tables[0].rows[6:10]
+    assert detections[2] == ("care", "16.0", "16.0", "16.0", "11.0", "11.0", "not detected")
+    assert braked[0] == ("history", *["0/5"] * 6)
+    assert detections[3] == ("full", *["16.0"] * 6)
+    assert {line[1] for line in tables[0].rows[11:15]} == {"3.0"}
+    history, camera, full = tables[0].rows[16:19]
+    assert history[:2] == ("history", "+8.0* [8.0,8.0]")
+    assert camera[4] == "-3.0* [-3.0,-3.0]"
+    assert full[1] == "+0.0 [0.0,0.0]"
+
+
+def test_one_miss_in_thirty_does_not_change_the_order():
+    missed = BY_TITLE["missed objects"]
+    made = [row(config, distance(config)) for config in configurations(range(30)) if config.scenario == "dartout"]
+    for each in made:
+        if (each["policy"], each["seed"], each["false_negative_rate"]) == ("care", 3, 0.4):
+            each |= {"detection_distance_m": None, "undetected_to_m": 3.0}
+    assert order(("care", "history"), missed, DARTOUT, Played(made)) == ">, < from 1"
+
+
+def test_strengths_that_were_not_played_are_passed_over(rows):
+    def without(*rates):
+        kept = [r for r in rows if r["policy"] != "care" or r["false_negative_rate"] not in rates]
+        return order(("care", "history"), BY_TITLE["missed objects"], DARTOUT, Played(kept))
+
+    assert without(0.4) == ">, < from 1"
+    assert without(0.0) == ">, < from 1"
+    assert without(0.8, 1.0) == ">"
+    assert without(0.0, 0.2, 0.4, 0.6, 0.8, 1.0) == ""
+
+
+def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
+    varied = {name for fault in FAULTS for level in fault.levels for name in level.changes}
+    faults = set(Sensing.__dataclass_fields__) - {"engine", "min_returns", "camera_confidence"}
+    assert varied == faults
+    for fault in FAULTS:
+        values = [float(level.label) for level in fault.levels]
+        assert values == sorted(set(values))
+        assert values[0] == (1 if "burst" in fault.title else 0)
+
+
+def test_the_full_scan_is_played_only_where_it_feels_the_fault():
+    full = [config for config in configurations([0]) if config.policy == "full"]
+    assert len(full) == len(set(full)) == 2 * (1 + 4 + 3 + 4 + 3)
+
+
+def test_a_figure_for_every_place_and_measure(rows):
+    figures = fault_figures(rows)
+    assert tuple(figures) == NAMES
+    for figure in figures.values():
+        panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
+        assert [axes.get_title(loc="left") for axes in panels] == [fault.title for fault in FAULTS]
+        assert all(len(axes.lines) >= 4 for axes in panels)
+        bottom, top = panels[0].get_ylim()
+        drawn = [height for axes in panels for line in axes.lines for height in line.get_ydata()]
+        assert all(bottom <= height <= top for height in drawn if height == height)
+        assert not any(axes.axison for axes in figure.axes if axes not in panels)
+    missed = figures["faults-dartout-detection"].axes[0]
+    hollow = [list(line.get_xdata()) for line in missed.lines if line.get_markerfacecolor() == "white"]
+    assert [5] in hollow
+
+
+def test_a_further_policy_is_played_shown_and_ordered():
+    rows = [row(config, distance(config)) for config in configurations(SEEDS, ["care-sbf"])]
+    orders, first, *_ = fault_tables(rows)
+    assert orders.columns[-1] == "care : care-sbf"
+    assert sum(line[0] == "care-sbf" for line in first.rows) == 4 * len(PLACES)

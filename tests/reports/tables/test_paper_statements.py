@@ -1,0 +1,90 @@
+"""The paper's statements against rows made by hand."""
+
+import pytest
+
+from care_sim.reports.tables.paper_statements import statements
+from care_sim.study.designs.paper import configurations
+
+
+def distance(config):
+    """First detections as the paper has them."""
+    if config.policy == "history":
+        return 11.9
+    return 10.3 if (config.scenario, config.policy, config.budget) == ("dense", "all-camera", 0.03) else 15.1
+
+
+def outcome(config):
+    history = config.policy == "history"
+    return {
+        "detection_distance_m": 20.0 if config.scenario == "cutin" else distance(config),
+        "undetected_to_m": None,
+        "braked": not history or config.seed < 3,
+        "min_distance_m": 4.0 if history else 5.7,
+        "clearance_m": 3.0,
+        "collision": False,
+    }
+
+
+STUDY = [config.row() | outcome(config) for config in configurations(range(5))]
+
+
+def differing(rows):
+    return [statement.text for statement in statements(rows) if not statement.agrees]
+
+
+def changed(where, **values):
+    return [row | values if where.items() <= row.items() else row for row in STUDY]
+
+
+def test_the_papers_own_figures_agree_with_every_statement():
+    assert len(statements(STUDY)) == 12
+    assert differing(STUDY) == []
+
+
+MISSED = {"detection_distance_m": None, "undetected_to_m": 3.0}
+DARTOUT = {"scenario": "dartout", "budget": 0.1, "false_negative_rate": 0.0, "camera_latency": 0}
+
+
+@pytest.mark.parametrize(
+    ("where", "values", "text"),
+    [
+        (DARTOUT | {"policy": "care", "seed": 4}, {"braked": False}, "brake in every episode"),
+        (DARTOUT | {"policy": "care"}, {"detection_distance_m": 14.5}, "within 0.3 m of full"),
+        (DARTOUT | {"policy": "history"}, {"detection_distance_m": 13.5}, "at least 2 m later"),
+        (DARTOUT | {"policy": "history"}, {"braked": True}, "brakes in 3 of 5"),
+        (DARTOUT | {"policy": "all-camera"}, {"min_distance_m": 5.0}, "5.7 m or more"),
+        (DARTOUT | {"policy": "history"}, {"min_distance_m": 5.5}, "history at 4.0 m"),
+        ({"scenario": "dense", "policy": "full"}, {"detection_distance_m": 16.0}, "within 0.5 m of full"),
+        (
+            {"scenario": "dense", "policy": "all-camera", "budget": 0.03},
+            {"detection_distance_m": 13.0},
+            "3 m later than care",
+        ),
+        ({"scenario": "dense", "policy": "care", "budget": 0.2}, {"detection_distance_m": 16.0}, "dense from 5%"),
+        ({"scenario": "cutin", "policy": "history"}, {"detection_distance_m": 18.0}, "cut-in"),
+        ({"policy": "care", "false_negative_rate": 0.4}, MISSED, "missed detections"),
+        ({"scenario": "dense", "policy": "care", "budget": 0.2}, MISSED, "dense from 5%"),
+        ({"scenario": "cutin", "policy": "care"}, MISSED, "cut-in"),
+        ({"policy": "care", "camera_latency": 2}, {"detection_distance_m": 9.0}, "latency"),
+        ({"scenario": "cutin", "policy": "full", "seed": 0}, {"collision": True}, "collides"),
+    ],
+)
+def test_each_statement_can_differ(where, values, text):
+    (said,) = differing(changed(where, **values))
+    assert text in said
+
+
+def test_both_sides_are_shown():
+    texts = [str(statement) for statement in statements(STUDY)]
+    assert "agrees: dense 3%: all-camera detects at least 3 m later than care. Paper: 10.3 against 15.1. " in texts[6]
+    assert texts[6].endswith("Here: 10.3 against 15.1.")
+
+
+def test_an_undetected_median_ranks_last_and_is_said():
+    missed = changed(DARTOUT | {"policy": "history"}, **MISSED)
+    assert differing(missed) == []
+    assert "Here: not detected against 15.1." in str(statements(missed)[2])
+
+
+def test_a_part_of_the_study_makes_no_statement():
+    assert statements([row for row in STUDY if row["scenario"] != "cutin"]) == []

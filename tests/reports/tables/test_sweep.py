@@ -1,0 +1,132 @@
+"""Tables of a sweep."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from care_sim.reports.summary import setting_of
+from care_sim.reports.table import Bold
+from care_sim.reports.tables.sweep import COLUMNS, sweep_tables
+from care_sim.study.episode_config import EpisodeConfig
+from tests.helpers.made_rows import STUDY, row, rows
+
+ORACLE = rows("history", [9.0, 10.0, 11.0, 12.0, 13.0], changes={"policy": "history-oracle", "tags": "privileged"})
+
+
+def levels(study=STUDY):
+    return {line[1]: dict(zip(COLUMNS, line, strict=True)) for line in sweep_tables(study)[0].rows}
+
+
+def blocks(study=STUDY):
+    """Entries of the contrast table by block and policy."""
+    found, block = {}, ""
+    for line in sweep_tables(study)[1].rows:
+        if len(line) == 1:
+            block = line[0]
+        else:
+            found[block, line[0]] = line[1:]
+    return found
+
+
+def test_other_physics_are_another_setting():
+    config = EpisodeConfig("dense", "care", scenario_parameters=(("vehicles", 7),))
+    assert setting_of(row(config, 1.0)) != setting_of(row(EpisodeConfig("dense", "care"), 1.0))
+    assert sweep_tables([row(config, 1.0)])[0].title == "dense, vehicles 7"
+
+
+def test_levels_stand_beside_the_papers_figures():
+    lines = levels()
+    assert lines["all-camera"]["first detection m"] == "12.0 [11.0, 13.0]"
+    assert lines["all-camera"]["paper"] == "10.3"
+    assert (lines["history"]["never"], lines["history"]["regret m"]) == ("2/5", "≥12.3")
+    assert (lines["care"]["regret m"], lines["care"]["as full"]) == ("0.1", "4/5")
+    assert lines["full"]["regret m"] == ""
+    table = sweep_tables(STUDY)[0]
+    assert any("10.3 m" in quote for quote in table.quotes)
+    assert "| 3% | history | 4.0 [n.d., 6.0] | 2/5 |" in table.markdown()
+
+
+@pytest.mark.parametrize(
+    ("distances", "text"),
+    [
+        ([None] * 5, "not detected"),
+        ([None, None, None, 8.0, 9.0], "not detected [n.d., 8.0]"),
+        ([None, 7.0, 8.0, 9.0, 9.5], "8.0 [7.0, 9.0]"),
+    ],
+)
+def test_a_quantile_on_a_miss_reads_not_detected(distances, text):
+    assert levels(rows("care", distances))["care"]["first detection m"] == text
+
+
+def test_care_is_compared_with_every_policy_at_every_budget():
+    study = [*STUDY, *rows("care", [15.0] * 5, budget=0.1), *rows("history", [14.0] * 5, budget=0.1)]
+    found = blocks(study)
+    assert sweep_tables(study)[1].columns == ("care minus", "3%", "10%")
+    assert found["First detection, m", "all-camera"] == ("+5.0* [5.0,5.0]", "")
+    assert found["First detection, m", "history"][1] == "+1.0 [1.0,1.0]"
+    assert [isinstance(entry, Bold) for entry in found["First detection, m", "history"]] == [True, True]
+    assert found["First detection, m", "history"][0].startswith("≥+12.2* [")
+    assert found["First detection, m", "full"][0].startswith("-0.1 [-0.3,0.0]")
+    assert not isinstance(found["First detection, m", "full"][0], Bold)
+    assert found["Braked, points", "history"] == ("+0 [0,0]",) * 2
+    assert found["Detected, points", "history"][0].startswith("+40 [0,80]")
+
+
+def test_the_full_scan_alone_has_nothing_to_regret():
+    (table,) = sweep_tables([row for row in STUDY if row["policy"] == "full"])
+    assert table.notes == ()
+    (table,) = sweep_tables([row for row in STUDY if row["policy"] == "history"])
+    assert table.notes == ("Regret: full not run.",)
+
+
+def test_what_is_learned_is_compared_with_every_policy_too():
+    learned = rows("learned-scorer", [14.0, 15.0, 16.0, 17.0, 18.0], changes={"tags": "causal+learned"})
+    found = {table.title: table for table in sweep_tables([*STUDY, *learned])}
+    assert [title for title in found if "minus" in title] == [
+        "dense: care minus each policy",
+        "dense: learned-scorer minus each policy",
+    ]
+    of_care, of_learned = (
+        {line[0]: line[1:] for line in reversed(found[f"dense: {name} minus each policy"].rows)}
+        for name in ("care", "learned-scorer")
+    )
+    assert of_care["learned-scorer"] == ("+1.0 [1.0,1.0]",)
+    assert of_learned["care"] == ("-1.0 [-1.0,-1.0]",)
+    assert "full" in of_learned
+    assert "learned-scorer" not in of_learned
+
+
+def test_detection_rates_are_compared_only_where_somebody_missed():
+    assert ("Detected, points", "history") in blocks()
+    everybody = [row for row in STUDY if row["policy"] != "history"]
+    assert ("Detected, points", "all-camera") not in blocks(everybody)
+
+
+def test_without_care_or_another_policy_there_is_no_contrast():
+    assert len(sweep_tables([row for row in STUDY if row["policy"] != "care"])) == 1
+    assert len(sweep_tables(rows("care", [15.0]))) == 1
+
+
+def test_policies_that_no_car_can_have_are_marked():
+    table, contrasts = sweep_tables([*STUDY, *ORACLE])
+    assert "history-oracle †" in {line[1] for line in table.rows}
+    assert "history-oracle †" in {line[0] for line in contrasts.rows}
+    assert all("† knows the truth: no policy of a car." in each.notes for each in (table, contrasts))
+    assert not any("‡" in note for note in table.notes)
+
+
+def test_the_terminal_shows_every_cell_in_80_columns():
+    terminal = io.StringIO()
+    Console(width=80, file=terminal).print(*(table.rich() for table in sweep_tables([*STUDY, *ORACLE])))
+    shown = terminal.getvalue()
+    assert all(part in shown for part in ("history-oracle †", "12.0 [11.0, 13.0]", "2/5", "15.1", "+5.0* [5.0,5.0]"))
+    assert "…" not in shown
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+def test_a_pass_that_was_never_in_view_is_said():
+    config = EpisodeConfig("cutin", "care")
+    seen, unseen = row(config, 9.0), row(config, None, min_distance_m=None, clearance_m=None)
+    assert levels([unseen])["care"]["pass m"] == "never in view"
+    assert levels([seen, unseen | {"seed": 1}])["care"]["pass m"] == "5.0 (of 1)"

@@ -1,0 +1,195 @@
+"""Results that something else wrote, or that were damaged, are refused in one line where they are opened."""
+
+import io
+import random
+import warnings
+from dataclasses import replace
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from rich.console import Console
+
+from care_sim.base.errors import InvalidInput
+from care_sim.cli import main
+from care_sim.reports.report import Report, print_report, reported
+from care_sim.reports.studies import STUDIES
+from care_sim.study.rows import LEFT_OUT, read_rows, write_rows
+from care_sim.study.rows import STUDY as NAME
+from tests.helpers import made_plays
+from tests.helpers.made_rows import CROWD, STUDY
+
+PLAYS = made_plays.study({"care": (3, 4), "history": (2, 3), "full": (4, 5)}, scenes=2, budgets=(0.1,), events=5)
+ROWS = {"sweep": STUDY, "crowding": CROWD, "faults": STUDY, "protocol": PLAYS}
+DEEP = b"[" * 100_000
+
+
+def table(name, folder):
+    write_rows(ROWS[name], folder / STUDIES[name].kind.file, name)
+    return pq.read_table(folder / STUDIES[name].kind.file)
+
+
+def put(content, name, folder):
+    pq.write_table(content, folder / STUDIES[name].kind.file)
+
+
+def of_value(content, column, value):
+    return content.set_column(content.column_names.index(column), column, pa.array([value] * content.num_rows))
+
+
+def shown(folder):
+    rows, study, left_out = reported(folder)
+    with warnings.catch_warnings(action="ignore"):
+        Report.of(rows, replace(study, figures=lambda _rows: {}), left_out)
+        print_report(rows, Console(file=io.StringIO()), study, left_out)
+
+
+def complaint(folder):
+    with pytest.raises(InvalidInput) as refused:
+        reported(folder)
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 1000
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "value", "fault"),
+    [
+        ("sweep", "budget", "a tenth", "column budget must hold numbers, got string"),
+        ("sweep", "budget", 0.0, "column budget must hold numbers from 1e-09 to 1"),
+        ("sweep", "seed", 0.5, "column seed must hold whole numbers, got double"),
+        ("sweep", "policy", 3, "column policy must hold text, got int64"),
+        ("sweep", "policy", None, "column policy must hold text, got null"),
+        ("sweep", "braked", 1, "column braked must hold true or false, got int64"),
+        ("sweep", "detection_distance_m", float("nan"), "column detection_distance_m must hold numbers from 0 to"),
+        ("sweep", "detection_distance_m", float("inf"), "column detection_distance_m must hold numbers from 0 to"),
+        ("sweep", "min_distance_m", [3.0], "column min_distance_m must hold numbers, got list"),
+        ("sweep", "lidar_dead_rows", ["a"], "column lidar_dead_rows must hold lists of whole numbers"),
+        ("sweep", "camera_latency", "late", "column camera_latency must hold whole numbers"),
+        ("crowding", "scenario.vehicles", "many", "column scenario.vehicles must hold whole numbers"),
+        ("protocol", "ttfds", [0.5], "column ttfds must hold lists of whole numbers"),
+        ("protocol", "ttfds", [1, None], "column ttfds must hold whole lists"),
+        ("protocol", "ttfds", [], "has 0 TTFD of 5 events"),
+        ("protocol", "events", None, "column events must hold numbers, got null"),
+        ("protocol", "range/below 20 m/found", "x", "column range/below 20 m/found must hold numbers"),
+        ("protocol", "differing_cells", -1, "column differing_cells must hold whole numbers from 0"),
+        ("protocol", "tags", 1, "column tags must hold text"),
+    ],
+)
+def test_a_column_of_another_type_or_range_is_named(tmp_path, name, column, value, fault):
+    put(of_value(table(name, tmp_path), column, value), name, tmp_path)
+    with pytest.raises(InvalidInput) as refused:
+        shown(tmp_path)
+    assert fault in str(refused.value)
+
+
+def test_a_parameter_of_a_structure_is_named(tmp_path):
+    content = table("sweep", tmp_path)
+    put(content.append_column("policy.x", pa.array([{"a": 1}] * content.num_rows)), "sweep", tmp_path)
+    assert "column policy.x must hold text, numbers, flags or lists of them, got struct" in complaint(tmp_path)
+
+
+@pytest.mark.parametrize("column", ["class/bus/delay", "film_hash", "tracks", "ttfds", "keyframes", "events"])
+def test_a_missing_column_of_a_play_is_named(tmp_path, column):
+    put(table("protocol", tmp_path).drop_columns(column), "protocol", tmp_path)
+    assert f"it lacks {column}" in complaint(tmp_path)
+
+
+def test_one_empty_cell_and_two_columns_of_a_name_are_named(tmp_path):
+    content = table("sweep", tmp_path)
+    policies = [None, *content["policy"].to_pylist()[1:]]
+    put(content.set_column(1, "policy", pa.array(policies)), "sweep", tmp_path)
+    assert "column policy must hold text in every row, got nothing in 1" in complaint(tmp_path)
+    put(content.append_column("policy", content["policy"]), "sweep", tmp_path)
+    assert "is not a readable Parquet file: Multiple matches" in complaint(tmp_path)
+
+
+def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_path):
+    path = tmp_path / "episodes.parquet"
+    pq.write_table(pa.table({"when": pa.array([2**62], pa.timestamp("ms"))}), path)
+    assert "it lacks " in complaint(tmp_path)
+    with pytest.raises(InvalidInput, match="not a readable Parquet file"):
+        read_rows(path)
+    content = table("sweep", tmp_path)
+    put(content.append_column("when", pa.array([2**62] * content.num_rows, pa.timestamp("ms"))), "sweep", tmp_path)
+    assert len(reported(tmp_path)[0]) == content.num_rows
+
+
+@pytest.mark.parametrize(
+    ("notes", "fault"),
+    [
+        ({NAME: b"\xff"}, "has notes that cannot be read"),
+        ({LEFT_OUT: b"["}, "has notes that cannot be read"),
+        ({LEFT_OUT: DEEP}, "nested too deep"),
+        ({LEFT_OUT: b"3"}, "what is left out must be a list of texts"),
+        ({LEFT_OUT: b"[1]"}, "what is left out must be a list of texts"),
+        ({NAME: b"gardening"}, "unknown study"),
+        ({NAME: b"protocol"}, "holds no rows of the study protocol, which are in plays.parquet"),
+        ({NAME: b"crowding"}, "it lacks scenario.vehicles"),
+    ],
+)
+def test_notes_of_another_kind_are_one_line(tmp_path, notes, fault):
+    put(table("sweep", tmp_path).replace_schema_metadata(notes), "sweep", tmp_path)
+    assert fault in complaint(tmp_path)
+
+
+VALUES = [None, float("nan"), -1.0, 0.0, 1e300, "text", "$x^$ <b>|`", True, -1, 2**62, [], [1], [None], {"a": 1}, b"x"]
+
+
+def mutated(content, random):
+    """The table with a column dropped, moved, or with another value in it."""
+    name = random.choice(content.column_names)
+    place, column = content.column_names.index(name), content[name]
+    try:
+        match random.randrange(5):
+            case 0:
+                return content.remove_column(place)
+            case 1:
+                return of_value(content, name, random.choice(VALUES))
+            case 2:
+                values = column.to_pylist()
+                values[random.randrange(len(values))] = random.choice(VALUES)
+                return content.set_column(place, name, pa.array(values, column.type))
+            case 3:
+                return content.set_column(place, name, content[random.choice(content.column_names)])
+            case _:
+                return content.set_column(
+                    place, name, column.take(pa.array(random.sample(range(len(column)), len(column))))
+                )
+    except (pa.ArrowException, TypeError, ValueError, OverflowError):
+        return content
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_damaged_results_are_shown_or_refused(tmp_path, name):
+    """Seeded damage; figures are drawn of few."""
+    rolls = random.Random(name)
+    content, refused = table(name, tmp_path), []
+    for _ in range(60):
+        put(mutated(mutated(content, rolls), rolls), name, tmp_path)
+        try:
+            shown(tmp_path)
+        except InvalidInput as error:
+            refused.append(str(error))
+    assert 10 < len(refused) < 60
+    assert not any("\n" in line for line in refused)
+
+
+@pytest.mark.filterwarnings("ignore:Glyph")
+@pytest.mark.parametrize("name", ["sweep", "protocol"])
+def test_a_name_of_signs_is_shown_everywhere(tmp_path, name, capsys):
+    odd = "my $x^$ |`<b>_\\ \x1b[31m"
+    rows = [row | {"policy": odd if row["policy"] == "history" else row["policy"]} for row in ROWS[name]]
+    write_rows(rows, tmp_path / STUDIES[name].kind.file, name, ["what \x1b[31m failed"])
+    (tmp_path / "config.json").write_text('{"machine": {"system": "\\ud800"}}')
+    for command in (
+        ["report", str(tmp_path)],
+        ["report", str(tmp_path), "-o", str(tmp_path / "a.html"), "--episodes", "0"],
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(command)
+        assert end.value.code == 0, capsys.readouterr().err
+    said = capsys.readouterr()
+    for text in (said.out, said.err, *((tmp_path / file).read_text() for file in ("tables.md", "tables.tex"))):
+        assert "\x1b" not in text
+    assert "<b>_" not in (tmp_path / "a.html").read_text()

@@ -1,0 +1,92 @@
+import json
+
+import pyarrow.parquet as pq
+import pytest
+from rich.console import Console
+
+from care_sim.base.errors import InvalidInput
+from care_sim.reports.report import conduct, print_report, write_report
+from care_sim.reports.studies import STUDIES, study_of
+from care_sim.reports.tables import ablations, crowding, faults
+from care_sim.study.added_columns import annotated
+from care_sim.study.designs import paper
+from care_sim.study.episode_config import grid
+from care_sim.study.rows import read_rows, write_rows
+from tests.helpers.made_rows import CROWD, STUDY, row
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_file_knows_its_study(name, tmp_path):
+    write_rows(STUDY, tmp_path / "episodes.parquet", name)
+    assert study_of(tmp_path / "episodes.parquet") is STUDIES[name]
+
+
+def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
+    path = tmp_path / "episodes.parquet"
+    write_rows(STUDY, path)
+    pq.write_table(pq.read_table(path).replace_schema_metadata(None), path)
+    assert study_of(path).name == "sweep"
+
+
+def test_an_unknown_study_is_one_clear_line(tmp_path):
+    write_rows(STUDY, tmp_path / "episodes.parquet", "gardening")
+    with pytest.raises(
+        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, protocol, sweep"
+    ):
+        study_of(tmp_path / "episodes.parquet")
+
+
+EPISODES = {"sweep": STUDY, "paper": STUDY, "crowding": CROWD, "ablate": STUDY, "faults": STUDY}
+
+
+@pytest.mark.parametrize(("name", "rows"), EPISODES.items())
+def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys):
+    study = STUDIES[name]
+    assert set(study.figures(rows)) <= set(study.figure_names)
+    write_report(rows, tmp_path, study)
+    print_report(rows, Console(width=80), study)
+    printed, markdown, latex = (
+        capsys.readouterr().out,
+        *((tmp_path / f).read_text() for f in ("tables.md", "tables.tex")),
+    )
+    assert "Collisions: 0 in" in printed
+    assert all("Collisions: 0 in" in text and "never detected" in text for text in (markdown, latex))
+    tables = study.tables(rows)
+    assert latex.count(r"\begin{table}") == len(tables)
+    assert all(f"## {table.title}\n" in markdown for table in tables)
+
+
+def test_a_file_changes_nothing_in_the_tables(tmp_path):
+    """Numbers that differ in type alone, and columns that only some rows have, come back from Parquet changed."""
+    played = {
+        "ablate": ablations.configurations(range(2)),
+        "faults": faults.configurations(range(2)),
+        "crowding": crowding.configurations(range(2)),
+        "paper": paper.configurations(range(2)),
+    }
+    for name, configs in played.items():
+        rows = annotated([row(config, 10.0 + number % 7) for number, config in enumerate(configs)])
+        write_rows(rows, tmp_path / "episodes.parquet", name)
+        read = read_rows(tmp_path / "episodes.parquet")
+        tables = STUDIES[name].tables(read)
+        assert tables == STUDIES[name].tables(rows)
+        assert name == "paper" or all(all(line[:3]) for table in tables for line in table.rows)
+
+
+def test_no_study_is_left_out_above():
+    """The protocol has plays for episodes, and its own test."""
+    assert {*EPISODES, "protocol"} == set(STUDIES)
+
+
+def test_only_the_papers_study_quotes_the_paper_on_collisions():
+    assert "Paper" in STUDIES["paper"].closing(STUDY)[0]
+    assert "Paper" not in STUDIES["sweep"].closing(STUDY)[0]
+
+
+def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
+    short = (("vehicles", 1), ("duration_s", 0.2))
+    configs = grid(["dense"], ["random", "full"], [0.1], [0], scenario_parameters=short)
+    assert conduct(configs, tmp_path, workers=1, study=STUDIES["crowding"]) == []
+    assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
+    assert study_of(tmp_path / "episodes.parquet").name == "crowding"
+    assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / "episodes.parquet")[0])

@@ -1,0 +1,173 @@
+"""README, site and notebook: their Python runs as it stands, commands are understood, links lead somewhere."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from importlib.util import module_from_spec, spec_from_file_location
+
+import pytest
+import tyro
+
+import care_sim.wrappers
+from care_sim import cli
+from care_sim.envs import IDS
+from care_sim.measure.bench.config import BenchConfig
+from care_sim.measure.certify.config import CertifyConfig
+from care_sim.measure.parity.config import ParityConfig
+from care_sim.training import COMMANDS as LEARNERS
+from care_sim.viewer.recording.entities import ENTITIES
+from tests.helpers.places import ROOT
+
+SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "results" / "README.md", *SITE]
+NOTEBOOK = ROOT / "docs" / "quickstart.ipynb"
+
+
+def fenced(page, language):
+    """The blocks of a page that are marked with a language, or with none."""
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.S | re.M)
+    return [text for marked, text in blocks if marked == language]
+
+
+def name_of(page):
+    return str(page.relative_to(ROOT))
+
+
+BLOCKS = [
+    pytest.param(block, id=f"{name_of(page)}-{number}")
+    for page in PAGES
+    for number, block in enumerate(fenced(page, "python"))
+]
+LINES = [
+    (name_of(page), line.partition("#")[0].strip())
+    for page in PAGES
+    for block in fenced(page, "")
+    for line in block.splitlines()
+    if re.match(r"care-sim [a-z]", line)
+]
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_a_block_runs_on_its_own(block, tmp_path, drive):
+    """In an empty folder, with an Argoverse 2 log in `logs`."""
+    for wrapper, library in (("RecordVideo", "moviepy"), ("RecordRerun", "rerun")):
+        if wrapper in block:
+            pytest.importorskip(library)
+    (tmp_path / "logs").symlink_to(drive.parent)
+    paths = {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(
+        [sys.executable, "-c", block], cwd=tmp_path, env=os.environ | paths, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+
+
+def parsed(arguments):
+    """What the command line makes of arguments, without running it."""
+    measures = {"bench": BenchConfig, "parity": ParityConfig, "certify": CertifyConfig}
+    first, *rest = arguments
+    if first in measures:
+        return tyro.cli(measures[first], args=rest)
+    commands = LEARNERS if first == "train" else cli.COMMANDS
+    return tyro.extras.subcommand_cli_from_dict(commands, args=rest if first == "train" else arguments)
+
+
+def understood(line):
+    try:
+        parsed(shlex.split(line)[1:])
+    except SystemExit as end:
+        return end.code == 0
+    return True
+
+
+def test_commands_are_understood():
+    assert len(LINES) > 30
+    assert [entry for entry in LINES if not understood(entry[1])] == []
+
+
+def test_the_quick_start_makes_a_page():
+    page, line = "docs/index.md", "care-sim report runs/mine -o report.html"
+    assert (page, line) in LINES
+
+
+def test_files_that_a_page_names_are_there():
+    """Those of the repository, as seen from its root."""
+    named = [
+        (page, name)
+        for page in PAGES
+        for name in re.findall(r"`((?:docs|care_sim|examples|tests)/[\w./]*)`", page.read_text())
+    ]
+    assert len(named) > 5
+    assert [(name_of(page), name) for page, name in named if not (ROOT / name).exists()] == []
+
+
+def test_the_learner_in_one_file_learns(monkeypatch, capsys):
+    pytest.importorskip("torch")
+    place = spec_from_file_location("train_ppo", ROOT / "docs" / "examples" / "train_ppo.py")
+    example = module_from_spec(place)
+    place.loader.exec_module(example)
+    for name, number in {"UPDATES": 2, "ROLLOUT": 60, "ENVIRONMENTS": 2, "BATCH": 40}.items():
+        monkeypatch.setattr(example, name, number)
+    example.main()
+    steps = re.findall(r"^ *(\d+) steps: return +-?[\d.]+$", capsys.readouterr().out, re.M)
+    assert steps == ["120", "240"]
+
+
+def test_the_policy_has_twenty_lines_at_most():
+    (policy,) = (block for block in fenced(ROOT / "README.md", "python") if "class Corridor" in block)
+    body = policy[policy.index("class Corridor") : policy.index("env = ")]
+    assert len([line for line in body.splitlines() if line.strip()]) <= 20
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\((?!http|#)([^)#]+)", page.read_text()):
+        assert (page.parent / target).exists(), target
+
+
+def test_every_environment_has_a_page():
+    text = "".join(page.read_text() for page in SITE if page.parent.name == "environments")
+    for entry_point in IDS.values():
+        assert f"::: {entry_point.replace(':', '.')}\n" in text
+
+
+def test_the_site_is_built_without_a_warning(tmp_path):
+    pytest.importorskip("material")
+    command = [sys.executable, "-m", "mkdocs", "build", "-f", ".mkdocs.yml", "--site-dir", str(tmp_path / "site")]
+    quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=ROOT, env=quiet, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stdout + done.stderr
+    page = (tmp_path / "site" / "environments" / "dense.html").read_text()
+    for part in ("CARE-Dense-v0", "Reward", "Episode end", "lidar_dropout", "vehicles", "encroachment_s"):
+        assert part in page
+    watch = (tmp_path / "site" / "watch.html").read_text()
+    assert [name for name in ENTITIES if f"<code>{name}</code>" not in watch] == []
+    wrappers = (tmp_path / "site" / "api" / "wrappers.html").read_text()
+    assert {*care_sim.wrappers.__all__} <= {*re.findall(r'<h2 id="[\w.]*\.(\w+)"', wrappers)}
+    for page in (tmp_path / "site").rglob("*.html"):
+        loaded = re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page.read_text())
+        assert loaded == [], f"{page.name} asks the network"
+
+
+def test_the_notebook_runs_from_top_to_bottom_and_is_kept_without_outputs():
+    client, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    pytest.importorskip("ipykernel")
+    book = nbformat.read(NOTEBOOK, as_version=4)
+    code = [cell for cell in book.cells if cell.cell_type == "code"]
+    assert all(cell.outputs == [] and cell.execution_count is None for cell in code)
+    client.NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    texts = "".join(output.text for cell in code for output in cell.outputs if output.output_type == "stream")
+    found = [float(number) for number in re.findall(r"detects the person at ([\d.]+) m", texts)]
+    assert len(found) == 3
+    assert found[1] > found[0], "CARE sees the person before history does"
+    pictures = [output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})]
+    assert len(pictures) == 2
+
+
+def test_the_citation_names_this_version():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()

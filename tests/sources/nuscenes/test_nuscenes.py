@@ -1,0 +1,229 @@
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.types import CLASSES
+from care_sim.loops.film import NOBODY, Annotations
+from care_sim.sources.nuscenes.categories import CATEGORIES, DETECTION_NAMES
+from care_sim.sources.nuscenes.splits import VAL, scenes
+from care_sim.sources.nuscenes.sweeps import owners, read_points
+from care_sim.sources.nuscenes.tables import Database
+from tests.helpers.nuscenes_database import SENSORS, annotated, as_recorded, change, pose, write
+from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
+
+UPRIGHT = Frame(0.0, 0.0, 1.8, 0.0)
+
+
+def test_a_scene_becomes_a_film(tmp_path):
+    movie = first(database(tmp_path))
+    (shot,) = movie.shots
+    assert (movie.name, movie.keyframe_s, shot.token) == (SCENE, 0.5, f"{SCENE}-0")
+    assert movie.sensor_height_m == pytest.approx(1.84023)
+    assert len(movie.cameras) == 6
+    assert shot.sensor.yaw == pytest.approx(0.0, abs=0.01)
+    assert CLASSES[shot.annotations.classes[0]] == "car"
+    assert shot.annotations.boxes[0, 3:6] == pytest.approx([4.6, 1.9, 1.7]), "length first"
+    world = shot.sensor.boxes_to_world(shot.annotations.boxes)[0]
+    assert world[:3] == pytest.approx([20.0, 2.0, 0.85])
+
+
+def test_the_cloud_holds_the_recorded_points_in_their_cells_on_their_objects(tmp_path):
+    (shot,) = first(database(tmp_path)).shots
+    cloud = shot.cloud
+    assert len(cloud) == 4, "the point on our own roof is left out"
+    assert np.array_equal(cloud.cells, AngularGrid().cells_of(cloud.points))
+    assert np.all(np.diff(cloud.cells) >= 0)
+    assert sorted(cloud.objects.tolist()) == [NOBODY, 0, 0, 0]
+    world = shot.sensor.origin + shot.sensor.vectors_to_world(cloud.points)
+    assert sorted(map(tuple, world.round(3).tolist())) == sorted(map(tuple, WORLD[:4].tolist()))
+
+
+def test_a_point_belongs_to_the_box_it_lies_in_as_the_box_is_turned():
+    boxes = np.array([[10.0, 0.0, 0.0, 8.0, 1.0, 2.0, np.pi / 4]])
+    on_the_diagonal, across_it = [12.0, 2.0, 0.0], [12.0, -2.0, 0.0]
+    annotations = Annotations(np.array([5]), np.array([0]), boxes)
+    assert owners(np.array([on_the_diagonal, across_it]), annotations, UPRIGHT).tolist() == [5, NOBODY]
+
+
+def test_boxes_stand_upright_however_the_sensor_leans():
+    """The sensor's front is 3 degrees down: 6 m off a bus's middle that makes 0.3 m."""
+    sensor = Frame(3.0, 1.0, 1.8, 0.4, pitch=np.deg2rad(3.0))
+    bus = np.array([[20.0, 2.0, 1.7, 12.0, 2.9, 3.4, 0.4]])
+    ends = bus[0, :3] + [[5.9 * np.cos(0.4), 5.9 * np.sin(0.4), h] for h in (1.6, -1.6, 1.8, -1.8)]
+    annotations = Annotations(np.array([7]), np.array([2]), sensor.boxes_to_local(bus))
+    found = owners(sensor.vectors_to_local(ends - sensor.origin), annotations, sensor)
+    assert found.tolist() == [7, 7, NOBODY, NOBODY]
+
+
+def test_a_point_in_two_boxes_belongs_to_the_smaller():
+    boxes = np.array([[10.0, 0, 0, 2, 2, 2, 0], [10.0, 0, 0, 9, 9, 9, 0], [10.0, 0, 0, 4, 4, 4, 0]])
+    annotations = Annotations(np.array([3, 4, 5]), np.zeros(3, np.int64), boxes)
+    points = np.array([[10.5, 0.0, 0.0], [11.5, 0.0, 0.0], [13.0, 0.0, 0.0]])
+    assert owners(points, annotations, UPRIGHT).tolist() == [3, 5, 4]
+
+
+def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
+    root = database(tmp_path)
+    between = {"token": "between", "is_key_frame": False, "filename": "sweeps/gone.pcd.bin"}
+    change(root, "sample_data", lambda rows: rows.append(rows[0] | between))
+    change(root, "ego_pose", lambda rows: rows.append(rows[0] | {"token": "between"}))
+    assert len(first(root).shots[0].cloud) == 4
+    tables = Database(root)
+    assert "between" not in {*tables.rows("sample_data"), *tables.rows("ego_pose")}, "they would fill the memory"
+
+
+def test_a_keyframe_without_annotations_plays(tmp_path):
+    (shot,) = first(database(tmp_path, [([], pose(), as_recorded(WORLD))])).shots
+    assert (len(shot.annotations), len(shot.sights.objects), len(shot.cloud)) == (0, 0, 4)
+
+
+def test_the_car_turns_and_drives_and_the_object_stays(tmp_path):
+    far = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a", yaw=0.3)
+    samples = [([far], pose(4.0 * n, 0.5 * n, 0.1 * n), as_recorded(WORLD)) for n in range(4)]
+    shots = first(database(tmp_path, samples)).shots
+    for shot in shots:
+        world = shot.sensor.boxes_to_world(shot.annotations.boxes)[0]
+        assert world[:3] == pytest.approx([20.0, 2.0, 0.85])
+        assert world[6] == pytest.approx(0.3, abs=1e-3)
+    assert [shot.time_s for shot in shots] == pytest.approx([0, 0.5, 1, 1.5])
+    assert shots[1].ego.yaw_rate == pytest.approx(0.2)
+    assert shots[1].ego.speed == pytest.approx(8 * np.cos(0.1) + 1 * np.sin(0.1))
+
+
+def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
+    near = (12.0, 0.0, 0.9)
+    size = (0.7, 0.7, 1.8)
+    boxes = [
+        annotated("human.pedestrian.adult", (near[0], y, near[2]), size, instance=name, visible=level)
+        for name, y, level in [("a", 3.0, "4"), ("b", 1.0, "2"), ("c", -1.0, "1"), ("d", -3.0, "")]
+    ]
+    (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
+    assert shot.annotations.objects.tolist() == [0, 1, 2, 3]
+    assert shot.sights.objects.tolist() == [0, 1, 3]
+    surest = shot.sights.detections.confidences
+    assert surest[1] < surest[0] < surest[2]
+    assert set(shot.sights.detections.cameras.tolist()) == {0}
+
+
+def test_an_object_too_small_for_a_picture_has_no_box(tmp_path):
+    boxes = [annotated("human.pedestrian.adult", (d, 0.0, 0.9), (0.7, 0.7, 1.8), instance=f"{d}") for d in (20, 130)]
+    (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
+    assert len(shot.annotations) == 2
+    assert len(shot.sights.objects) == 1
+
+
+@pytest.mark.parametrize("channel", [name for name in SENSORS if name.startswith("CAM")])
+def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
+    """Mount, roll and principal point: pixels of the recorded picture come back to a tenth of a pixel."""
+    movie = first(database(tmp_path))
+    camera = movie.cameras[list(SENSORS)[1:].index(channel)]
+    translation, (w, x, y, z), (focal, u, v) = SENSORS[channel]
+    pixels = np.array([[80.0, 100.0], [800.0, 450.0], [1500.0, 850.0]])
+    rays = np.column_stack([(pixels - (u, v)) / focal, np.ones(3)])
+    points = np.add(translation, Rotation.from_quat([x, y, z, w]).apply(rays) * 30)
+    sensor = movie.shots[0].sensor
+    shown, depth = camera.project(sensor.vectors_to_local(points - sensor.origin))
+    assert np.all(depth > 0)
+    shift = np.array([camera.width, camera.height]) / 2 - (u, v)
+    assert shown - shift == pytest.approx(pixels, abs=0.1)
+    assert (shift >= 0).all(), "the recorded picture lies within"
+    spare = np.array([camera.width, camera.height]) - (1600, 900)
+    assert (shift <= spare).all()
+    assert (spare < 110).all()
+
+
+def test_every_category_of_the_taxonomy_has_its_place():
+    assert len(CATEGORIES) == 23 + 9, "the 23 of the annotations, and 9 more of the lidarseg extension"
+    assert {*CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
+    assert len(DETECTION_NAMES) == 10
+
+
+def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
+    boxes = [CAR, annotated("vehicle.trailer", (30, 0, 2)), annotated("vehicle.bicycle", (9, 3, 0.6), points=0)]
+    (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
+    assert len(shot.annotations) == 1
+
+
+def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
+    waiting, seen = (
+        annotated("human.pedestrian.adult", (30.0, 4.0, 0.9), (0.7, 0.7, 1.8), instance="w", points=n) for n in (0, 5)
+    )
+    trailer = annotated("vehicle.trailer", (30, 0, 2), points=0)
+    samples = [([CAR, waiting, trailer], pose(), as_recorded(WORLD)), ([CAR, seen], pose(4.0), as_recorded(WORLD))]
+    movie = first(database(tmp_path, samples))
+    assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
+    assert movie.hidden.objects.tolist() == [number for number in movie.shots[1].annotations.objects if number]
+    world = movie.shots[0].sensor.boxes_to_world(movie.hidden.boxes)
+    assert world[0, :3] == pytest.approx([30.0, 4.0, 0.9])
+
+
+def test_the_validation_split_holds_the_150_scenes_of_the_devkit():
+    assert len(VAL) == len(set(VAL)) == 150
+    assert {VAL[0], VAL[-1], "scene-0103", "scene-0916"} <= set(VAL)
+    assert {"scene-0061", "scene-0553"} - set(VAL) == {"scene-0061"}, "train, and val"
+    assert {"scene-0037", "scene-0628", "scene-0918", "scene-0970", "scene-1074"}.isdisjoint(VAL)
+
+
+def test_splits_choose_scenes(tmp_path):
+    sample = [([CAR], pose(), as_recorded(WORLD))]
+    root = write(tmp_path, {"scene-0061": sample, "scene-0103": sample, "scene-0916": sample})
+    tables = Database(root)
+    assert [row["name"] for row in scenes(tables)] == ["scene-0103", "scene-0916"]
+    assert len(scenes(tables, "all")) == 3
+    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps({"mine": ["scene-0061"], "gone": ["scene-9"]}))
+    assert [row["name"] for row in scenes(tables, "mine")] == ["scene-0061"]
+    with pytest.raises(InvalidInput, match=r"splits.json: the split 'gone' names 'scene-9'"):
+        scenes(tables, "gone")
+    with pytest.raises(InvalidInput, match="unknown split 'x'; known: all, gone, mine, val"):
+        scenes(tables, "x")
+
+
+def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
+    root = write(tmp_path, {"scene-0061": [([CAR], pose(), as_recorded(WORLD))]})
+    with pytest.raises(InvalidInput, match=r"scene.json: holds no scene of the split 'val'; splits it holds: all$"):
+        scenes(Database(root))
+    own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
+    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
+    with pytest.raises(InvalidInput, match=r"the split 'val'; splits it holds: all, mine$"):
+        scenes(Database(root))
+
+
+@pytest.fixture
+def sweep(recorded):
+    (path,) = (recorded / "nuscenes").glob("*.pcd.bin")
+    rings = np.fromfile(path, "<f4").reshape(-1, 5)[:, 4].astype(int)
+    return read_points(path), rings
+
+
+def test_every_real_point_off_our_own_car_falls_inside_the_grid(sweep):
+    points, _ = sweep
+    ranges = np.linalg.norm(points, axis=1)
+    inside = AngularGrid().cells_of(points) >= 0
+    assert inside.mean() == pytest.approx(0.945, abs=0.001)
+    assert inside[ranges > 1.0].all()
+    assert ranges[~inside].max() < 1.0
+
+
+def test_real_rings_are_rows_one_to_one(sweep):
+    """Ring 0 is the lowest. Near the sensor points stray by a row: lasers stand at different places in their head."""
+    points, rings = sweep
+    ranges = np.linalg.norm(points, axis=1)
+    rows = AngularGrid().cells_of(points) // AngularGrid().columns
+    medians = [np.median(rows[(ranges > 1.0) & (rings == ring)]) for ring in range(32)]
+    assert medians == [31 - ring for ring in range(32)]
+    own_row = rows == 31 - rings
+    assert own_row[ranges > 8.0].all()
+    assert own_row[ranges > 1.0].mean() == pytest.approx(0.875, abs=0.001)
+
+
+def test_the_real_sweep_plays_in_a_scene(tmp_path, sweep):
+    points, rings = sweep
+    rows = np.column_stack([-points[:, 1], points[:, 0], points[:, 2], np.zeros(len(points)), rings])
+    (shot,) = first(database(tmp_path, [([CAR], pose(), rows)])).shots
+    ranges = np.linalg.norm(points, axis=1)
+    assert len(shot.cloud) == np.sum((ranges > 1.0) & (ranges <= 50.0))

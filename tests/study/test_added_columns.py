@@ -1,0 +1,30 @@
+from care_sim.study.added_columns import annotated
+from tests.helpers.made_rows import rows
+
+
+def columns(study, policy):
+    return [(row["regret_m"], row["censored"]) for row in annotated(study) if row["policy"] == policy]
+
+
+def test_the_regret_of_every_episode_stands_beside_it():
+    study = [*rows("history", [4.0, None, 9.0]), *rows("full", [15.0, 16.0, None])]
+    assert columns(study, "history") == [(11.0, False), (13.0, True), (-6.0, True)]
+    assert columns(study, "full") == [(0.0, False), (0.0, False), (0.0, True)]
+
+
+def test_without_the_full_scan_of_the_same_world_there_is_no_regret():
+    elsewhere = rows("full", [15.0, 15.0], scenario_parameters=(("vehicles", 3),))
+    study = [*rows("care", [14.0, None]), *elsewhere]
+    assert columns(study, "care") == [(None, False), (None, True)]
+
+
+def test_what_was_there_stays_and_tags_are_text():
+    (before,) = rows("care", [14.0])
+    (after,) = annotated([before])
+    assert before.items() <= after.items()
+    assert after["tags"] == "causal"
+
+
+def test_a_camera_fault_is_measured_against_the_full_scan_that_asks_no_camera():
+    faulty = rows("care", [14.0], scenario="dartout", budget=0.1, false_negative_rates=(0.2,))
+    assert columns([*faulty, *rows("full", [15.0], scenario="dartout")], "care") == [(1.0, False)]

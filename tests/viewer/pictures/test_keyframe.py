@@ -1,0 +1,104 @@
+"""The picture of a keyframe: it shows what happened, and taking it changes nothing."""
+
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.core.grid import AngularGrid
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.envs import CLOSED_LOOP
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.keyframe import BRAKING, DETECTED, HEIGHT, HIDDEN, TRACKED, WIDTH, draw_keyframe
+
+
+def make(name, **arguments):
+    env = gymnasium.make(name, disable_env_checker=True, **arguments)
+    return env, care_sim.make_policy("care", env)
+
+
+def shows(picture, colour, at_least=20):
+    return np.all(picture == colour, axis=-1).sum() >= at_least
+
+
+def play(name, keyframes, *, draw):
+    env, policy = make(name, render_mode="rgb_array" if draw else None)
+    observation, _ = env.reset(seed=0)
+    seen = [observation]
+    for _ in range(keyframes):
+        if draw:
+            env.render()
+        observation, *_ = env.step(policy(observation))
+        seen.append(observation)
+    env.close()
+    return seen
+
+
+@pytest.fixture(scope="module")
+def dense():
+    """The dense street at the first keyframe the person is detected and the car brakes."""
+    env, policy = make("CARE-Dense-v0", render_mode="rgb_array")
+    observation, _ = env.reset(seed=0)
+    frame = None
+    while frame is None or not (frame.detected and frame.braking):
+        observation, _, terminated, truncated, _ = env.step(policy(observation))
+        assert not terminated
+        assert not truncated
+        frame = env.unwrapped.keyframes[-1]
+    yield env
+    env.close()
+
+
+@pytest.mark.parametrize("name", CLOSED_LOOP)
+def test_it_has_one_size_before_and_after_the_first_scan(name):
+    env, policy = make(name, render_mode="rgb_array")
+    observation, _ = env.reset(seed=1)
+    before = env.render()
+    env.step(policy(observation))
+    after = env.render()
+    env.close()
+    for picture in (before, after):
+        assert picture.shape == (HEIGHT, WIDTH, 3)
+        assert picture.dtype == np.uint8
+    assert np.any(before != after)
+    assert shows(before, HIDDEN)
+
+
+def test_rendering_changes_no_observation():
+    for plain, drawn in zip(play("CARE-Dense-v0", 6, draw=False), play("CARE-Dense-v0", 6, draw=True), strict=True):
+        assert all(np.array_equal(plain[key], drawn[key]) for key in plain)
+
+
+def test_the_same_keyframe_gives_the_same_picture(dense):
+    assert np.array_equal(dense.render(), dense.render())
+
+
+def test_it_says_what_happened(dense):
+    picture = dense.render()
+    assert shows(picture, BRAKING, 1000)
+    assert shows(picture, DETECTED, 50)
+    assert shows(picture, TRACKED, 500)
+    loop, frame = dense.unwrapped.loop, dense.unwrapped.keyframes[-1]
+    calm = draw_keyframe(loop, replace(frame, braking=False, detected=False))
+    assert not shows(calm, BRAKING)
+    assert not shows(calm, DETECTED)
+
+
+def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
+    grid = AngularGrid(columns=8, rows=2)
+    ranges = np.zeros(grid.shape)
+    left, right = 6, 1
+    ranges[0, left], ranges[1, right] = grid.range_m, 10.0
+    picture = np.asarray(drawing.grid_picture(grid, ranges, 3))
+    assert picture.shape == (6, 8, 3)
+    assert tuple(picture[0, 1]) == drawing.NO_RETURN
+    assert tuple(picture[5, 6]) == tuple(drawing.range_colours(np.array([0.2]))[0])
+    assert tuple(picture[5, 1]) == drawing.NOT_FIRED
+
+
+def test_points_behind_the_camera_are_not_marked():
+    camera = PinholeCamera(100, 50)
+    assert drawing.point_above(camera, np.array([5.0, 0, 0, 1, 1, 1, 0])) is not None
+    assert drawing.point_above(camera, np.array([-5.0, 0, 0, 1, 1, 1, 0])) is None
