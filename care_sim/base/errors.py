@@ -2,7 +2,8 @@
 
 import math
 import os
-from collections.abc import Container, Iterable
+import sys
+from collections.abc import Container, Iterable, Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -140,3 +141,9 @@ def check_choice(name: str, value: object, choices: Container[object]) -> None:
     if value is not None and not (isinstance(value, str) and value in choices):
         named = " or ".join(map(repr, choices)) if isinstance(choices, Iterable) else str(choices)
         raise InvalidInput(f"{name} must be None or {named}, got {shown(value)}")
+
+
+def report_problems(problems: Sequence[str]) -> None:
+    """Print them, a line each, where complaints go."""
+    for problem in problems:
+        print(f"care-sim: {one_line(problem)}", file=sys.stderr)

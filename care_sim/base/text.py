@@ -8,3 +8,13 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+
+
+def percent(budget: float) -> str:
+    """A budget as people read it."""
+    return f"{100 * budget:.3g}%"
+
+
+def counted(count: int, unit: str) -> str:
+    """A number of things, as a sentence says it."""
+    return f"{count:,} {unit}{'' if count == 1 else 's'}"

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import LARGEST, InvalidInput
+from care_sim.base.errors import LARGEST, InvalidInput, report_problems
 from care_sim.commands.shared.options import USUAL, Options, seeds_of
-from care_sim.commands.shared.running import CORES, MOST_WORKERS, Running, console, in_turn, playable, report_problems
+from care_sim.commands.shared.running import Running, console, in_turn, playable
+from care_sim.study.executors import CORES, MOST_WORKERS
 
 if TYPE_CHECKING:
     from care_sim.policies.base import Policy
@@ -229,7 +230,7 @@ class Report:
         from care_sim.base.extras import check_page
 
         check_page()
-        from care_sim.reports.formatting import counted
+        from care_sim.base.text import counted
         from care_sim.reports.page.build import write_page
 
         page = write_page(self.folder, path, self.episodes, self.workers)

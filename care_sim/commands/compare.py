@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.options import USUAL, Options
-from care_sim.commands.shared.running import DONE, FAILED, console, playable, report_problems
+from care_sim.commands.shared.running import DONE, FAILED, console, playable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

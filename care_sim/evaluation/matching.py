@@ -8,7 +8,7 @@ from scipy.spatial.distance import cdist
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 from care_sim.core.types import Detections
-from care_sim.loops.film import Annotations
+from care_sim.sensors.annotated import Annotations
 
 MATCH_M = 2.0
 """Greatest planar distance between the centres of an object and of its detection, this value included."""

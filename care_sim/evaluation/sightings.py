@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from care_sim.base.errors import InvalidInput, check_number, shown
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
-from care_sim.loops.film import NO_ANNOTATIONS, Annotations
+from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 
 RANGE_M = 50.0
 """R: planar distance from the sensor to the centre of the box, this value included (paper, Remark 1)."""

@@ -13,10 +13,11 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.types import Detections, Rig, Scan, Tracks
 from care_sim.driving.odometry import Odometry
-from care_sim.loops.film import Cloud, Film, Shot
+from care_sim.loops.film import Film, Shot
 from care_sim.perception.proxy import Detector
 from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
+from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
 from care_sim.sensors.recorded_lidar import RecordedLidar

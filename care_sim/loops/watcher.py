@@ -11,7 +11,7 @@ from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.types import Action, Belief, Demand, ImageDetections, Keyframe
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.film import NOBODY, Sights
+from care_sim.sensors.annotated import NOBODY, Sights
 from care_sim.sensors.camera import sights_of
 
 

@@ -12,7 +12,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.frames import Floats, turned
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Detections
-from care_sim.loops.film import NOBODY, Annotations, Cloud
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
 MOST_DETECTIONS = 500
 """Boxes a keyframe: as many as the official nuScenes evaluation takes."""

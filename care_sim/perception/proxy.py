@@ -14,7 +14,7 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import Detections
-from care_sim.loops.film import Annotations, Cloud
+from care_sim.sensors.annotated import Annotations, Cloud
 from care_sim.world.bullet import Integers
 
 

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from care_sim.reports.contrasts import DETECTION, Contrast, contrast
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.summary import Cell, Key, grouped, summarise, tags_of_row
+from care_sim.reports.summary import Cell, summarise
+from care_sim.study.row_reading import Key, grouped, tags_of_row
 from care_sim.study.task import Row
 
 

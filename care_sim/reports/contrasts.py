@@ -6,8 +6,8 @@ Policies are compared seed by seed, because a seed fixes world, faults and floor
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.censoring import Difference, Reading, difference
+from care_sim.study.row_reading import detection
 from care_sim.study.task import Row
 
 GATE_M = 2.5
@@ -27,20 +27,6 @@ class Measure:
     decimals: int
     gate: float
     read: Callable[[Row], Reading]
-
-
-def detection(row: Row) -> Reading:
-    """Detection distance in metres; of an actor never detected, the most it can have been.
-
-    Raises InvalidInput for a row that has neither.
-    """
-    distance, most = row["detection_distance_m"], row["undetected_to_m"]
-    if distance is None and most is None:
-        raise InvalidInput(
-            f"{row['scenario']} {row['policy']} seed {row['seed']}: one of detection_distance_m and undetected_to_m "
-            "must be given"
-        )
-    return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
 
 
 DETECTION = Measure("First detection", "m", 1, GATE_M, detection)

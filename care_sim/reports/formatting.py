@@ -17,16 +17,6 @@ MEANINGS = {
 }
 
 
-def percent(budget: float) -> str:
-    """A budget as people read it."""
-    return f"{100 * budget:.3g}%"
-
-
-def counted(count: int, unit: str) -> str:
-    """A number of things, as a sentence says it."""
-    return f"{count:,} {unit}{'' if count == 1 else 's'}"
-
-
 def marked(policy: str, tags: tuple[str, ...]) -> str:
     """The policy, with a mark when no car can have it."""
     marks = "".join(mark for tag, mark in MARKS.items() if tag in tags)

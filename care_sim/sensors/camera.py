@@ -10,7 +10,7 @@ from care_sim.core.frames import Floats
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
-from care_sim.loops.film import Sights
+from care_sim.sensors.annotated import Sights
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.picture_kernels import tally

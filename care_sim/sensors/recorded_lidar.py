@@ -5,7 +5,7 @@ import numpy as np
 from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Floats
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.loops.film import Cloud
+from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.lidar import dead_cells, noisy
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.loops.film import NOBODY, Cloud, Sights
+from care_sim.sensors.annotated import NOBODY, Cloud, Sights
 from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
 from care_sim.world.bullet import NOTHING, BulletWorld, Integers
 

@@ -9,7 +9,7 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
-from care_sim.loops.film import Annotations, Cloud, Sights
+from care_sim.sensors.annotated import Annotations, Cloud, Sights
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
 from care_sim.world.bodies import sized
 from care_sim.world.bullet import BulletWorld

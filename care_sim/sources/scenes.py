@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput, check_known, shortened
 from care_sim.loops.film import Film
 from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street, street_name
-from care_sim.study.provenance import data_digest, file_digest
 
 
 class Scene(NamedTuple):

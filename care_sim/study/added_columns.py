@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from care_sim.policies import tags_of
-from care_sim.reports.contrasts import detection
-from care_sim.reports.summary import Setting, setting_of
+from care_sim.study.row_reading import Setting, detection, setting_of
 from care_sim.study.task import Row
 
 Worlds = dict[tuple[Setting, int], Row]

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -152,3 +153,11 @@ def _is_death(error: BaseException) -> bool:
     from dask.distributed import KilledWorker
 
     return isinstance(error, KilledWorker)
+
+
+MOST_WORKERS = 1024
+"""A process each takes 100 MB."""
+
+
+CORES = min(os.cpu_count() or 1, MOST_WORKERS)
+"""Workers unless another number is asked for."""

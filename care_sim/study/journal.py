@@ -106,3 +106,6 @@ def _read(line: str) -> Row | None:
 
 def _checksum(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+JOURNAL = "journal.jsonl"

@@ -1,7 +1,9 @@
 """The parameters of a task: what values they may have, so that journals and columns hold them as they are."""
 
+import ast
 import os
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,3 +74,26 @@ def _kind(value: Any) -> Any:
     if len(kinds) > 1:
         raise ValueError
     return (*kinds,)
+
+
+LONGEST = 8192
+"""Characters of a parameter: a path and its name fit."""
+
+
+def parameters(texts: Sequence[str]) -> "Parameters":
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
+    return tuple(_pair(text) for text in texts)
+
+
+def _pair(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
+    if len(text) > LONGEST:
+        raise InvalidInput(f"a parameter must be at most {LONGEST} characters long, got {shown(text)}")
+    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
+        try:
+            literal = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+            literal = value  # no literal, or one nested deeper than any parameter is
+    return name, tuple(literal) if isinstance(literal, list) else literal

@@ -1,18 +1,16 @@
 """Where results come from: the code, the libraries and the machine that made them."""
 
-import hashlib
 import os
 import platform
-from collections.abc import Iterable
-from functools import cache, lru_cache
+from functools import cache
 from importlib import metadata
 from importlib.metadata import EntryPoint
-from itertools import islice
 from pathlib import Path
 from uuid import uuid4
 
 import care_sim
 from care_sim.base import package_files as belongings
+from care_sim.base.digests import _combined, _content, file_digest
 from care_sim.perception.listing import BUILT_IN as BUILT_IN_DETECTORS
 from care_sim.perception.listing import entries as detector_entries
 from care_sim.policies import BUILT_IN
@@ -26,8 +24,6 @@ SHIPPED = Path(care_sim.__file__).parent / "policies" / "learned" / "shipped"
 """Where the weights lie that come with the package."""
 CODE = (".py", ".so", ".pyd")
 """Endings of what a process loads once."""
-MOST_FILES = 10_000
-"""Files of a folder whose content is hashed: a second of work."""
 
 SESSION = uuid4().hex
 """Names this run of the program; no other run has it."""
@@ -49,39 +45,6 @@ def policy_digest(policy: str) -> str | None:
 def detector_digest(detector: str) -> str | None:
     """The same of a detector."""
     return "" if detector in BUILT_IN_DETECTORS else _entry_digest(detector_entries()[detector])
-
-
-def file_digest(path: Path) -> str | None:
-    """Hash of the content of a file, or of the files below a folder and their names; empty where there is neither,
-    None of a folder with more than `MOST_FILES`.
-    """
-    found = [path] if path.is_file() else [*islice(filter(Path.is_file, path.rglob("*")), MOST_FILES + 1)]
-    if len(found) > MOST_FILES:
-        return None
-    hashes = [f"{file.relative_to(path)} {_content(file)}" for file in sorted(found) if file.suffix != ".pyc"]
-    return _combined(hashes) if hashes else ""
-
-
-def _content(path: Path) -> str:
-    """Hash of a file as it is now."""
-    stat = path.stat()
-    return _hashed(path, stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
-
-
-@lru_cache(maxsize=10_000)
-def _hashed(path: Path, *_identity: int) -> str:
-    """Hash of a file that has not changed since it was last hashed."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
-
-
-def _combined(digests: Iterable[str]) -> str:
-    return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
-
-
-def data_digest(paths: Iterable[Path]) -> str:
-    """Hash of the content of several files."""
-    return _combined(str(file_digest(path)) for path in paths)
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:

@@ -11,13 +11,14 @@ from typing import Any, Self
 import gymnasium
 
 import care_sim
+from care_sim.base.digests import file_digest
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.package_files import paths
 from care_sim.core.conditions import DEFAULTS, UNFELT_BY_FULL
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.parameters import Parameters, settled
-from care_sim.study.provenance import SESSION, code_digest, file_digest, policy_digest
+from care_sim.study.provenance import SESSION, code_digest, policy_digest
 
 Row = dict[str, Any]
 

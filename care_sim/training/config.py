@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Literal
 
 from care_sim.base.bounds import bounded, settle
 from care_sim.base.errors import LARGEST, InvalidInput
-from care_sim.commands.shared.options import parameters
 from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.envs.reward import HEAVIEST
 from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.study.parameters import parameters
 from care_sim.training.seeds import TRAINING, VALIDATION
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")

@@ -11,7 +11,7 @@ import pytest
 import care_sim
 from care_sim.base.bounds import allowed, bounded, settle
 from care_sim.base.errors import InvalidInput, check_path, check_whole, one_line, shown
-from care_sim.commands.shared.options import parameters, seeds_of
+from care_sim.commands.shared.options import seeds_of
 from care_sim.core.allocation import allocate
 from care_sim.core.conditions import Conditions
 from care_sim.core.forgetting import ForgettingRules
@@ -24,6 +24,7 @@ from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.dartout import Dartout
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.executors import cluster
+from care_sim.study.parameters import parameters
 from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
 
 NO_NUMBERS = (float("nan"), float("inf"), 10**400, 10**5000, -1e300, 1e300, Decimal(1), 1j, True, "1", None, [1], {1})

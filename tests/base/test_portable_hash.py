@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from care_sim.base.portable_hash import STEP, imprint
-from care_sim.loops.film import NO_ANNOTATIONS, Annotations
+from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import make_street
 from care_sim.study.episode_config import EpisodeConfig

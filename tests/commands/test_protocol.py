@@ -10,14 +10,15 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
+from care_sim.commands.shared.conduct import conduct
 from care_sim.core.conditions import Conditions
 from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_of
-from care_sim.reports.report import JOURNAL, conduct, reported
+from care_sim.reports.report import reported
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.scenes import Scene, Streets, chosen, source_of
 from care_sim.study import scene_play as plays
-from care_sim.study.journal import Journal
+from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
 from care_sim.study.results_files import PLAYS
 from care_sim.study.runner import run_all

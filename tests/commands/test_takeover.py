@@ -7,13 +7,14 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
+from care_sim.commands.shared.conduct import conduct
 from care_sim.commands.shared.takeover import check_results
 from care_sim.evaluation.sightings import PRESENCES
-from care_sim.reports.report import JOURNAL, conduct, write_report
+from care_sim.reports.report import write_report
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.scenes import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
-from care_sim.study.journal import Journal
+from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid
 from care_sim.study.results_files import _PARAMETERS, EPISODES, KINDS, PLAYS
 from care_sim.study.rows import read_notes, read_rows, write_rows

@@ -12,9 +12,10 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import camera_layers, explained
 from care_sim.core.types import CLASSES, MAX_DETECTIONS, MAX_TRACKS, Belief, Ego, ImageDetections, Rig, Tracks
 from care_sim.envs.spaces import observation_space
-from care_sim.loops.film import Annotations, Cloud, Film, Shot, Sights
+from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.proxy import ReturnsProxy
+from care_sim.sensors.annotated import Annotations, Cloud, Sights
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)

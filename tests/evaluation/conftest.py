@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES, Detections
-from care_sim.loops.film import Annotations
+from care_sim.sensors.annotated import Annotations
 
 
 def columns(classes, centres):

@@ -11,7 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import turned
 from care_sim.core.types import Detections
 from care_sim.evaluation.matching import found
-from care_sim.loops.film import Annotations
+from care_sim.sensors.annotated import Annotations
 
 
 @pytest.mark.parametrize(("distance", "matches"), [(0.0, True), (1.99, True), (2.01, False)])

@@ -11,7 +11,7 @@ from care_sim.core.types import Detections
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import Score, Tally, score
 from care_sim.evaluation.sightings import Sightings
-from care_sim.loops.film import Annotations
+from care_sim.sensors.annotated import Annotations
 
 NONE = np.zeros(0, bool)
 SEEDS = st.integers(0, 2**32 - 1)

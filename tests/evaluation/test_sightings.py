@@ -9,7 +9,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE, Sightings, check_presence
-from care_sim.loops.film import Annotations
+from care_sim.sensors.annotated import Annotations
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -8,10 +8,11 @@ import pytest
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections, Rig
-from care_sim.loops.film import NOBODY, Annotations, Cloud, Film, Shot, Sights
+from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, Sights
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)

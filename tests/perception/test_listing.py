@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.loops.film import Annotations, Cloud
 from care_sim.perception.listing import ENTRY_POINTS, detector_names, make_detector
 from care_sim.perception.points_only import BrokenDetector, PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
+from care_sim.sensors.annotated import Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
 
 POINTS = shell(8, 6, 0.4, 4.61, 1.95, 1.72)

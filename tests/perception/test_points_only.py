@@ -5,9 +5,9 @@ import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.types import Detections
-from care_sim.loops.film import NOBODY, Annotations, Cloud
 from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
 from care_sim.perception.proxy import ReturnsProxy
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
 
 CAR = np.array([8.0, 6.0, 0.86 - HEIGHT, 4.61, 1.95, 1.72, 0.4])

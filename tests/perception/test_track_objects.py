@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from care_sim.loops.film import NOBODY
 from care_sim.perception.track_objects import Identities
+from care_sim.sensors.annotated import NOBODY
 
 PRESENT = {30: np.full(7, 100.0), 7: np.full(7, 200.0)}
 

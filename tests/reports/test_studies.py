@@ -5,7 +5,8 @@ import pytest
 from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
-from care_sim.reports.report import conduct, print_report, write_report
+from care_sim.commands.shared.conduct import conduct
+from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.reports.tables import ablations, crowding, faults
 from care_sim.study.added_columns import annotated

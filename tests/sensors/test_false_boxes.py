@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.loops.film import Sights
 from care_sim.scenarios.dense import Dense
+from care_sim.sensors.annotated import Sights
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, TRIES, Ghosts, Pool
 from care_sim.sensors.surround import SURROUND_CAMERAS

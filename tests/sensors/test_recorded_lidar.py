@@ -5,7 +5,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
-from care_sim.loops.film import NOBODY, Cloud
+from care_sim.sensors.annotated import NOBODY, Cloud
 from care_sim.sensors.recorded_lidar import RecordedLidar
 
 CELLS = np.array([100, 100, 700, 9000, 16000])

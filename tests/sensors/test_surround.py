@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import Frame
-from care_sim.loops.film import NOBODY
+from care_sim.sensors.annotated import NOBODY
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NOTHING, BulletWorld

@@ -13,11 +13,10 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.reports.report import JOURNAL
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.executors import cluster
-from care_sim.study.journal import Journal
+from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.runner import Audience, run_all
 
 MEASURED = {"wall_s", "peak_rss_mb"}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from care_sim.base import package_files as belongings
+from care_sim.commands.shared.conduct import conduct
 from care_sim.policies.installed import entries
-from care_sim.reports.report import JOURNAL, conduct
 from care_sim.sources.scenes import source_of
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.journal import Journal
+from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import play_grid
 from care_sim.study.provenance import code_digest, detector_digest, policy_digest
 from care_sim.study.results_files import EPISODES

@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 
-from care_sim.reports.report import JOURNAL
+from care_sim.study.journal import JOURNAL
 from tests.helpers.descendants import Marked, until
 
 COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'care-sim'; from care_sim.cli import main; main()"]

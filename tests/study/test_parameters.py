@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.conduct import conduct
 from care_sim.commands.shared.takeover import check_results
-from care_sim.reports.report import conduct
 from care_sim.reports.studies import SWEEP
-from care_sim.reports.summary import policy_of
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.journal import Journal
 from care_sim.study.parameters import settled
+from care_sim.study.row_reading import policy_of
 from care_sim.study.rows import read_rows, write_rows
 
 ANYTHING = """

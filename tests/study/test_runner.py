@@ -12,11 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.conduct import conduct
 from care_sim.core.types import Outcome
-from care_sim.reports.report import JOURNAL, conduct
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import answer, run_episode, trace
-from care_sim.study.journal import Journal
+from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.results_files import EPISODES
 from care_sim.study.rows import read_rows
 from care_sim.study.runner import Audience, run_all

@@ -16,8 +16,8 @@ import uuid
 from contextlib import suppress
 from pathlib import Path
 
-from tests.torture.case import Fault
 from tests.helpers.places import ROOT
+from tests.torture.case import Fault
 
 MARK = "CARE_SIM_TORTURE"
 MEMORY = 2**30

@@ -1,19 +1,15 @@
 """What several commands take: conditions that all episodes share, parameters as NAME=VALUE, seeds."""
 
-import ast
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import Conditions
+from care_sim.study.parameters import parameters
 
 if TYPE_CHECKING:
-    from care_sim.study.parameters import Parameters
-
-LONGEST = 8192
-"""Characters of a parameter: a path and its name fit."""
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,22 +47,3 @@ def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
             f"or a list of seeds, got {shown(numbers[0])}"
         )
     return range(numbers[0]) if len(numbers) == 1 else numbers
-
-
-def parameters(texts: Sequence[str]) -> "Parameters":
-    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
-    return tuple(_pair(text) for text in texts)
-
-
-def _pair(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
-    if len(text) > LONGEST:
-        raise InvalidInput(f"a parameter must be at most {LONGEST} characters long, got {shown(text)}")
-    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
-        try:
-            literal = ast.literal_eval(value)
-        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
-            literal = value  # no literal, or one nested deeper than any parameter is
-    return name, tuple(literal) if isinstance(literal, list) else literal

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from care_sim.commands.shared.options import parameters
 from care_sim.core.conditions import Conditions
+from care_sim.study.parameters import parameters
 
 if TYPE_CHECKING:
     from care_sim.sources.scenes import Source

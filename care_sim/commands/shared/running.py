@@ -1,6 +1,5 @@
 """How a command plays a study: over workers, into a folder, with what is left out named."""
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.options import USUAL
+from care_sim.study.executors import CORES, MOST_WORKERS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,11 +19,6 @@ if TYPE_CHECKING:
 DONE, FAILED = 0, 1
 PIPE_WIDTH = 180
 """Columns of a table that is not printed on a terminal."""
-
-MOST_WORKERS = 1024
-"""A process each takes 100 MB."""
-CORES = min(os.cpu_count() or 1, MOST_WORKERS)
-"""Workers unless another number is asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +38,8 @@ class Running:
 
     def conduct(self, study: str, configs: "Sequence[Task]", out: Path, left_out: Sequence[str] = ()) -> int:
         """Play the tasks, print their tables, name those that failed and the policies that were left out."""
-        from care_sim.reports.report import conduct, print_report, reported, summary
+        from care_sim.commands.shared.conduct import conduct, summary
+        from care_sim.reports.report import print_report, reported
         from care_sim.reports.studies import STUDIES
         from care_sim.study import executors
 
@@ -77,12 +73,6 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
     if several and one != getattr(USUAL, name):
         raise InvalidInput(f"give {name} one value or several, not both")
     return several or (one,)
-
-
-def report_problems(problems: Sequence[str]) -> None:
-    """Print them, a line each, where complaints go."""
-    for problem in problems:
-        print(f"care-sim: {one_line(problem)}", file=sys.stderr)
 
 
 def console() -> "Console":

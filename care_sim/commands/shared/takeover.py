@@ -4,8 +4,8 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from care_sim.base.errors import InvalidInput
+from care_sim.base.text import counted
 from care_sim.core.conditions import DEFAULTS
-from care_sim.reports.formatting import counted
 from care_sim.reports.studies import SWEEP, Study
 from care_sim.study.journal import Journal
 from care_sim.study.results_files import KINDS, is_parameter

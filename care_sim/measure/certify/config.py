@@ -8,7 +8,7 @@ import tyro
 
 from care_sim.base.bounds import bounded, settle
 from care_sim.base.errors import InvalidInput, check_whole
-from care_sim.commands.shared.running import MOST_WORKERS
+from care_sim.study.executors import MOST_WORKERS
 
 EPISODES, ALL_EPISODES = 1_000, 10_000
 

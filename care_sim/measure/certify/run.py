@@ -4,8 +4,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 
-from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.commands.shared.running import report_problems
+from care_sim.base.errors import InvalidInput, MissingExtra, report_problems
 from care_sim.measure.certify.config import CertifyConfig
 from care_sim.measure.certify.design import drawn
 from care_sim.measure.certify.needs import playable

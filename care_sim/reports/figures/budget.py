@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
+from care_sim.base.text import percent
 from care_sim.reports.figures.styles import FULL, Style, styles
-from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.summary import Cell, summarise
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.task import Row

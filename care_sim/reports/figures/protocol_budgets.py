@@ -3,10 +3,11 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from care_sim.base.text import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.styles import FULL as FULL_STYLE
 from care_sim.reports.figures.styles import styles
-from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import Plays
 from care_sim.study.task import FULL, REFERENCE

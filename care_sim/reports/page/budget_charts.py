@@ -5,8 +5,9 @@ from typing import Any
 
 import altair as alt
 
+from care_sim.base.text import counted, percent
 from care_sim.reports.figures.budget import DODGE, SPREAD
-from care_sim.reports.formatting import counted, marked, percent, spread, tag_notes
+from care_sim.reports.formatting import marked, spread, tag_notes
 from care_sim.reports.page.chart import FULL_SCAN, Chart, Look, apart, budget_axis, budgets_text, inline, specification
 from care_sim.reports.summary import Cell, summarise
 from care_sim.study.task import FULL, Row

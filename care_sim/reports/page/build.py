@@ -15,7 +15,7 @@ from markupsafe import Markup
 import care_sim
 from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
-from care_sim.reports.formatting import counted
+from care_sim.base.text import counted
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts

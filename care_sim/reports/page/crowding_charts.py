@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 import altair as alt
 
+from care_sim.base.text import counted, percent
 from care_sim.reports.figures.crowding import PALE
-from care_sim.reports.formatting import counted, interval, mean, percent
+from care_sim.reports.formatting import interval, mean
 from care_sim.reports.page.chart import Chart, inline, specification
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.study.task import Row

@@ -7,10 +7,10 @@ from typing import Any
 
 import altair as alt
 
+from care_sim.base.text import counted
 from care_sim.reports.cells import Played
 from care_sim.reports.figures.faults import MEASURES, Measure
 from care_sim.reports.figures.styles import FULL, styles
-from care_sim.reports.formatting import counted
 from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Look, inline, specification
 from care_sim.reports.tables.faults import FAULTS, PLACES, policies_of
 from care_sim.study.designs.levels import Place

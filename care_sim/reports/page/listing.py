@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.reports.formatting import marked, percent
+from care_sim.base.text import percent
+from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode
 from care_sim.reports.page.replay import packed
-from care_sim.reports.summary import Setting, policy_of, setting_of, tags_of_row
+from care_sim.study.row_reading import Setting, policy_of, setting_of, tags_of_row
 from care_sim.study.task import Row
 
 

@@ -5,10 +5,11 @@ from typing import Any
 
 import altair as alt
 
+from care_sim.base.text import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.protocol_budgets import APART, DODGE, SPREAD
 from care_sim.reports.figures.protocol_frontier import Point, frontier, recalls
-from care_sim.reports.formatting import MARKS, counted, marked, percent, tag_notes
+from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.page.chart import FULL_SCAN, PANEL_WIDTH, Chart, Look, apart, budget_axis, inline, specification
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import Plays, plays_of

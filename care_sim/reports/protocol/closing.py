@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
+from care_sim.base.text import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.reports.contrasts import GATE_POINTS
-from care_sim.reports.formatting import percent
 from care_sim.reports.protocol.differences import Gap, Pair
 from care_sim.reports.protocol.formatting import whole
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.base.text import percent
+from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.differences import RATIOS, Gap, Pair
 from care_sim.reports.protocol.formatting import PAPER, whole
 from care_sim.reports.protocol.notes import UNITS, left_out, on_intervals, papers, played

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Iterable, Iterator
 
+from care_sim.base.text import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
-from care_sim.reports.formatting import percent
 from care_sim.reports.protocol.differences import Gap
 from care_sim.reports.protocol.formatting import OVER_EVENTS
 from care_sim.reports.protocol.rows import Plays

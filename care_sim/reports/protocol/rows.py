@@ -15,7 +15,7 @@ from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged,
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.evaluation.strata import thirds
 from care_sim.perception.listing import PROXY
-from care_sim.reports.summary import policy_of, tags_of_row, with_parameters
+from care_sim.study.row_reading import policy_of, tags_of_row, with_parameters
 from care_sim.study.task import FULL, REFERENCE, Row
 
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}

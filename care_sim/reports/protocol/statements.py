@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from care_sim.reports.formatting import percent
+from care_sim.base.text import percent
 from care_sim.reports.protocol.differences import Compared, Gap, Third
 from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, interval, judged, verdict
 from care_sim.reports.protocol.notes import UNITS, on_intervals, papers

@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator
 
+from care_sim.base.text import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import THIRDS
-from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.differences import FEWEST_SCENES, GAP, RANKINGS, Pair, Third
 from care_sim.reports.protocol.formatting import PAPER, whole, written
 from care_sim.reports.protocol.notes import UNITS, papers

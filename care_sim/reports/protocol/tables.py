@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Collection, Sequence
 
+from care_sim.base.text import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, level
-from care_sim.reports.formatting import marked, percent, tag_notes
+from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import contrast_tables
 from care_sim.reports.protocol.differences import RATIOS
 from care_sim.reports.protocol.formatting import PAPER, written

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 
+from care_sim.base.text import percent
 from care_sim.reports.cells import Played
 from care_sim.reports.contrasts import Contrast
-from care_sim.reports.formatting import interval, mean, median, percent
-from care_sim.reports.summary import Key, key_of
+from care_sim.reports.formatting import interval, mean, median
 from care_sim.reports.table import Table
 from care_sim.scenarios.dense import PLACES
 from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.row_reading import Key, key_of
 from care_sim.study.task import Row
 
 BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 
+from care_sim.base.text import percent
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
-from care_sim.reports.formatting import ends, interval, marked, percent, spread, tag_notes, unsigned
-from care_sim.reports.summary import Cell, Groups, Key, Setting, full_of, grouped, summarise
+from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned
+from care_sim.reports.summary import Cell, summarise
 from care_sim.reports.table import Table
 from care_sim.study.designs.paper import Published, paper_cells, published
+from care_sim.study.row_reading import Groups, Key, Setting, full_of, grouped
 from care_sim.study.task import FULL, REFERENCE, Row
 
 COLUMNS = (

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
-from care_sim.loops.film import Annotations, Sights
+from care_sim.sensors.annotated import Annotations, Sights
 from care_sim.sensors.camera import CAMERA_WIDTH
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 

@@ -17,7 +17,7 @@ from care_sim.base.errors import InvalidInput, check_number, check_whole
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.loops.film import NOBODY, Annotations, Sights
+from care_sim.sensors.annotated import NOBODY, Annotations, Sights
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
 from care_sim.sources.nuscenes.tables import Database, Row, read_json

@@ -14,7 +14,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Ego
-from care_sim.loops.film import Annotations, Film, Shot, Sights
+from care_sim.loops.film import Film, Shot
+from care_sim.sensors.annotated import Annotations, Sights
 from care_sim.sources.car_motion import motions
 from care_sim.sources.nuscenes.cameras import (
     CHANNELS,

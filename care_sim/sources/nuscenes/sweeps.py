@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats, Frame, turned
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.loops.film import NOBODY, Annotations, Cloud
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
 VALUES_A_POINT = 5
 """float32 x, y, z, intensity and ring."""

@@ -11,7 +11,8 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
-from care_sim.loops.film import NOBODY, Annotations, Cloud, Film, Shot, Sights
+from care_sim.loops.film import Film, Shot
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, Sights
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
 from care_sim.sources.streets.draft import KEYFRAME_S

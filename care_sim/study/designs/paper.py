@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from care_sim.reports.summary import Key, key_of
 from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.row_reading import Key, key_of
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sbf")
 BUDGETED = ("history", *CAMERA_POLICIES)

@@ -8,8 +8,8 @@ from PIL import Image, ImageDraw
 
 from care_sim.core.frames import Floats, box_corners
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.film import Cloud
 from care_sim.loops.open_loop import Exposure, OpenLoop
+from care_sim.sensors.annotated import Cloud
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
 from care_sim.viewer.pictures.keyframe import HEIGHT, WIDTH, draw_grid

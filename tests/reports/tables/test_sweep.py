@@ -5,10 +5,10 @@ import io
 import pytest
 from rich.console import Console
 
-from care_sim.reports.summary import setting_of
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.sweep import COLUMNS, sweep_tables
 from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.row_reading import setting_of
 from tests.helpers.made_rows import STUDY, row, rows
 
 ORACLE = rows("history", [9.0, 10.0, 11.0, 12.0, 13.0], changes={"policy": "history-oracle", "tags": "privileged"})

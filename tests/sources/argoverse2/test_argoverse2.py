@@ -3,7 +3,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
-from care_sim.loops.film import NOBODY
+from care_sim.sensors.annotated import NOBODY
 from care_sim.sources.argoverse2.films import CATEGORIES, SENSOR_HEIGHT_M, UP_LIDAR, film, logs
 from tests.helpers.av2_log import CAR_AHEAD, at, box, parked, replaced, rewrite, stamp, write
 

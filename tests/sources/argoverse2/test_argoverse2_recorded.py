@@ -6,7 +6,7 @@ from pyarrow import feather
 
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.loops.film import NOBODY
+from care_sim.sensors.annotated import NOBODY
 from care_sim.sources.argoverse2.films import SENSOR_HEIGHT_M, UP_LIDAR, film
 
 loaded = functools.cache(film)

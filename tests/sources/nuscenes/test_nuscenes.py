@@ -8,7 +8,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
-from care_sim.loops.film import NOBODY, Annotations
+from care_sim.sensors.annotated import NOBODY, Annotations
 from care_sim.sources.nuscenes.categories import CATEGORIES, DETECTION_NAMES
 from care_sim.sources.nuscenes.splits import VAL, scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points

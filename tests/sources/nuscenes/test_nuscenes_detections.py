@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.loops.film import NOBODY
+from care_sim.sensors.annotated import NOBODY
 from care_sim.sources.nuscenes.detections import DetectionFile
 from tests.helpers.nuscenes_database import SENSORS
 from tests.helpers.nuscenes_scene import SCENE, database, first

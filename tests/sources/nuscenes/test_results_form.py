@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
-from care_sim.loops.film import Annotations, Cloud, Shot, Sights
+from care_sim.loops.film import Shot
+from care_sim.sensors.annotated import Annotations, Cloud, Sights
 from care_sim.sources.nuscenes.films import film
 from care_sim.sources.nuscenes.results_form import MOST_BOXES, attribute, boxes, confidences
 from care_sim.sources.nuscenes.splits import scenes

@@ -6,7 +6,7 @@ import pytest
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Ego
 from care_sim.evaluation.sightings import Sightings
-from care_sim.loops.film import NOBODY
+from care_sim.sensors.annotated import NOBODY
 from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS

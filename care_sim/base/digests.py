@@ -1,0 +1,43 @@
+"""Hashes of files and folders."""
+
+import hashlib
+from collections.abc import Iterable
+from functools import lru_cache
+from itertools import islice
+from pathlib import Path
+
+MOST_FILES = 10_000
+"""Files of a folder whose content is hashed: a second of work."""
+
+
+def file_digest(path: Path) -> str | None:
+    """Hash of the content of a file, or of the files below a folder and their names; empty where there is neither,
+    None of a folder with more than `MOST_FILES`.
+    """
+    found = [path] if path.is_file() else [*islice(filter(Path.is_file, path.rglob("*")), MOST_FILES + 1)]
+    if len(found) > MOST_FILES:
+        return None
+    hashes = [f"{file.relative_to(path)} {_content(file)}" for file in sorted(found) if file.suffix != ".pyc"]
+    return _combined(hashes) if hashes else ""
+
+
+def _content(path: Path) -> str:
+    """Hash of a file as it is now."""
+    stat = path.stat()
+    return _hashed(path, stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
+
+
+@lru_cache(maxsize=10_000)
+def _hashed(path: Path, *_identity: int) -> str:
+    """Hash of a file that has not changed since it was last hashed."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
+def _combined(digests: Iterable[str]) -> str:
+    return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
+
+
+def data_digest(paths: Iterable[Path]) -> str:
+    """Hash of the content of several files."""
+    return _combined(str(file_digest(path)) for path in paths)

@@ -1,0 +1,119 @@
+"""A study from configurations to a folder of results."""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from care_sim.base.errors import InvalidInput, check_whole
+from care_sim.base.files import write_text
+from care_sim.base.text import counted
+from care_sim.commands.shared.takeover import check_journal, check_kind, check_results, lost
+from care_sim.reports.report import Report
+from care_sim.reports.studies import SWEEP, Study
+from care_sim.study.executors import ExecutorFactory, processes
+from care_sim.study.journal import JOURNAL, Journal
+from care_sim.study.progress import run_with_progress
+from care_sim.study.provenance import machine, versions
+from care_sim.study.rows import check_columns, write_columns, write_rows
+from care_sim.study.runner import Failure
+from care_sim.study.task import Row, Task
+
+
+def conduct(
+    configs: Sequence[Task],
+    folder: Path,
+    workers: int,
+    make_executor: ExecutorFactory = processes,
+    study: Study = SWEEP,
+    force: bool = False,
+) -> list[Failure]:
+    """Run a study into `folder`, going on where an earlier run stopped; returns the tasks that failed.
+
+    Writes `journal.jsonl` as they finish; then, if there are any, `config.json` with the configurations and what
+    failed, the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`, `tables.tex`
+    and the figures of `study`; the folder is this study's until all that is written. Where tasks failed and the folder
+    holds rows that were therefore not obtained, these files stay, unless `force`. Raises InvalidInput for no task
+    or no worker, when the folder cannot be written, and unless `force` when it holds another study, or rows of this one
+    that are none of `configs`.
+    """
+    if not configs:
+        raise InvalidInput("a study needs at least one value on every axis")
+    check_whole("workers", workers, 1)
+    configs, kind = [config.changed() for config in configs], study.kind
+    check_columns(config.row() for config in configs)
+    _check(folder, configs, study, force)
+    with _journal(folder, study) as journal:
+        _check(folder, configs, study, force, journal)
+        _say_what_is_found(configs, journal, folder, kind.unit)
+        failures = run_with_progress(configs, journal, workers, make_executor, kind)
+        played = [config for config in configs if config.key in journal]
+        left = lost(folder, played, study) if failures and not force else ""
+        if left:
+            print(left, file=sys.stderr)
+        elif played:
+            _write([journal[config.key] for config in played], configs, folder, study, failures)
+    return failures
+
+
+def summary(failures: Sequence[Failure], unit: str) -> list[str]:
+    """What failed, in a line for every reason."""
+    by_reason: dict[str, list[Failure]] = {}
+    for failure in failures:
+        by_reason.setdefault(failure.reason, []).append(failure)
+    return [str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}" for own in by_reason.values()]
+
+
+def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failure]) -> str:
+    settings = {"study": study.name, "versions": versions(), "machine": machine(), "failed": [*map(str, failures)]}
+    return json.dumps(settings | study.kind.listed(configs), indent=1) + "\n"
+
+
+def _check(folder: Path, configs: Sequence[Task], study: Study, force: bool, journal: Journal | None = None) -> None:
+    """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves a file there, and
+    after.
+    """
+    check_kind(folder, study)
+    if not force:
+        check_results(folder, configs, study)
+        if journal is not None:
+            check_journal(folder, journal, study)
+
+
+def _journal(folder: Path, study: Study) -> Journal:
+    if folder.is_file():
+        raise InvalidInput(f"{folder} is a file, --out wants a folder")
+    try:
+        return Journal(folder / JOURNAL, study.name)
+    except OSError as error:
+        raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
+
+
+def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, unit: str) -> None:
+    """One line when tasks will not be played again, or others share the journal; one for what is damaged there."""
+    if journal.damaged:
+        lines = counted(journal.damaged, "line")
+        print(
+            f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no checksums; what they "
+            "held is played again where it is asked for",
+            file=sys.stderr,
+        )
+    found = sum(config.key in journal for config in configs)
+    others = len(journal) - found
+    if found or others:
+        rest = f"; {others} of other options or code stay in its journal" if others else ""
+        print(f"{found} of {len(configs)} {unit} found in {folder}{rest}", file=sys.stderr)
+
+
+def _write(
+    rows: Sequence[Row], configs: Sequence[Task], folder: Path, study: Study, failures: Sequence[Failure]
+) -> None:
+    """Write the results of a study: everything is made before the first file is replaced."""
+    kind = study.kind
+    left_out, finished, aside = summary(failures, kind.unit), kind.finish(rows), kind.aside(rows)
+    report = Report.of(finished, study, left_out)
+    write_text(folder / "config.json", _description(configs, study, failures))
+    for name, columns in aside.items():
+        write_columns(columns, folder / name)
+    write_rows(finished, folder / kind.file, study.name, left_out)
+    report.write(folder)
