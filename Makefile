@@ -1,6 +1,7 @@
 # make setup      create .venv and install what the benchmark needs
 # make reproduce  set up, run the paper's closed-loop study, print it beside the paper's figures
 # make test       set up with the development tools, run every test
+# make test-speed   hold the ratios of speed to the published ones; nothing else may run meanwhile
 # make docs       build the documentation's site into build/site
 # make check      format, lint, types, tests
 # make torture    random input for ten minutes: commands, calls, files, kills, full disks; SECONDS=600 SEED=0
@@ -32,7 +33,7 @@ ifneq ($(filter official,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: setup reproduce test check docs lint torture official test-official clean
+.PHONY: setup reproduce test test-speed check docs lint torture official test-official clean
 
 setup: $(VENV)/.installed
 
@@ -52,6 +53,9 @@ reproduce: setup
 
 test: $(VENV)/.developing
 	$(BIN)/python -m pytest --numprocesses 2
+
+test-speed: $(VENV)/.developing
+	$(BIN)/python -m pytest -m speed
 
 # NO_MKDOCS_2_WARNING: the theme tells of its end of life, in May 2027, at every build; a warning is to be one of a page.
 docs: $(VENV)/.developing

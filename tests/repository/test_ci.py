@@ -20,4 +20,4 @@ def test_the_browser_is_installed_without_a_question(tmp_path):
     assert update == "apt-get update -qq noninteractive"
     assert install.startswith("apt-get install")
     assert install.endswith("chromium noninteractive")
-    assert [line.split()[1] for line in made] == ["test", "test-official", "lint"]
+    assert [line.split()[1] for line in made] == ["test", "test-speed", "test-official", "lint"]

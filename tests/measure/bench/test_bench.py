@@ -104,7 +104,7 @@ def test_bad_input_is_named(wrong, named):
         measure(BenchConfig(**{**TINY, **wrong}))
 
 
-@pytest.mark.slow
+@pytest.mark.speed
 def test_no_ratio_has_fallen_behind_the_published_ones():
     """Ratios of medians within one run, so that the machine's speed does not matter; a third is what sharing it with
     others may cost one side. Two processes need two free cores, which a test does not have.
