@@ -5,6 +5,9 @@ import pty
 import select
 import subprocess
 import sys
+from textwrap import dedent
+
+import pytest
 
 NOWHERE = """
 import numba.core.caching as caching
@@ -16,8 +19,61 @@ print(survey(np.array([3, 1]), np.array([2])))
 
 
 def test_without_a_folder_for_the_code_it_is_compiled_anew():
-    done = subprocess.run([sys.executable, "-c", NOWHERE], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", NOWHERE], capture_output=True, text=True, check=True
+    )
     assert done.stdout.strip() == "(0, 3, False)"
+
+
+TWO_FILES = """
+import sys
+from pathlib import Path
+import care_sim.base.compiled
+care_sim.base.compiled.PACKAGE = Path(sys.argv[1])
+sys.path.insert(0, sys.argv[1])
+from outer_kernels import outer
+print(outer(1), sum(outer.stats.cache_hits.values()))
+"""
+OUTER = """
+    from care_sim.base.compiled import compiled
+    from inner_kernels import inner
+
+    @compiled()
+    def outer(number):
+        return inner(number)
+"""
+INNER = """
+    from care_sim.base.compiled import compiled
+
+    @compiled()
+    def inner(number):
+        return number + {added}
+"""
+
+
+@pytest.fixture
+def outer(tmp_path):
+    """What the kernel `outer`, which calls one of another file that adds a number, gives for 1 in a
+    new process, and how often its kept code was used.
+    """
+    (tmp_path / "outer_kernels.py").write_text(dedent(OUTER))
+
+    def run(added):
+        (tmp_path / "inner_kernels.py").write_text(dedent(INNER).format(added=added))
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+        command = [sys.executable, "-c", TWO_FILES, str(tmp_path)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    return run
+
+
+def test_kept_code_is_used_while_no_file_of_kernels_changes(outer):
+    assert [outer(added=1), outer(added=1)] == ["2 0", "2 1"]
+
+
+def test_a_change_in_a_file_whose_kernel_is_called_is_noticed(outer):
+    assert [outer(added=1), outer(added=5)] == ["2 0", "6 0"]
 
 
 def test_the_package_alone_compiles_nothing():
@@ -29,11 +85,14 @@ def test_the_package_alone_compiles_nothing():
 def test_who_waits_at_a_terminal_for_the_first_use_is_told(tmp_path):
     terminal, other_end = pty.openpty()
     code = (
-        "import numpy as np; from care_sim.core.allocation_kernels import survey; survey(np.array([3]), np.array([1]))"
+        "import numpy as np; from care_sim.core.allocation_kernels import survey; "
+        "survey(np.array([3]), np.array([1]))"
     )
     heard = []
     for _ in range(2):
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
         subprocess.run([sys.executable, "-c", code], env=environment, stderr=other_end, check=True)
-        heard.append(os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else "")
+        heard.append(
+            os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else ""
+        )
     assert heard == ["care_sim: compiling; this takes half a minute, once on a machine\r\n", ""]
