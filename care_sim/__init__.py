@@ -12,8 +12,10 @@ from importlib.metadata import version
 
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.allocation import allocate
+from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import CLASSES, Belief, Demand, Detections, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, Demand, Detections, ImageDetections, Tracks
 from care_sim.envs import register_all
 from care_sim.policies import make_policy, policy_names
 from care_sim.policies.base import Policy

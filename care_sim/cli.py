@@ -16,7 +16,8 @@ import tyro
 
 from care_sim.base import interrupts
 from care_sim.base.bounds import allowed
-from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.text import one_line, shortened, shown
 from care_sim.commands.closed_loop import Ablate, Crowding, Faults, Report, Reproduce, Run, Sweep
 from care_sim.commands.compare import Compare
 from care_sim.commands.export import Export

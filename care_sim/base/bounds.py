@@ -7,7 +7,9 @@ any type become Python's own, so that equal configurations are written alike.
 from dataclasses import Field, field, fields
 from typing import Any
 
-from care_sim.base.errors import InvalidInput, check_flag, check_number, check_range, check_whole, is_number, shown
+from care_sim.base.checks import check_flag, check_number, check_range, check_whole, is_number
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 
 _BOUNDS = "bounds"
 _ANY = (float("-inf"), float("inf"))
@@ -23,7 +25,7 @@ def allowed(one: Field[Any]) -> str:
     return "{:g} to {:g}".format(*one.metadata[_BOUNDS]) if _BOUNDS in one.metadata else ""
 
 
-def settle(thing: Any, of: str = "") -> None:
+def check_fields(thing: Any, of: str = "") -> None:
     """Check the fields of a frozen dataclass, and make each number the type that it is declared as.
 
     Raises InvalidInput that names the field, with `of` behind its name.

@@ -1,63 +1,71 @@
 """Compiled functions (numba), whose machine code is kept for later processes.
 
-They lie in files whose names end in `kernels.py`, and may call each other across files: what is
-kept is used only while all of these files are as they were.
+Numba recompiles a function when its own file changes, and does not look further. Here a file of
+kernels may use compiled functions, named tuples and constants of other files: what is kept is
+also told by those.
 """
 
 import hashlib
+import inspect
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from functools import cache
-from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, TypeVar
 
 from numba import njit
 from numba.core import event
-from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-PACKAGE = Path(__file__).parents[1]
+_F = TypeVar("_F", bound=Callable[..., Any])
 
 
-def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def compiled(**options: Any) -> Callable[[_F], Any]:
     """Compile a function at its first call; `options` are those of `numba.njit`.
 
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
-    Where none of these can be written every process compiles anew.
+    Where none of these can be written, every process compiles anew.
     """
 
-    def make(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(**options)(function)
-        # Numba raises RuntimeError where it finds no folder that can be written.
-        with suppress(RuntimeError):
-            dispatcher._cache = _KernelCache(function)
-        return dispatcher
+    def make(function: _F) -> Any:
+        try:
+            kernel = njit(cache=True, **options)(function)
+        except RuntimeError:  # nowhere to keep it
+            return njit(**options)(function)
+        # Numba reads the version before anything else of what is kept, and drops code of another
+        # one. So code from other sources is never even unpickled: the classes of its arguments may
+        # be gone by now.
+        kernel._cache._cache_file._version += f" {_sources_digest(function.__module__)}"
+        return kernel
 
     return make
 
 
-class _KernelCache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache of a function; by itself it notices a change in the function's file only."""
-
-    def __init__(self, function: Callable[..., Any]):
-        super().__init__(function)
-        stamp = self._impl.locator.get_source_stamp(), _sources()
-        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
-
-
 @cache
-def _sources() -> str:
-    """A hash of all files of kernels."""
-    content = hashlib.sha256()
-    for file in sorted(PACKAGE.rglob("*kernels.py")):
-        content.update(
-            file.relative_to(PACKAGE).as_posix().encode() + b"\0" + file.read_bytes() + b"\0"
-        )
-    return content.hexdigest()
+def _sources_digest(name: str) -> str:
+    """Hash of all that is compiled into the functions of a module: its source, the constants that it
+    holds or imports, and the same of the modules whose functions and named tuples it uses.
+    """
+    module = sys.modules[name]
+    constants = [
+        (name, value)
+        for name, value in vars(module).items()
+        if not name.startswith("__") and isinstance(value, int | float | str | tuple)
+    ]
+    others = sorted(set(_used_modules(module)))
+    content = inspect.getsource(module), repr(constants), *map(_sources_digest, others)
+    return hashlib.sha256("\n".join(content).encode()).hexdigest()
 
 
-class _Patience(event.Listener):  # type: ignore[misc]
-    """Says on a terminal, once a process, that the first use on a machine takes its time."""
+def _used_modules(module: ModuleType) -> Iterator[str]:
+    """The other modules whose compiled functions and named tuples a module imports."""
+    for value in vars(module).values():
+        is_named_tuple = isinstance(value, type) and hasattr(value, "_fields")
+        if (is_named_tuple or hasattr(value, "py_func")) and value.__module__ != module.__name__:
+            yield value.__module__
+
+
+class _CompileNotice(event.Listener):  # type: ignore[misc]
+    """Tells a terminal, once per process, that the first use on a machine takes its time."""
 
     def on_start(self, event: Any) -> None:
         """A function is compiled, not read from what is kept."""
@@ -73,9 +81,9 @@ class _Patience(event.Listener):  # type: ignore[misc]
         """Nothing to say."""
 
 
-_PATIENCE = _Patience()
-event.register("numba:compile", _PATIENCE)
+_NOTICE = _CompileNotice()
+event.register("numba:compile", _NOTICE)
 
 
 def _stop_listening() -> None:
-    event.unregister("numba:compile", _PATIENCE)
+    event.unregister("numba:compile", _NOTICE)

@@ -17,11 +17,11 @@ def file_digest(path: Path) -> str | None:
     found = [path] if path.is_file() else [*islice(filter(Path.is_file, path.rglob("*")), MOST_FILES + 1)]
     if len(found) > MOST_FILES:
         return None
-    hashes = [f"{file.relative_to(path)} {_content(file)}" for file in sorted(found) if file.suffix != ".pyc"]
-    return _combined(hashes) if hashes else ""
+    hashes = [f"{file.relative_to(path)} {content_digest(file)}" for file in sorted(found) if file.suffix != ".pyc"]
+    return combined_digest(hashes) if hashes else ""
 
 
-def _content(path: Path) -> str:
+def content_digest(path: Path) -> str:
     """Hash of a file as it is now."""
     stat = path.stat()
     return _hashed(path, stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
@@ -34,10 +34,11 @@ def _hashed(path: Path, *_identity: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
-def _combined(digests: Iterable[str]) -> str:
+def combined_digest(digests: Iterable[str]) -> str:
+    """One hash of several, in their order."""
     return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
 
 
 def data_digest(paths: Iterable[Path]) -> str:
     """Hash of the content of several files."""
-    return _combined(str(file_digest(path)) for path in paths)
+    return combined_digest(str(file_digest(path)) for path in paths)

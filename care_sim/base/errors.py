@@ -1,25 +1,9 @@
 """Errors a user can act on: one line that names the thing and what is allowed."""
 
-import math
-import os
 import sys
-from collections.abc import Container, Iterable, Sequence
-from numbers import Integral, Real
-from typing import Any
+from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from care_sim.base.text import printable
-
-LARGEST = 2**31 - 1
-"""What a whole number may be where nothing else is said."""
-LARGEST_SEED = 2**63 - 1
-"""What a column of a results file holds."""
-LONGEST_PATH, LONGEST_NAME = 4095, 255
-"""Bytes of a path and of a name in it (Linux)."""
-_SHOWN = 120
-"""Characters of a value that a message quotes."""
+from care_sim.base.text import one_line, shown
 
 
 class InvalidInput(ValueError):
@@ -34,113 +18,10 @@ class MissingExtra(ImportError):
     """An optional dependency that is not installed; the message names the extra to install."""
 
 
-def one_line(text: str) -> str:
-    """The text on one line, what a terminal would not show written out."""
-    return printable(" ".join(text.split()))
-
-
-def shown(value: object) -> str:
-    """A value as a message quotes it: on one line, its middle left out where it is long."""
-    try:
-        text = one_line(repr(value))
-    except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
-        text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
-    return shortened(text, _SHOWN)
-
-
-def shortened(text: str, most: int) -> str:
-    """The text, its middle left out where it is longer than `most` characters."""
-    return text if len(text) <= most else f"{text[: most - 20]}...{text[-17:]}"
-
-
 def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
     """The error for a name that is not among the known ones."""
     told = shown(name if isinstance(name, str) else shown(name))
     return InvalidInput(f"unknown {kind} {told}; known: {', '.join(sorted(known)) or 'none'}")
-
-
-def check_known(kind: str, name: object, known: Iterable[str]) -> None:
-    """Raise InvalidInput unless `name` is one of the known ones."""
-    if not (isinstance(name, str) and name in known):
-        raise unknown(kind, name, known)
-
-
-def is_number(value: object) -> bool:
-    """Whether `value` is a real number, and no flag."""
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def check_number(name: str, value: object, least: float = -math.inf, most: float = math.inf) -> None:
-    """Raise InvalidInput unless `value` is a finite number within `least` and `most`."""
-    if not (is_number(value) and least <= _finite(value) <= most):
-        if most < math.inf:
-            allowed = f"lie in [{least:g}, {most:g}]"
-        else:
-            allowed = f"be a finite number >= {least:g}" if least > -math.inf else "be a finite number"
-        raise InvalidInput(f"{name} must {allowed}, got {shown(value)}")
-
-
-def _finite(value: Any) -> float:
-    """The number as a float; NaN, which lies in no range, for what none is near."""
-    try:
-        number = float(value)
-    except OverflowError:
-        return math.nan
-    return number if math.isfinite(number) else math.nan
-
-
-def check_whole(name: str, value: object, least: float, most: float = LARGEST) -> None:
-    """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
-    whole = int(value) if isinstance(value, Integral) and is_number(value) else None
-    if whole is None or not least <= whole <= most:
-        upper = f" and <= {most}" if most < LARGEST or (whole is not None and whole > most) else ""
-        raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
-
-
-def check_range(name: str, value: Any, least: float = -math.inf, most: float = math.inf) -> None:
-    """Raise InvalidInput unless `value` is a pair of numbers, low and high, within `least` and `most`."""
-    fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(is_number, value))
-    if not (fits and least <= _finite(value[0]) <= _finite(value[1]) <= most):
-        within = f", within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
-        raise InvalidInput(f"{name} must be two numbers, low and high{within}, got {shown(value)}")
-
-
-def check_flag(name: str, value: object) -> None:
-    """Raise InvalidInput unless `value` is True or False."""
-    if not isinstance(value, bool):
-        raise InvalidInput(f"{name} must be True or False, got {shown(value)}")
-
-
-def check_seed(seed: object, name: str = "seed") -> None:
-    """Raise InvalidInput for a seed that no column holds."""
-    check_whole(name, seed, 0, LARGEST_SEED)
-
-
-def check_path(name: str, value: object) -> None:
-    """Raise InvalidInput for what no file or folder can be called."""
-    try:
-        path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
-    except (TypeError, UnicodeError) as error:
-        raise InvalidInput(f"{name} must be a path, got {shown(value)}") from error
-    too_long = len(path) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in path.split(b"/"))
-    if not path or b"\0" in path or too_long:
-        least = "empty" if not path else "longer than a file system allows" if too_long else "with a null character"
-        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}")
-
-
-def as_array(name: str, value: Any) -> NDArray[Any]:
-    """`value` as an array. Raises InvalidInput for what has no regular shape."""
-    try:
-        return np.asarray(value)
-    except Exception as error:  # a ragged list, and whatever foreign arrays do
-        raise InvalidInput(f"{name} must be an array, got {shown(value)}") from error
-
-
-def check_choice(name: str, value: object, choices: Container[object]) -> None:
-    """Raise InvalidInput unless `value` is None or one of the named choices."""
-    if value is not None and not (isinstance(value, str) and value in choices):
-        named = " or ".join(map(repr, choices)) if isinstance(choices, Iterable) else str(choices)
-        raise InvalidInput(f"{name} must be None or {named}, got {shown(value)}")
 
 
 def report_problems(problems: Sequence[str]) -> None:

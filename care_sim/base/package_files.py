@@ -19,7 +19,7 @@ from typing import Any
 
 LONGEST_PATH = 4096
 """Characters of a path on Linux."""
-DEEPEST = 8
+MOST_NESTED = 8
 """Values within values that are looked through for names of files."""
 _OF_INSTALLERS = (".dist-info", ".egg-info")
 _SCRIPTS = (["bin"], ["Scripts"])
@@ -27,7 +27,7 @@ _OF_THE_SYSTEM = tuple(map(Path, ("/proc", "/sys", "/dev")))
 """What is no file of anybody, and another one at every look."""
 
 
-def shipped(entry: EntryPoint) -> dict[str, Path] | None:
+def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
     """The files that came with an entry point, by name: of its package, or beside its module where no list of its
     distribution names it; and those of that list. None where the code has no files to read.
     """
@@ -44,7 +44,7 @@ def shipped(entry: EntryPoint) -> dict[str, Path] | None:
     return {name: file for name, file in files.items() if _counts(Path(name)) and file.is_file()}
 
 
-def named(entry: EntryPoint) -> dict[str, Path]:
+def files_named_by(entry: EntryPoint) -> dict[str, Path]:
     """The files and folders that the defaults of an entry point's parameters, and the constants of its classes and
     modules, name; relative names from here and from its module. Nothing of code that cannot be loaded.
 
@@ -55,7 +55,7 @@ def named(entry: EntryPoint) -> dict[str, Path]:
     except (Exception, SystemExit):
         return {}
     home = Path(getattr(sys.modules.get(entry.module), "__file__", None) or "").parent.resolve()
-    found = ((name, path) for name, value in _values(entry, make) for path in paths(value, home))
+    found = ((name, path) for name, value in _values(entry, make) for path in paths_in(value, home))
     here = Path.cwd()
     return {
         f"{name} {number}": path
@@ -64,7 +64,7 @@ def named(entry: EntryPoint) -> dict[str, Path]:
     }
 
 
-def written(files: Collection[Path]) -> dict[str, Path]:
+def files_named_in(files: Collection[Path]) -> dict[str, Path]:
     """The further files that texts in the code among these name, wherever they stand in it: relative names from here
     and from the code. A folder that a text happens to name is left out.
     """
@@ -74,12 +74,12 @@ def written(files: Collection[Path]) -> dict[str, Path]:
         for source in files
         if source.suffix == ".py"
         for text in _file_names(source)
-        for number, path in enumerate(paths(text, source.parent))
+        for number, path in enumerate(paths_in(text, source.parent))
     }
     return {name: path for name, path in found.items() if path.is_file() and path.resolve() not in own}
 
 
-def paths(value: object, *places: Path, depth: int = DEEPEST) -> Iterator[Path]:
+def paths_in(value: object, *places: Path, depth: int = MOST_NESTED) -> Iterator[Path]:
     """What a value names of files and folders that are there, from here or from further places; of structures what
     they hold.
     """
@@ -87,7 +87,7 @@ def paths(value: object, *places: Path, depth: int = DEEPEST) -> Iterator[Path]:
         yield from _named_by(value, places)
     elif depth:
         for each in _held(value):
-            yield from paths(each, *places, depth=depth - 1)
+            yield from paths_in(each, *places, depth=depth - 1)
 
 
 def _held(value: object) -> Iterable[object]:

@@ -21,21 +21,21 @@ _LARGEST = 2.0**61
 Content = str | ArrayLike
 
 
-def imprint(*parts: Content | tuple[Content, ...]) -> bytes:
+def portable_bytes(*parts: Content | tuple[Content, ...]) -> bytes:
     """The bytes of texts, arrays and numbers, and of tuples of them, with their shapes.
 
     Whole numbers and flags are taken exactly, the others to `STEP`; -0.0 is 0, float32 and float64 are one, infinities
     and NaN are numbers of their own.
     """
-    return b"".join(map(_imprint, parts))
+    return b"".join(map(_bytes_of, parts))
 
 
-def _imprint(part: object) -> bytes:
+def _bytes_of(part: object) -> bytes:
     if isinstance(part, str):
         text = part.encode(errors="surrogatepass")
         return b"text %d " % len(text) + text
     if isinstance(part, tuple):
-        return b"tuple %d " % len(part) + imprint(*part)
+        return b"tuple %d " % len(part) + portable_bytes(*part)
     numbers = np.asarray(part)
     whole = numbers if numbers.dtype.kind in "biu" else _rounded(numbers)
     return b"array %r " % (numbers.shape,) + np.ascontiguousarray(whole, "<i8").tobytes()

@@ -16,10 +16,10 @@ from care_sim.base.errors import InvalidInput
 
 def streams(entropy: tuple[int, ...], count: int, secret: str = "") -> list[np.random.SeedSequence]:
     """`count` streams of an episode; `entropy` is its seed, and in the open loop a number of its scene's."""
-    return np.random.SeedSequence(closed("episode", entropy, secret) if secret else entropy).spawn(count)
+    return np.random.SeedSequence(secret_entropy("episode", entropy, secret) if secret else entropy).spawn(count)
 
 
-def closed(what: str, entropy: tuple[int, ...], secret: str) -> int:
+def secret_entropy(what: str, entropy: tuple[int, ...], secret: str) -> int:
     """256 bits of what is drawn, its seed and a secret (HMAC-SHA-256), of which neither can be told. An episode and a
     street of one seed have nothing in common.
     """

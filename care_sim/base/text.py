@@ -18,3 +18,26 @@ def percent(budget: float) -> str:
 def counted(count: int, unit: str) -> str:
     """A number of things, as a sentence says it."""
     return f"{count:,} {unit}{'' if count == 1 else 's'}"
+
+
+_SHOWN = 120
+"""Characters of a value that a message quotes."""
+
+
+def one_line(text: str) -> str:
+    """The text on one line, what a terminal would not show written out."""
+    return printable(" ".join(text.split()))
+
+
+def shown(value: object) -> str:
+    """A value as a message quotes it: on one line, its middle left out where it is long."""
+    try:
+        text = one_line(repr(value))
+    except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
+        text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
+    return shortened(text, _SHOWN)
+
+
+def shortened(text: str, most: int) -> str:
+    """The text, its middle left out where it is longer than `most` characters."""
+    return text if len(text) <= most else f"{text[: most - 20]}...{text[-17:]}"

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import LARGEST, InvalidInput, report_problems
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.options import USUAL, Options, seeds_of
 from care_sim.commands.shared.running import Running, console, in_turn, playable
 from care_sim.study.executors import CORES, MOST_WORKERS
@@ -206,13 +207,13 @@ class Report:
     """The --out of an earlier study."""
     page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """HTML file for the page, which needs nothing else to be read; the folder is left as it is (extra 'page')."""
-    episodes: int = bounded(400, 0, LARGEST)
+    episodes: int = bounded(400, 0, LARGEST_INTEGER)
     """The most episodes that are played again to be watched in the page, seed by seed; 0 for none."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play them."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
 
     def __call__(self) -> int:
         """Run it."""

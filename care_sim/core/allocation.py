@@ -5,11 +5,12 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, check_number, check_whole, is_number, shown
+from care_sim.base.checks import check_number, check_whole, is_number
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 from care_sim.core.grid import Cells, cell_indices
-from care_sim.core.types import Action, Demand
+from care_sim.core.types import Demand
 
 RESERVE_FRACTION = 0.3
 """rho, the share of the budget kept for the reserve (paper, Remark 2)."""
@@ -84,22 +85,14 @@ def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
     return np.array(free, np.int64)
 
 
-def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
-    """The action (E, A) that makes `fired_cells` choose `cells`, earlier ones scored higher."""
-    scores = np.zeros(shape[0] * shape[1], np.float32)
-    scores[cells] = np.arange(len(cells), 0, -1, dtype=np.float32) / max(len(cells), 1)
-    return scores.reshape(shape)
+class RandomFloor:
+    """Number 0 is the seed's own floor, the others are drawn from its children."""
 
+    def __init__(self, seed: np.random.SeedSequence, number: int, cells: int):
+        children = (number - 1,) if number else ()
+        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
+        self._rng, self._cells = np.random.default_rng(own), cells
 
-def fired_cells(scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, floor: Cells | None) -> Cells:
-    """The cells an action fires, ascending: the `budget` highest strictly positive scores, ties by
-    ascending index, topped up from `floor` when there are fewer (None leaves them unspent).
-    """
-    flat = scores.ravel().astype(np.float32, copy=False)
-    chosen = np.flatnonzero(flat > 0)
-    if len(chosen) > budget:
-        chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]
-    elif floor is not None and len(chosen) < budget:
-        free = floor[:budget]  # enough of it, whatever is chosen: of these at most len(chosen) are taken
-        chosen = np.concatenate([chosen, free[flat[free] <= 0][: budget - len(chosen)]])
-    return np.sort(chosen)
+    def next(self) -> Cells:
+        """The floor of the coming keyframe; to be drawn at every one, spent or not."""
+        return self._rng.permutation(self._cells)

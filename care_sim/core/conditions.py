@@ -9,20 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import LARGEST, InvalidInput, check_whole, shown
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER, check_whole
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 from care_sim.core.allocation import RESERVE_FRACTION
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
-CONFIDENCE = 0.25
+CAMERA_CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
-MOST_GHOSTS = 64
+MOST_FALSE_BOXES = 64
 """False detections a picture, on average: half as many as a policy is shown at most."""
 MOST_KEYFRAMES = 1200
 """Of an episode: a minute in steps of 0.05 s. No fault needs to last longer."""
-LONGEST_S = 3600.0
+LONGEST_BLACKOUT_S = 3600.0
 """Far beyond the end of any episode or recorded scene."""
 
 
@@ -36,7 +38,7 @@ class CameraFaults:
     """How much that share grows with every metre of distance, up to 1."""
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
-    false_positive_rate: float = bounded(0.0, 0, MOST_GHOSTS)
+    false_positive_rate: float = bounded(0.0, 0, MOST_FALSE_BOXES)
     """Mean number of boxes in a picture that show nothing; else they are like the true ones, which they are drawn from
     (`care_sim.sensors.false_boxes`), so that where the camera never sees anybody there are none.
     """
@@ -44,9 +46,9 @@ class CameraFaults:
     """Age of the camera's detections in whole keyframes."""
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
-    blackout_start_s: float = bounded(0.0, 0, LONGEST_S)
+    blackout_start_s: float = bounded(0.0, 0, LONGEST_BLACKOUT_S)
     """When the camera goes black, seconds from the start; it does only with `blackout_s`."""
-    blackout_s: float = bounded(0.0, 0, LONGEST_S)
+    blackout_s: float = bounded(0.0, 0, LONGEST_BLACKOUT_S)
     """How long the camera's pictures are black, seconds."""
     camera_rotation_sigma_deg: float = bounded(0.0, 0, 180)
     """Spread of the error in yaw and pitch with which the camera is mounted, degrees; drawn once an episode."""
@@ -90,13 +92,13 @@ class Sensing(CameraFaults, LidarFaults):
     """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
     reference.
     """
-    min_returns: int = bounded(MIN_RETURNS, 1, LARGEST)
+    min_returns: int = bounded(MIN_RETURNS, 1, LARGEST_INTEGER)
     """Fired rays that must hit an object for it to be detected."""
-    camera_confidence: float = bounded(CONFIDENCE, 0, 1)
+    camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has 0.25."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
         self._settle_rows()
 
 
@@ -104,14 +106,14 @@ class Sensing(CameraFaults, LidarFaults):
 class Conditions(Sensing):
     """All conditions: sensing, and how the budget is spent.
 
-    `care_sim.core.types.Rig` checks what the allocator is given, the environments whether engine and rows exist.
+    `care_sim.core.rig.Rig` checks what the allocator is given, the environments whether engine and rows exist.
     """
 
     reserve_fraction: float = bounded(RESERVE_FRACTION, 0, 1)
     """Share rho of the budget that the allocator keeps for the reserve, 0 to 1."""
     floor: bool = True
     """Whether the shared random floor spends what the policy leaves of the budget."""
-    floor_seed: int = bounded(0, 0, LARGEST)
+    floor_seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Which of the random floors that the episode's seed holds."""
     azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
     """Columns by which hulls and wedges are dilated."""
@@ -121,7 +123,7 @@ class Conditions(Sensing):
 
 DEFAULTS = {field.name: field.default for field in fields(Conditions)}
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))
-UNFELT_BY_FULL = (
+UNUSED_BY_FULL_SCAN = (
     *CAMERA_FAULTS,
     "camera_confidence",
     "reserve_fraction",

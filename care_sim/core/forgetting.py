@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.bounds import bounded, settle
+from care_sim.base.bounds import bounded, check_fields
 from care_sim.core.frames import Floats
 from care_sim.core.grid import AZIMUTH_MARGIN, Cells
 from care_sim.core.types import Ego, Tracks
@@ -31,7 +31,7 @@ class ForgettingRules:
     """Columns of margin forgotten with each consecutive safe keyframe."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
 
     def guard_distance(self, ego_speed: float) -> float:
         """Eq. 3, metres: inside it nothing is ever forgotten, whichever way the car goes."""

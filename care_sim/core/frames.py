@@ -112,3 +112,6 @@ def _replaced(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) 
     yaw = boxes[:, 6]
     heading = turn(np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))]))
     return np.column_stack([centres, boxes[:, 3:6], np.arctan2(heading[:, 1], heading[:, 0])])
+
+
+Integers = NDArray[np.int64]

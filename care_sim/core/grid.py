@@ -13,8 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import InvalidInput, as_array
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import as_array
+from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 
 Cells = NDArray[np.int64]
@@ -42,7 +43,7 @@ class AngularGrid:
     range_m: float = bounded(50.0, 1, 1_000_000)
 
     def __post_init__(self) -> None:
-        settle(self, " of the grid")
+        check_fields(self, " of the grid")
         if self.bottom >= self.top:
             raise InvalidInput(f"bottom of the grid must lie below its top, {self.top:g}, got {self.bottom:g}")
 

@@ -25,9 +25,11 @@ from functools import cached_property
 
 import numpy as np
 
+from care_sim.core.belief import HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.frames import Floats
 from care_sim.core.residual import explainers
-from care_sim.core.types import CLASSES, HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 MAX_SPEED_MPS = 100.0
 MAX_ACCELERATION_MPS2 = 100.0

@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import InvalidInput, check_number, shown
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import check_number
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 from care_sim.core.frames import Floats, Frame
 
 NEAR_M = 0.1
@@ -43,7 +45,7 @@ class PinholeCamera:
     roll: float = bounded(0.0, -_TURNS, _TURNS)
 
     def __post_init__(self) -> None:
-        settle(self, " of the camera")
+        check_fields(self, " of the camera")
         if not (isinstance(self.position, tuple | list | np.ndarray) and len(self.position) == 3):
             raise InvalidInput(f"position of the camera must be x, y and z in metres, got {shown(self.position)}")
         for metres in self.position:
@@ -95,7 +97,7 @@ class PinholeCamera:
         to the principal point, where azimuth and elevation of a wide box are extreme.
         """
         boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
-        return Lenses.of([self]).box_rays(boxes, np.zeros(len(boxes), np.int64))
+        return CameraModels.of([self]).box_rays(boxes, np.zeros(len(boxes), np.int64))
 
     def project_boxes(self, boxes: Floats) -> Floats:
         """(n, 4) left, top, right, bottom of 3D boxes (n, 7) in pixels, beyond the picture where they reach
@@ -112,7 +114,7 @@ class PinholeCamera:
         return np.array(self.position, dtype=float), self.axes, self.focal, centre
 
 
-class Lenses(NamedTuple):
+class CameraModels(NamedTuple):
     """The pinhole model of k cameras: `positions` (k, 3), `axes` (k, 3, 3), `focals` (k,) and `centres` (k, 2) as in
     `care_sim.core.pinhole_kernels`.
     """
@@ -123,7 +125,7 @@ class Lenses(NamedTuple):
     centres: Floats
 
     @classmethod
-    def of(cls, cameras: Sequence[PinholeCamera]) -> "Lenses":
+    def of(cls, cameras: Sequence[PinholeCamera]) -> "CameraModels":
         """Those of k cameras, of which there may be none."""
         shapes = (3,), (3, 3), (), (2,)
         columns = ([camera._lens[n] for camera in cameras] for n in range(len(shapes)))

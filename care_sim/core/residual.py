@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats, turned
 from care_sim.core.grid import Cells
-from care_sim.core.types import Belief, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import ImageDetections, Tracks
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[np.bool_]:
@@ -27,7 +29,7 @@ def explainers(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Cells:
 
     columns = detections.boxes, detections.classes, detections.cameras, detections.yaw_changes
     forecasts = tracks.boxes[:, :3], tracks.classes
-    found: Cells = lenses.explainers(_contiguous(*columns), _contiguous(*forecasts), rig.lenses)
+    found: Cells = lenses.explainers(_contiguous(*columns), _contiguous(*forecasts), rig.camera_models)
     return found
 
 
@@ -40,7 +42,7 @@ def bundles(detections: ImageDetections, rig: Rig) -> Floats:
     """(n, 9, 3) the rays through the image box of every detection, as of `PinholeCamera.box_rays`, turned by the yaw
     change since its picture.
     """
-    rays = rig.lenses.box_rays(detections.boxes, detections.cameras)
+    rays = rig.camera_models.box_rays(detections.boxes, detections.cameras)
     return turned(rays, -detections.yaw_changes[:, None])
 
 

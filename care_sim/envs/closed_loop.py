@@ -7,19 +7,20 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import check_choice, check_number
-from care_sim.core.types import Action, Keyframe
+from care_sim.base.checks import check_choice, check_number
+from care_sim.core.types import Action
 from care_sim.envs import reward as rewards
 from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.other_drive import seen_on_a_drive
+from care_sim.loops.records import Keyframe
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines.engine import check_engine
 from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
 from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.world.world import STEP_S, whole_steps
+from care_sim.world.world import WORLD_STEP_S, whole_steps
 
 LONGEST_KEYFRAME_S = 1.0
 """A car at 30 km/h would be 8 m further on, past what it brakes for."""
@@ -70,7 +71,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
     | `reward_terms` | `care_sim.envs.reward.terms` | scoring alone |
     | `seed` | of `reset`: repeats the episode, and so tells all of it | scoring alone |
-    | `outcome` | at the end: a dict of `care_sim.core.types.Outcome` | scoring alone |
+    | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
 
     (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector environments stack arrays of
     one length. (2) A car knows what it detected, and has it as tracks; which one the episode is about it does not know.
@@ -102,7 +103,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         scoring_info: bool = True,
         **parameters: Any,
     ):
-        check_number("keyframe_s", keyframe_s, STEP_S, LONGEST_KEYFRAME_S)
+        check_number("keyframe_s", keyframe_s, WORLD_STEP_S, LONGEST_KEYFRAME_S)
         whole_steps(keyframe_s)
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
         conditions = conditions_of(parameters)

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 
-from care_sim.base.errors import InvalidInput, check_known, check_number, shown
-from care_sim.core.types import Keyframe
+from care_sim.base.checks import check_known, check_number
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
+from care_sim.loops.records import Keyframe
 
 KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""

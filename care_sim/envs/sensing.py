@@ -7,14 +7,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, check_flag, check_seed, shown
+from care_sim.base.checks import check_flag, check_seed
+from care_sim.base.errors import InvalidInput
 from care_sim.base.random_streams import check_secret, streams
-from care_sim.core.allocation import budget_cells, fired_cells
+from care_sim.base.text import shown
+from care_sim.core.actions import fired_cells
+from care_sim.core.allocation import RandomFloor, budget_cells
+from care_sim.core.belief import Belief
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.random_floor import Floor
-from care_sim.core.types import Action, Belief, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.loops.episode_truth import EpisodeTruth, Loop
 from care_sim.loops.truth import Truth
@@ -102,7 +106,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     def begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
         self._running, self._over = loop, False
-        self._floor = Floor(floor, self.conditions.floor_seed, self.rig.grid.size)
+        self._floor = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
         return self.observed()
 
     def observed(self) -> Observed:

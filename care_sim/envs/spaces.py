@@ -6,10 +6,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, as_array
+from care_sim.base.checks import as_array
+from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
 from care_sim.core.frames import Floats
 from care_sim.core.observation_limits import Limits
-from care_sim.core.types import MAX_DETECTIONS, MAX_TRACKS, Rig
+from care_sim.core.rig import Rig
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.core.types import Keyframe, Outcome
+from care_sim.loops.records import Keyframe, Outcome
 
 
 def outcome(keyframes: Sequence[Keyframe]) -> Outcome:

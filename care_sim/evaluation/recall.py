@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, check_whole
+from care_sim.base.checks import check_whole
+from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Detections
 from care_sim.evaluation import matching

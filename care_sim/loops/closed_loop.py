@@ -6,13 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.types import Keyframe, Rig, Scan, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.odometry import Odometry
+from care_sim.loops.records import Keyframe
 from care_sim.perception.proxy import ReturnsDetector
 from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
@@ -20,7 +22,6 @@ from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_o
 from care_sim.sensors.engines.engine import ENGINES
 from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
-from care_sim.world.bullet import Integers
 from care_sim.world.world import World
 
 

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats
-from care_sim.core.types import Belief, Scan, Tracks
+from care_sim.core.types import Scan, Tracks
 
 
 class Loop(Protocol):

@@ -1,7 +1,7 @@
 """What the open loop replays: the keyframes of a scene, the same for every policy.
 
 A film is made once, from a generated street, a recorded drive whose boxes become bodies, or recorded clouds. Nothing
-in it depends on a policy. It holds truth; policies see of it what `care_sim.core.types.Belief` carries.
+in it depends on a policy. It holds truth; policies see of it what `care_sim.core.belief.Belief` carries.
 """
 
 from dataclasses import dataclass

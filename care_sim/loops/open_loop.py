@@ -11,7 +11,8 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
-from care_sim.core.types import Detections, Rig, Scan, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.film import Film, Shot
 from care_sim.perception.proxy import Detector

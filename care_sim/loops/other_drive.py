@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from care_sim.core.conditions import Sensing
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.sensors.false_boxes import Pool
 from care_sim.world.world import World

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.budget_shares import shares_of
+from care_sim.core.actions import shares_of
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
-from care_sim.core.types import Action, Belief, Demand, ImageDetections, Keyframe
+from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
 from care_sim.sensors.annotated import NOBODY, Sights
 from care_sim.sensors.camera import sights_of
 
@@ -41,7 +43,7 @@ class Stance:
 
 @dataclass(frozen=True)
 class Moment:
-    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see `care_sim.core.budget_shares`), what the scan returned
+    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see `care_sim.core.actions`), what the scan returned
     as `ranges` (E, A) in metres (0 not fired, maximum range no return), and the record for the scoring.
     """
 

@@ -8,8 +8,9 @@ import inspect
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 
-from care_sim.base.errors import InvalidInput, MissingExtra, check_known, shown
-from care_sim.base.text import printable
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.text import printable, shown
 from care_sim.perception.cluster.detector import ClusterDetector
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
 from care_sim.perception.proxy import Detector, ReturnsProxy

@@ -9,13 +9,12 @@ from typing import Protocol
 
 import numpy as np
 
-from care_sim.base.errors import check_whole
+from care_sim.base.checks import check_whole
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
-from care_sim.world.bullet import Integers
 
 
 class Detector(Protocol):

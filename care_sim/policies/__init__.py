@@ -2,7 +2,9 @@
 
 import gymnasium
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, check_known, shown
+from care_sim.base.checks import check_known
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra
+from care_sim.base.text import shown
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.seed_finder import SeedFinder
 from care_sim.policies.installed import ENTRY_POINTS, entries, load

@@ -4,9 +4,12 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.allocation import allocate, scores_of
+from care_sim.core.actions import scores_of
+from care_sim.core.allocation import allocate
+from care_sim.core.belief import Belief, Observation
 from care_sim.core.grid import Cells
-from care_sim.core.types import Action, Belief, Demand, Observation, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Action, Demand
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
 """What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan, learned, playing by the

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from textwrap import wrap
 
-from care_sim.base.errors import InvalidInput, one_line
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import one_line
 from care_sim.policies import BUILT_IN, maker, policy_names, tags_of
 from care_sim.policies.installed import all_entries, entries, package_of
 from care_sim.policies.parameters import Maker, settable

@@ -4,7 +4,8 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
-from care_sim.base.errors import InvalidInput, check_known
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
 from care_sim.policies.base import Policy
 from care_sim.policies.privileged import PrivilegedPolicy
 

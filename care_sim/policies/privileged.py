@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.loops.truth import Truth
 from care_sim.policies.base import Policy
 

@@ -2,7 +2,7 @@
 
 from dataclasses import fields
 
-from care_sim.base.errors import check_known
+from care_sim.base.checks import check_known
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.bounds import bounded, settle
+from care_sim.base.bounds import bounded, check_fields
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
@@ -38,7 +38,7 @@ class Scenario(ABC):
     duration_s: float = bounded(6.0, 0.05, LONGEST_S)
 
     def __post_init__(self) -> None:
-        settle(self, f" of {type(self).__name__.lower()}")
+        check_fields(self, f" of {type(self).__name__.lower()}")
 
     @abstractmethod
     def build(self, rng: np.random.Generator) -> World:

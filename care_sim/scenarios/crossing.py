@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.base.bounds import bounded
-from care_sim.base.errors import InvalidInput, check_known
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.base import (
     EGO_SPEED_MPS,
     EGO_SPEEDS_MPS,

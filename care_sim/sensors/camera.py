@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
@@ -15,7 +15,7 @@ from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.picture_kernels import tally
 from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Ghosts, Pool
-from care_sim.world.bullet import Integers, Window
+from care_sim.world.bullet import PixelWindow
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
 """Metres in the sensor frame: CAM_FRONT of nuScenes stands this far before and below LIDAR_TOP."""
@@ -25,9 +25,9 @@ FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAME
 """90 degrees wide, the default of CARLA's RGB camera, in which the paper ran."""
 
 
-def window_on(camera: PinholeCamera, boxes: Floats) -> Window:
+def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
     """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in view."""
-    held: Window = window_around(camera.project_boxes(boxes), camera.width, camera.height)
+    held: PixelWindow = window_around(camera.project_boxes(boxes), camera.width, camera.height)
     return held
 
 
@@ -40,7 +40,7 @@ class Picture:
     pixels: Integers
 
     @classmethod
-    def of(cls, ids: Integers, window: Window | None = None) -> "Picture":
+    def of(cls, ids: Integers, window: PixelWindow | None = None) -> "Picture":
         """Read the box of every body off a picture of ids (height, width), all of it or that of a window."""
         table = tally(ids)
         left, top = window[:2] if window is not None else (0, 0)

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import LidarFaults
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import Scan
 from care_sim.sensors.engines.engine import RayEngine
-from care_sim.world.bullet import NOTHING, Integers
+from care_sim.world.bullet import NO_BODY
 
 LIDAR_POSITION = (-0.445, 0.0, 1.84)
 """Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault Zoe."""
@@ -56,7 +56,7 @@ class Lidar:
         lost = self._dead[cells]
         if self._faults.lidar_dropout > 0:
             lost = lost | (self._dropout.random(self.grid.size)[cells] < self._faults.lidar_dropout)
-        return Scan(cells, np.where(lost, np.inf, ranges)), np.where(lost, NOTHING, ids)
+        return Scan(cells, np.where(lost, np.inf, ranges)), np.where(lost, NO_BODY, ids)
 
 
 def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:

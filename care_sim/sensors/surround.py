@@ -8,12 +8,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NOBODY, Cloud, Sights
 from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
-from care_sim.world.bullet import NOTHING, BulletWorld, Integers
+from care_sim.world.bullet import NO_BODY, BulletWorld
 
 
 def _camera(yaw: float, position: tuple[float, float, float], width: float = 70.0) -> PinholeCamera:
@@ -48,7 +48,7 @@ def look_around(
 
 
 def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float) -> Cloud:
-    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids, of the road NOTHING or
+    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids, of the road NO_BODY or
     the world's ground.
 
     `boxes` (n, 7) in the sensor frame hold all bodies. Rays are cast where these are; all others can only meet the
@@ -58,10 +58,10 @@ def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floa
     covered = np.zeros(grid.size, dtype=bool)
     for hull in grid.hulls(boxes):
         covered[hull] = True
-    ranges, bodies = road_ranges(grid, height_m), np.full(grid.size, NOTHING)
+    ranges, bodies = road_ranges(grid, height_m), np.full(grid.size, NO_BODY)
     directions = sensor.vectors_to_world(grid.directions[covered])
     cast, hit = world.cast(sensor.origin, directions, grid.range_m)
-    ranges[covered] = np.where(hit == NOTHING, ranges[covered], cast)
+    ranges[covered] = np.where(hit == NO_BODY, ranges[covered], cast)
     bodies[covered] = hit
     (cells,) = np.nonzero(np.isfinite(ranges))
     return Cloud(cells, grid.directions[cells] * ranges[cells, None], bodies[cells])

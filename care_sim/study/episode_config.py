@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import gymnasium
 
-from care_sim.base.errors import check_known, check_seed
+from care_sim.base.checks import check_known, check_seed
 from care_sim.core.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario

@@ -13,10 +13,12 @@ import gymnasium
 import numpy as np
 
 import care_sim
-from care_sim.base.errors import InvalidInput, one_line
-from care_sim.base.portable_hash import imprint
-from care_sim.core.types import Keyframe, Observation
+from care_sim.base.errors import InvalidInput
+from care_sim.base.portable_hash import portable_bytes
+from care_sim.base.text import one_line
+from care_sim.core.belief import Observation
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.task import Row
@@ -49,7 +51,7 @@ def run_episode(config: EpisodeConfig) -> Row:
     """Play an episode and return its row.
 
     Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields of
-    `care_sim.core.types.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far; and
+    `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far; and
     `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`).
     """
     return trace(config)[0]
@@ -104,7 +106,7 @@ class Seal:
     def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
         """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
         poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
-        self._content.update(imprint(np.asarray(fired, np.int64), observation["ranges"], poses))
+        self._content.update(portable_bytes(np.asarray(fired, np.int64), observation["ranges"], poses))
 
     def hexdigest(self) -> str:
         """The hash so far."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from uuid import uuid4
 
 import care_sim
-from care_sim.base import package_files as belongings
-from care_sim.base.digests import _combined, _content, file_digest
+from care_sim.base import package_files
+from care_sim.base.digests import combined_digest, content_digest, file_digest
 from care_sim.perception.listing import BUILT_IN as BUILT_IN_DETECTORS
 from care_sim.perception.listing import entries as detector_entries
 from care_sim.policies import BUILT_IN
@@ -31,7 +31,7 @@ SESSION = uuid4().hex
 
 def code_digest() -> str:
     """Hash of the package's sources and weights, so that no row of an edited program passes for a new one."""
-    return _combined([_sources_digest(Path(care_sim.__file__).parent), str(file_digest(SHIPPED))])
+    return combined_digest([_sources_digest(Path(care_sim.__file__).parent), str(file_digest(SHIPPED))])
 
 
 def policy_digest(policy: str) -> str | None:
@@ -48,27 +48,29 @@ def detector_digest(detector: str) -> str | None:
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:
-    files = belongings.shipped(entry)
+    files = package_files.shipped_files(entry)
     if files is None:
         return None
-    shipped = [f"{name} {_loaded(file) if file.suffix in CODE else _content(file)}" for name, file in files.items()]
-    further = belongings.named(entry) | belongings.written(files.values())
+    shipped = [
+        f"{name} {_loaded(file) if file.suffix in CODE else content_digest(file)}" for name, file in files.items()
+    ]
+    further = package_files.files_named_by(entry) | package_files.files_named_in(files.values())
     named = [(name, file_digest(path)) for name, path in further.items()]
     if any(digest is None for _, digest in named):
         return None
-    return _combined([*sorted(shipped), *(f"{name} {digest}" for name, digest in named)])
+    return combined_digest([*sorted(shipped), *(f"{name} {digest}" for name, digest in named)])
 
 
 @cache
 def _loaded(path: Path) -> str:
     """The hash of a file of code, once a process, which has it loaded."""
-    return _content(path)
+    return content_digest(path)
 
 
 @cache
 def _sources_digest(root: Path) -> str:
     """The hash of all code below a folder, once a process, which has it loaded."""
-    return _combined(f"{file.relative_to(root)} {_content(file)}" for file in sorted(root.rglob("*.py")))
+    return combined_digest(f"{file.relative_to(root)} {content_digest(file)}" for file in sorted(root.rglob("*.py")))
 
 
 def versions() -> dict[str, str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.core.types import Outcome
+from care_sim.loops.records import Outcome
 from care_sim.study import episode_config as config
 from care_sim.study import episode_play as episode
 from care_sim.study import play_config

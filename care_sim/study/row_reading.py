@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from care_sim.base.errors import InvalidInput, is_number
-from care_sim.core.conditions import CAMERA_FAULTS, UNFELT_BY_FULL
+from care_sim.base.checks import is_number
+from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import CAMERA_FAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.evaluation.censoring import Reading
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.task import Row
@@ -41,7 +42,7 @@ class Setting:
 
     def for_full(self) -> "Setting":
         """The setting in which the full scan of the same world is found."""
-        return Setting(self.scenario, tuple(pair for pair in self.conditions if pair[0] not in UNFELT_BY_FULL))
+        return Setting(self.scenario, tuple(pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN))
 
 
 Key = tuple[Setting, str, float]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import care_sim
-from care_sim.base.portable_hash import imprint
+from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
@@ -152,14 +152,14 @@ def film_hash(film: Film) -> str:
     iteration, which makes a millimetre of a last bit.
     """
     cameras = tuple(astuple(camera) for camera in film.cameras)
-    content = hashlib.sha256(imprint(film.name, cameras, film.sensor_height_m, film.keyframe_s))
+    content = hashlib.sha256(portable_bytes(film.name, cameras, film.sensor_height_m, film.keyframe_s))
     for shot in film.shots:
         seen, sights, cloud = shot.annotations, shot.sights, shot.cloud
-        content.update(imprint(shot.time_s, shot.token, astuple(shot.ego)))
-        content.update(imprint(seen.objects, seen.classes, seen.boxes, sights.detections.rows(), sights.objects))
-        content.update(imprint(cloud.cells, cloud.objects))
+        content.update(portable_bytes(shot.time_s, shot.token, astuple(shot.ego)))
+        content.update(portable_bytes(seen.objects, seen.classes, seen.boxes, sights.detections.rows(), sights.objects))
+        content.update(portable_bytes(cloud.cells, cloud.objects))
     hidden = film.hidden
-    content.update(imprint(hidden.objects, hidden.classes, hidden.boxes))
+    content.update(portable_bytes(hidden.objects, hidden.classes, hidden.boxes))
     return content.hexdigest()[:16]
 
 
@@ -187,5 +187,5 @@ def _sightings(score: Score) -> dict[str, list[Any]]:
 def _episode_hash(exposures: Sequence[Exposure]) -> str:
     content = hashlib.sha256()
     for exposure in exposures:
-        content.update(imprint(exposure.fired, exposure.detections.classes, exposure.detections.boxes))
+        content.update(portable_bytes(exposure.fired, exposure.detections.classes, exposure.detections.boxes))
     return content.hexdigest()[:16]

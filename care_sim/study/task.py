@@ -12,9 +12,10 @@ import gymnasium
 
 import care_sim
 from care_sim.base.digests import file_digest
-from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.package_files import paths
-from care_sim.core.conditions import DEFAULTS, UNFELT_BY_FULL
+from care_sim.base.errors import InvalidInput
+from care_sim.base.package_files import paths_in
+from care_sim.base.text import shown
+from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
 from care_sim.study.parameters import Parameters, settled
@@ -128,7 +129,7 @@ def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, An
     if parameters := conditions.get("policy_parameters"):
         felt["policy_parameters"] = own(policy, parameters)
     if policy == FULL:
-        felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNFELT_BY_FULL}
+        felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNUSED_BY_FULL_SCAN}
     return felt
 
 
@@ -146,7 +147,7 @@ def own(policy: str, parameters: Parameters) -> Parameters:
 
 def files_in(parameters: Parameters) -> list[str | None]:
     """Hashes of the files and folders that parameters name; None of a folder with too many files to be read."""
-    return [file_digest(path) for _, value in parameters for path in paths(value)]
+    return [file_digest(path) for _, value in parameters for path in paths_in(value)]
 
 
 def flat(prefix: str, parameters: Parameters) -> Row:

@@ -6,8 +6,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import LARGEST, InvalidInput
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.envs.reward import HEAVIEST
 from care_sim.policies.learned.wrapper_text import Wrapping
@@ -43,9 +44,9 @@ class AgentConfig:
     """Blocks of the observation from top to bottom."""
     gain: float = bounded(10.0, 0, HEAVIEST)
     """Weight of the reward's term `gain`, in the closed loop; the others keep theirs."""
-    steps: int = bounded(200_000, 1, LARGEST)
+    steps: int = bounded(200_000, 1, LARGEST_INTEGER)
     """Environment steps in all."""
-    seed: int = bounded(0, 0, LARGEST)
+    seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Of the weights, the exploration and the episodes trained on."""
     environments: int = bounded(8, 1, 1024)
     """Environments side by side."""
@@ -57,7 +58,7 @@ class AgentConfig:
     """Step size of Adam."""
     discount: float = bounded(0.9, 0, 1)
     """What a reward is worth a keyframe later."""
-    evaluate_every: int = bounded(20_000, 1, LARGEST)
+    evaluate_every: int = bounded(20_000, 1, LARGEST_INTEGER)
     """Environment steps between evaluations; each also writes a checkpoint."""
     episodes: int = bounded(20, 1, TRAINING - VALIDATION)
     """Held-out episodes an evaluation."""
@@ -69,7 +70,7 @@ class AgentConfig:
     """Write a log for TensorBoard beside the weights; needs the package tensorboard."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
         if not 0 < len(self.budget) <= self.environments:
             raise InvalidInput(f"budget needs one value to {self.environments}, the environments; got {self.budget}")
         self.wrapping, self.arguments  # noqa: B018 (refuse what does not fit)

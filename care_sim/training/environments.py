@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 
 import care_sim
-from care_sim.base.errors import check_known
+from care_sim.base.checks import check_known
 from care_sim.base.processes import following, starting
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.wrappers.grid_observation import GridObservation

@@ -19,10 +19,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.base.errors import LARGEST, InvalidInput, is_number
+from care_sim.base.checks import LARGEST_INTEGER, is_number
+from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
 from care_sim.base.json_text import parsed
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save
 from care_sim.training.card_provenance import machine, versions
 from care_sim.training.config import AgentConfig
@@ -176,7 +177,7 @@ def _evaluation(row: list[str]) -> Evaluation:
     """A row of the curve. Raises ValueError for what is no number that can be drawn."""
     steps, seconds, value, distance = row
     numbers = (float(seconds), float(value), *([float(distance)] if distance else []))
-    if not (0 <= int(steps) <= LARGEST and all(map(_is_finite, numbers))):
+    if not (0 <= int(steps) <= LARGEST_INTEGER and all(map(_is_finite, numbers))):
         raise ValueError(f"{', '.join(row)} are no numbers of an evaluation")
     return int(steps), float(seconds), float(value), float(distance) if distance else None
 

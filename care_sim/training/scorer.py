@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import LARGEST
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.core.grid import AngularGrid
@@ -41,13 +41,13 @@ class TrainScorer:
 
     out: Path
     """File to write."""
-    seed: int = bounded(0, 0, LARGEST)
+    seed: int = bounded(0, 0, LARGEST_INTEGER)
     """Of the first weights and the order of the examples."""
-    steps: int = bounded(4000, 1, LARGEST)
+    steps: int = bounded(4000, 1, LARGEST_INTEGER)
     """Batches that are learned from."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
 
     def __call__(self) -> int:
         """Run it."""

@@ -19,9 +19,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.belief import Belief
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
-from care_sim.core.types import Belief
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film, Shot

@@ -7,19 +7,18 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats, Frame, Pose
+from care_sim.core.frames import Floats, Frame, Integers, Pose
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.bullet_clients import borrow, give_back, leave
-from care_sim.world.bullet_shapes import Looks
+from care_sim.world.bullet_shapes import Polyhedra
 from care_sim.world.primitives import Primitives
 from care_sim.world.quiet_pybullet import pybullet
 
-Integers = NDArray[np.int64]
-Window = tuple[int, int, int, int]
+PixelWindow = tuple[int, int, int, int]
 """Left, top, right, bottom in whole pixels."""
 
-NOTHING = -1
+NO_BODY = -1
 RAYS_A_CALL = 8192
 """`rayTestBatch` returns nothing, silently, for a batch of 16,384 rays or more."""
 
@@ -44,9 +43,9 @@ class BulletWorld:
         self._abandoned = finalize(self, leave, self._client)
         self._abandoned.atexit = False
         self.primitives = Primitives()
-        self.looks = Looks()
+        self.polyhedra = Polyhedra()
         self._moved: set[int] = set()
-        self.ground = self._lay_ground() if ground else NOTHING
+        self.ground = self._lay_ground() if ground else NO_BODY
 
     def _lay_ground(self) -> int:
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
@@ -74,7 +73,7 @@ class BulletWorld:
         )
         self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
         self.primitives.add(body, () if transparent else kind.parts)
-        self.looks.add(body, seen)
+        self.polyhedra.add(body, seen)
         self.move(body, pose)
         self._tell([body])
         return int(body)
@@ -95,7 +94,7 @@ class BulletWorld:
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.
 
-        Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NOTHING there.
+        Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NO_BODY there.
         """
         self._tell(self._moved)
         targets = origin + directions * reach
@@ -108,10 +107,10 @@ class BulletWorld:
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
         ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
         shares = np.fromiter((hit[2] for hit in hits), np.float64, len(hits))
-        return np.where(ids == NOTHING, np.inf, shares * reach), ids
+        return np.where(ids == NO_BODY, np.inf, shares * reach), ids
 
-    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window | None = None) -> Integers:
-        """(height, width) id of the body each pixel of `camera` shows, NOTHING where there is none.
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow | None = None) -> Integers:
+        """(height, width) id of the body each pixel of `camera` shows, NO_BODY where there is none.
 
         The camera is mounted in the frame `sensor`. Of a `window` only its own rows and columns.
         """
@@ -139,7 +138,7 @@ class BulletWorld:
             pybullet.resetBasePositionAndOrientation(body, pose[:3], pose[3:], physicsClientId=self._client)
             self._moved.discard(body)
 
-    def _render(self, camera: PinholeCamera, sensor: Frame, window: Window) -> tuple[Any, ...]:
+    def _render(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> tuple[Any, ...]:
         self._tell(self._moved)
         eye, (forward, _, up) = camera.stance(sensor)
         left, top, right, bottom = window

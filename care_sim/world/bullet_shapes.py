@@ -25,7 +25,7 @@ Tables = tuple[Floats, Floats, Integers, Integers, Integers]
 _NOTHING: Mesh = np.empty((0, 3)), np.empty((0, 4)), np.empty((0, 2), np.int64)
 
 
-class Looks:
+class Polyhedra:
     """Every part that cameras see, as a polyhedron in the frame of its body."""
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ def _mesh(part: Part) -> Mesh:
 
 @lru_cache(maxsize=256)
 def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
-    """Corners, faces and edges of a primitive about its centre; see `Looks.tables`."""
+    """Corners, faces and edges of a primitive about its centre; see `Polyhedra.tables`."""
     corners = _corners(shape, np.array(size))
     hull = ConvexHull(corners)
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Pose
+from care_sim.core.frames import Floats, Integers, Pose
 from care_sim.world.bodies import Triple
-from care_sim.world.bullet import Integers
 
 
 class Footprints:

@@ -44,7 +44,7 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
         return float(self.start[0]), float(self.start[1]), float(self.direction[0])
 
 
-class Driver(IDMVehicle):  # type: ignore[misc]
+class LaneDriver(IDMVehicle):  # type: ignore[misc]
     """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the middle of one."""
 
     def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
@@ -92,13 +92,13 @@ class Traffic:
 
     def add_driver(self, x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
         """A vehicle that keeps its lane and follows the intelligent driver model (IDM) at `speed`."""
-        vehicle = self._make(Driver, x, lane, speed, kind)
+        vehicle = self._make(LaneDriver, x, lane, speed, kind)
         vehicle.enter()
         return vehicle
 
     def add_parked_driver(self, x: float, lane: int, kind: BodyKind, target_speed: float) -> "RoadVehicle":
         """An IDM driver who stands in `lane` until told to `pull_out`, and then wants `target_speed`."""
-        vehicle = self._make(Driver, x, lane, target_speed, kind)
+        vehicle = self._make(LaneDriver, x, lane, target_speed, kind)
         vehicle.stand()
         return vehicle
 

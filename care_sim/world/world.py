@@ -5,15 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput, check_known
-from care_sim.core.frames import Floats, Pose
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats, Integers, Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
-from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.world.bullet import BulletWorld
 from care_sim.world.footprints import Footprints
 from care_sim.world.traffic import RoadVehicle, Traffic
 
-STEP_S = 0.05
+WORLD_STEP_S = 0.05
 """World step. Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
 CONTACT_REACH_M = 0.5
 """Contact is looked for among bodies this close: far more than the centimetres by which hulls are padded."""
@@ -127,14 +128,14 @@ class World:
 
     def _step(self, acceleration: float) -> Passage:
         before = self.ego.speed
-        self.ego.accelerate(acceleration, STEP_S)
-        self.traffic.step(STEP_S)
+        self.ego.accelerate(acceleration, WORLD_STEP_S)
+        self.traffic.step(WORLD_STEP_S)
         self._steps += 1
-        self.time = round(self._steps * STEP_S, 9)
+        self.time = round(self._steps * WORLD_STEP_S, 9)
         for event in [event for due, event in self._events if due <= self.time]:
             event()
         self._events = [(due, event) for due, event in self._events if due > self.time]
-        self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / STEP_S)
+        self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / WORLD_STEP_S)
         bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
         self.bullet.move_all(bodies, poses)
@@ -163,7 +164,7 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 
 def whole_steps(duration: float) -> int:
     """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide it."""
-    steps = round(duration / STEP_S)
-    if steps < 1 or abs(steps * STEP_S - duration) > 1e-9:
-        raise InvalidInput(f"keyframe_s must be a multiple of the world step {STEP_S} s, got {duration!r}")
+    steps = round(duration / WORLD_STEP_S)
+    if steps < 1 or abs(steps * WORLD_STEP_S - duration) > 1e-9:
+        raise InvalidInput(f"keyframe_s must be a multiple of the world step {WORLD_STEP_S} s, got {duration!r}")
     return steps

@@ -9,15 +9,19 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.base.bounds import allowed, bounded, settle
-from care_sim.base.errors import InvalidInput, check_path, check_whole, one_line, shown
+from care_sim.base.bounds import allowed, bounded, check_fields
+from care_sim.base.checks import check_path, check_whole
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import one_line, shown
 from care_sim.commands.shared.options import seeds_of
 from care_sim.core.allocation import allocate
+from care_sim.core.belief import Belief
 from care_sim.core.conditions import Conditions
 from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.types import Belief, Demand, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.envs.closed_loop import DenseEnv
 from care_sim.envs.open_loop import FilmEnv, ReplayEnv, StreetEnv
 from care_sim.scenarios import SCENARIOS, make_scenario
@@ -148,7 +152,7 @@ def test_a_dataclass_is_settled_by_kind():
         span: tuple[float, float] = bounded((1.0, 2.0), 0, 3)
 
         def __post_init__(self):
-            settle(self, " of it")
+            check_fields(self, " of it")
 
     assert Thing(span=[1, 2], share=1) == Thing(span=(1.0, 2.0), share=1.0)
     for name, value in (("flag", 1), ("name", 2), ("count", 6), ("share", "x"), ("span", (2, 1)), ("span", (0, 1, 2))):

@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import DEEPEST, parsed
+from care_sim.base.json_text import MOST_LEVELS, parsed
 from care_sim.policies.learned.weights import load
 from care_sim.reports.page.provenance import CONFIG, _description
 from care_sim.sources.nuscenes.tables import read_json
 
-DEEP = {n: "[" * n + "]" * n for n in (DEEPEST, DEEPEST + 1, 980, 100_000)}
+DEEP = {n: "[" * n + "]" * n for n in (MOST_LEVELS, MOST_LEVELS + 1, 980, 100_000)}
 
 
 def test_what_is_not_too_deep_comes_back():
-    for text in ('{"a": [1, {"b": null}]}', DEEP[DEEPEST], "3", '"\\ud800"'):
+    for text in ('{"a": [1, {"b": null}]}', DEEP[MOST_LEVELS], "3", '"\\ud800"'):
         assert parsed(text) == json.loads(text)
     assert parsed('{"a": {"b": 1}}', len) == 1
     wide = json.dumps([[[n]] for n in range(1000)])
     assert parsed(wide) == json.loads(wide)
 
 
-@pytest.mark.parametrize("text", [DEEP[DEEPEST + 1], DEEP[980], DEEP[100_000], "[" * 100_000, '{"a":' * 100_000])
+@pytest.mark.parametrize("text", [DEEP[MOST_LEVELS + 1], DEEP[980], DEEP[100_000], "[" * 100_000, '{"a":' * 100_000])
 def test_what_is_too_deep_is_a_value_error(text):
     with pytest.raises(ValueError, match="deep"):
         parsed(text)

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from care_sim.base.portable_hash import STEP, imprint
+from care_sim.base.portable_hash import STEP, portable_bytes
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import make_street
@@ -56,42 +56,42 @@ def test_the_features_that_are_left_out_change_last_bits():
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.5, 0.05, 0.1, 1e-4, 5e-5, 12.34565, -0.25, -3e-4, 50.0, 1e6])
 def test_round_numbers_are_not_on_a_border(value):
     near = [value * (1 - 1e-13) - 1e-13, value, value * (1 + 1e-13) + 1e-13]
-    assert len({imprint(one) for one in near}) == 1
+    assert len({portable_bytes(one) for one in near}) == 1
 
 
 def test_zero_has_no_sign_and_float32_is_not_another_number():
-    assert imprint(-0.0) == imprint(0.0)
-    assert imprint(np.float32(1.5)) == imprint(1.5)
-    assert imprint(np.float32(7.123456)) == imprint(7.123456)
-    assert imprint(np.arange(3, dtype=np.int32)) == imprint([0, 1, 2])
+    assert portable_bytes(-0.0) == portable_bytes(0.0)
+    assert portable_bytes(np.float32(1.5)) == portable_bytes(1.5)
+    assert portable_bytes(np.float32(7.123456)) == portable_bytes(7.123456)
+    assert portable_bytes(np.arange(3, dtype=np.int32)) == portable_bytes([0, 1, 2])
 
 
 def test_what_is_not_finite_is_told_apart():
     strange = [np.inf, -np.inf, np.nan, 0.0, 1e300, -1e300]
-    assert len({imprint(one) for one in strange}) == len(strange)
-    assert imprint([np.inf, 1.0]) == imprint([np.inf, 1.0 + 1e-12])
+    assert len({portable_bytes(one) for one in strange}) == len(strange)
+    assert portable_bytes([np.inf, 1.0]) == portable_bytes([np.inf, 1.0 + 1e-12])
 
 
 @given(arrays(np.float64, 5, elements=st.floats(-1e5, 1e5)), st.integers(0, 4), st.sampled_from([0.001, -0.001, 0.01]))
 def test_a_millimetre_is_noticed(values, place, change):
     moved = values.copy()
     moved[place] += change
-    assert imprint(moved) != imprint(values)
+    assert portable_bytes(moved) != portable_bytes(values)
 
 
 @given(st.lists(st.integers(-(2**60), 2**60), min_size=1, max_size=5), st.integers(0, 4))
 def test_whole_numbers_are_taken_exactly(values, place):
     assume(place < len(values))
     other = [value + (n == place) for n, value in enumerate(values)]
-    assert imprint(np.array(other, np.int64)) != imprint(np.array(values, np.int64))
+    assert portable_bytes(np.array(other, np.int64)) != portable_bytes(np.array(values, np.int64))
 
 
 def test_parts_do_not_run_into_each_other():
-    assert imprint([1, 2], [3]) != imprint([1], [2, 3]) != imprint([1, 2, 3])
-    assert imprint("a\udcff") != imprint("a?")
-    assert imprint("ab", "c") != imprint("a", "bc")
-    assert imprint(((1, 2), 3)) != imprint((1, (2, 3)))
-    assert imprint(np.zeros((2, 3), int)) != imprint(np.zeros((3, 2), int))
+    assert portable_bytes([1, 2], [3]) != portable_bytes([1], [2, 3]) != portable_bytes([1, 2, 3])
+    assert portable_bytes("a\udcff") != portable_bytes("a?")
+    assert portable_bytes("ab", "c") != portable_bytes("a", "bc")
+    assert portable_bytes(((1, 2), 3)) != portable_bytes((1, (2, 3)))
+    assert portable_bytes(np.zeros((2, 3), int)) != portable_bytes(np.zeros((3, 2), int))
 
 
 def test_who_is_hidden_at_the_start_of_a_film_counts():

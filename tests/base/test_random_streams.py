@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.random_streams import check_secret, closed, streams
+from care_sim.base.random_streams import check_secret, secret_entropy, streams
 
 
 def states(sequences):
@@ -30,8 +30,8 @@ def test_a_secret_makes_all_of_them_others_and_the_same_ones_again(seed, secret)
 
 
 def test_a_street_and_an_episode_of_one_seed_and_secret_have_no_root_in_common():
-    assert closed("street", (3,), "key") != closed("episode", (3,), "key")
-    root = np.random.SeedSequence(closed("episode", (3,), "key"))
+    assert secret_entropy("street", (3,), "key") != secret_entropy("episode", (3,), "key")
+    root = np.random.SeedSequence(secret_entropy("episode", (3,), "key"))
     assert states(streams((3,), 2, "key")) == states(root.spawn(2))
 
 

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.allocation import allocate, budget_cells, fired_cells, scores_of
+from care_sim.core.actions import fired_cells, scores_of
+from care_sim.core.allocation import allocate, budget_cells
 from care_sim.core.types import Demand
 
 CELLS = 40

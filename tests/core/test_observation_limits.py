@@ -5,12 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.observation_limits import MAX_AGE_S, MAX_SPEED_MPS, Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import camera_layers, explained
-from care_sim.core.types import CLASSES, MAX_DETECTIONS, MAX_TRACKS, Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.envs.spaces import observation_space
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.frames import Frame
-from care_sim.core.pinhole import NEAR_M, Lenses, PinholeCamera
+from care_sim.core.pinhole import NEAR_M, CameraModels, PinholeCamera
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 cameras = st.builds(
@@ -124,16 +124,16 @@ def test_the_axes_of_a_camera_are_those_of_the_frame_it_stands_in(yaw, pitch, ro
 def test_several_cameras_at_once_see_what_each_sees_alone():
     boxes = np.array([[10.0, 20, 30, 60], [100, 40, 300, 100], [0, 0, 320, 180], [160, 90, 200, 120]])
     numbers = np.array([5, 0, 2, 0])
-    rays = Lenses.of(SURROUND_CAMERAS).box_rays(boxes, numbers)
+    rays = CameraModels.of(SURROUND_CAMERAS).box_rays(boxes, numbers)
     for row, number in enumerate(numbers):
         np.testing.assert_array_equal(rays[row], SURROUND_CAMERAS[number].box_rays(boxes[row])[0])
 
 
 def test_a_camera_that_the_car_does_not_have_is_no_other():
     with pytest.raises(IndexError):
-        Lenses.of(SURROUND_CAMERAS).box_rays(np.array([[10.0, 20, 30, 60]]), np.array([6]))
+        CameraModels.of(SURROUND_CAMERAS).box_rays(np.array([[10.0, 20, 30, 60]]), np.array([6]))
 
 
 def test_a_rig_may_have_no_camera():
-    assert [column.shape for column in Lenses.of(())] == [(0, 3), (0, 3, 3), (0,), (0, 2)]
-    assert [column.shape for column in Lenses.of(SURROUND_CAMERAS[:2])] == [(2, 3), (2, 3, 3), (2,), (2, 2)]
+    assert [column.shape for column in CameraModels.of(())] == [(0, 3), (0, 3, 3), (0,), (0, 2)]
+    assert [column.shape for column in CameraModels.of(SURROUND_CAMERAS[:2])] == [(2, 3), (2, 3, 3), (2,), (2, 2)]

@@ -3,10 +3,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.core.belief import Belief
 from care_sim.core.frames import turned
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import camera_layers, explained, wedges
-from care_sim.core.types import Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 CAMERA = PinholeCamera()

@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import CLASSES, MAX_DETECTIONS, MAX_TRACKS, Belief, Ego, ImageDetections, Tracks
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 GRID = AngularGrid()
 STANDING = Ego()

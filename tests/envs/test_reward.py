@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.types import Keyframe
 from care_sim.envs.reward import KEEP_CLEAR_M, WEIGHTS, Potential, terms, weights
+from care_sim.loops.records import Keyframe
 
 
 def keyframe(**changes):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from care_sim.core.types import Keyframe, Outcome
 from care_sim.evaluation.metrics import outcome
+from care_sim.loops.records import Keyframe, Outcome
 
 
 def keyframe(index=0, **changes):

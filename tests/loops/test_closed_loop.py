@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from care_sim.core.conditions import Sensing
-from care_sim.core.types import CLASSES, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.perception.tracker import MemoryRules
 from care_sim.sensors.camera import FRONT_CAMERA

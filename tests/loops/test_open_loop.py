@@ -7,7 +7,8 @@ import pytest
 
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
-from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.points_only import PointsOnly

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.core.types import CLASSES, Belief, Ego, ImageDetections, Tracks
+from care_sim.core.belief import Belief
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 STANDING = Ego()
 

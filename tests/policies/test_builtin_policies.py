@@ -10,8 +10,10 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
+from care_sim.core.belief import Belief
 from care_sim.core.forgetting import ForgettingRules
-from care_sim.core.types import Belief, Ego, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Ego
 from care_sim.policies.paper.care_sbf import CareSbf
 
 SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]

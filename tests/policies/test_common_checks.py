@@ -8,7 +8,8 @@ import pytest
 
 import care_sim
 from care_sim.core.allocation import allocate
-from care_sim.core.types import CLASSES, MAX_DETECTIONS, Belief, ImageDetections
+from care_sim.core.belief import MAX_DETECTIONS, Belief
+from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.policies import BUILT_IN
 
 BEFORE = {"CARE-Dartout-v0": 24, "CARE-Dense-v0": 24, "CARE-CutIn-v0": 24, "CARE-Street-v0": 2, "CARE-Replay-v0": 2}

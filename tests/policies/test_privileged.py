@@ -9,7 +9,7 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.core.types import Belief
+from care_sim.core.belief import Belief
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.policies import BUILT_IN, tags_of
 from care_sim.policies.paper.farthest_points import FarthestPoints

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import camera_layers
-from care_sim.core.types import Belief, Ego
+from care_sim.core.types import Ego
 from care_sim.policies.paper.beam_reduce import horizon_rows
 from care_sim.policies.paper.history_uniform import uniform_pattern
 

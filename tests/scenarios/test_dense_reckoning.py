@@ -10,7 +10,8 @@ from care_sim.core.conditions import MIN_RETURNS, Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import wedges
-from care_sim.core.types import Demand, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, sights_of
 from care_sim.sensors.lidar import LIDAR_POSITION

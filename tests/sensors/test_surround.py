@@ -7,7 +7,7 @@ from care_sim.core.frames import Frame
 from care_sim.sensors.annotated import NOBODY
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.bullet import NOTHING, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld
 
 SENSOR = Frame(3.0, -2.0, 1.84, 0.6, roll=0.03, pitch=-0.02)
 
@@ -46,11 +46,11 @@ def test_a_full_sweep_holds_every_return_at_its_place(bare, grid):
     for sensor in (SENSOR, Frame(3.0, -2.0, 1.84, 0.6)):
         cloud = full_sweep(bare, grid, sensor, sensor.boxes_to_local(boxes), 1.84)
         ranges, bodies = bare.cast(sensor.origin, sensor.vectors_to_world(grid.directions), grid.range_m)
-        hit = cloud.objects != NOTHING
+        hit = cloud.objects != NO_BODY
         assert np.array_equal(cloud.cells[hit], np.flatnonzero(np.isfinite(ranges)))
         assert np.array_equal(cloud.objects[hit], bodies[cloud.cells[hit]])
         assert np.linalg.norm(cloud.points[hit], axis=1) == pytest.approx(ranges[cloud.cells[hit]])
-        assert set(bodies.tolist()) == {NOTHING, *range(len(poses))}
+        assert set(bodies.tolist()) == {NO_BODY, *range(len(poses))}
 
 
 def test_the_road_is_where_a_ground_plane_would_be_hit(bullet, grid):
@@ -60,7 +60,7 @@ def test_the_road_is_where_a_ground_plane_would_be_hit(bullet, grid):
     ranges, _ = bullet.cast(upright.origin, upright.vectors_to_world(grid.directions), grid.range_m)
     assert np.array_equal(cloud.cells, np.flatnonzero(np.isfinite(ranges)))
     assert np.linalg.norm(cloud.points, axis=1) == pytest.approx(ranges[cloud.cells], abs=1e-9)
-    assert set(cloud.objects.tolist()) == {NOTHING}
+    assert set(cloud.objects.tolist()) == {NO_BODY}
 
 
 def test_cameras_report_labelled_bodies_alone(bullet):

@@ -6,7 +6,7 @@ from importlib.machinery import ModuleSpec
 import numpy as np
 import pytest
 
-from care_sim.base import package_files as belongings
+from care_sim.base import package_files
 from care_sim.base.errors import InvalidInput
 from care_sim.study import provenance
 from care_sim.study.episode_config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, listed
@@ -119,7 +119,7 @@ def test_the_digest_covers_the_package_of_an_installed_policy(package, edited):
 
 
 def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers(package, monkeypatch):
-    monkeypatch.setattr(belongings, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
+    monkeypatch.setattr(package_files, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
     ours = EpisodeConfig("dense", "near")
     before = ours.digest()
     monkeypatch.setattr("care_sim.study.task.SESSION", "another run")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from care_sim.base import package_files as belongings
+from care_sim.base import package_files
 from care_sim.commands.shared.conduct import conduct
 from care_sim.policies.installed import entries
 from care_sim.sources.scenes import source_of
@@ -147,15 +147,15 @@ def test_a_text_in_code_names_no_folder_and_nothing_of_the_system(install, tmp_p
     source.write_text(source.read_text() + "SEEN = ('/proc/self/status', {'a': ['/dev/null']})\nX = 'runs.d'\n")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs.d").mkdir()
-    files = belongings.shipped(entries()["mine"]).values()
-    assert belongings.written(files) == {}
-    assert [*belongings.paths(("/proc/self/status", {"a": ["/dev/null"]}))] == []
+    files = package_files.shipped_files(entries()["mine"]).values()
+    assert package_files.files_named_in(files) == {}
+    assert [*package_files.paths_in(("/proc/self/status", {"a": ["/dev/null"]}))] == []
 
 
 def test_structures_that_hold_themselves_end():
     cycle = {}
     cycle["a"] = [cycle, "/"]
-    assert set(belongings.paths(cycle)) == {Path("/")}
+    assert set(package_files.paths_in(cycle)) == {Path("/")}
 
 
 def test_data_files_of_a_wheel_count_and_scripts_do_not(site, tmp_path):

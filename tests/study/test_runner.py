@@ -13,7 +13,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.conduct import conduct
-from care_sim.core.types import Outcome
+from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import answer, run_episode, trace
 from care_sim.study.journal import JOURNAL, Journal

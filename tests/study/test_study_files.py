@@ -4,7 +4,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.core.types import Outcome
+from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import Journal
 from care_sim.study.results_files import EPISODES

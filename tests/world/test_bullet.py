@@ -7,7 +7,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.bullet import NOTHING, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld
 
 FORWARD = np.array([[1.0, 0.0, 0.0]])
 BLOCK = CATALOGUE["trailer"]
@@ -33,7 +33,7 @@ def test_a_slanted_ray_onto_a_turned_box(bullet):
 def test_nothing_within_reach_is_infinitely_far(bullet):
     bullet.add(BLOCK, (40.0, 0.0, 0.0))
     ranges, ids = bullet.cast([0.0, 0.0, 1.0], FORWARD, 33.9)
-    assert (ranges[0], ids[0]) == (np.inf, NOTHING)
+    assert (ranges[0], ids[0]) == (np.inf, NO_BODY)
     assert bullet.cast([0.0, 0.0, 1.0], FORWARD, 34.1)[0][0] == pytest.approx(40 - 12.01 / 2)
 
 
@@ -51,7 +51,7 @@ def test_every_ray_of_any_number_is_answered_in_its_place(bullet, count):
     ranges, ids = bullet.cast([0.0, 0.0, 1.0], directions, 50.0)
     ahead = np.arange(count) % 2 == 0
     assert len(ranges) == len(ids) == count
-    assert np.array_equal(ids, np.where(ahead, body, NOTHING))
+    assert np.array_equal(ids, np.where(ahead, body, NO_BODY))
     assert np.allclose(ranges[ahead], NEAR_SIDE)
 
 
@@ -148,8 +148,8 @@ def test_the_picture_agrees_with_rays_through_its_pixels(bullet, heading, camera
     turn = np.array([[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]])
     eye = sensor.origin + turn @ camera.position
     _, ids = bullet.cast(eye, (rays / np.linalg.norm(rays, axis=1)[:, None]) @ turn.T, 110.0)
-    cast = np.where(ids == bullet.ground, NOTHING, ids).reshape(180, 320)
-    shown = np.where(picture == bullet.ground, NOTHING, picture)
+    cast = np.where(ids == bullet.ground, NO_BODY, ids).reshape(180, 320)
+    shown = np.where(picture == bullet.ground, NO_BODY, picture)
 
     same = shown == cast
     assert same[within_silhouettes(shown) & within_silhouettes(cast)].all()
@@ -159,8 +159,8 @@ def test_the_picture_agrees_with_rays_through_its_pixels(bullet, heading, camera
 
 def test_an_empty_street_shows_no_body(bullet):
     picture = bullet.body_ids(FRONT_CAMERA, Frame(0, 0, 1.84, 0))
-    assert set(picture.ravel().tolist()) <= {NOTHING, bullet.ground}
-    assert set(picture[:80].ravel().tolist()) == {NOTHING}
+    assert set(picture.ravel().tolist()) <= {NO_BODY, bullet.ground}
+    assert set(picture[:80].ravel().tolist()) == {NO_BODY}
 
 
 def test_left_is_left_in_the_picture(bullet):

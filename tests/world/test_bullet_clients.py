@@ -4,7 +4,7 @@ import pytest
 from care_sim.core.frames import Frame
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
-from care_sim.world.bullet import NOTHING, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld
 from care_sim.world.bullet_clients import borrow, give_back
 from care_sim.world.quiet_pybullet import pybullet
 
@@ -28,7 +28,7 @@ def test_a_client_is_used_again_and_empty():
 def test_two_worlds_at_a_time_have_clients_of_their_own():
     first, second = BulletWorld(), BulletWorld()
     first.add(CATALOGUE["bus"], (30.0, 0.0, 0.0))
-    assert second.cast(SENSOR.origin, AHEAD[:1], 50.0)[1].tolist() == [NOTHING]
+    assert second.cast(SENSOR.origin, AHEAD[:1], 50.0)[1].tolist() == [NO_BODY]
     first.close()
     second.close()
 

@@ -9,7 +9,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE, sized
-from care_sim.world.bullet import NOTHING, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld
 
 FORWARD = np.array([[1.0, 0.0, 0.0]])
 
@@ -17,7 +17,7 @@ FORWARD = np.array([[1.0, 0.0, 0.0]])
 def test_a_body_stands_at_any_height(bullet):
     bus = bullet.add(CATALOGUE["bus"], Frame(30.0, 0.0, 100.0, 0.0))
     heights = [99.9, 100.1, 103.4, 103.5]
-    assert [bullet.cast([0.0, 0.0, z], FORWARD, 50.0)[1][0] for z in heights] == [NOTHING, bus, bus, NOTHING]
+    assert [bullet.cast([0.0, 0.0, z], FORWARD, 50.0)[1][0] for z in heights] == [NO_BODY, bus, bus, NO_BODY]
 
 
 def test_a_pitched_box_presents_its_slanting_front(bullet):
@@ -35,7 +35,7 @@ def test_a_rolled_box_leans_to_its_right(bullet):
     slab = sized("slab", None, (4.0, 0.2, 3.0))
     bullet.add(slab, Frame(10.0, 0.0, 0.0, 0.0, roll=0.3))
     up, out = 2.8 * np.cos(0.3), -2.8 * np.sin(0.3)
-    hits = [bullet.cast([0.0, y, up], FORWARD, 50.0)[1][0] != NOTHING for y in (out, -out)]
+    hits = [bullet.cast([0.0, y, up], FORWARD, 50.0)[1][0] != NO_BODY for y in (out, -out)]
     assert hits == [True, False]
 
 
@@ -59,7 +59,7 @@ def test_a_tilted_camera_and_tilted_rays_see_the_same(bullet):
     eye = sensor.origin + sensor.vectors_to_world(np.array(FRONT_CAMERA.position))
     rays = sensor.vectors_to_world(rays / np.linalg.norm(rays, axis=1)[:, None])
     _, ids = bullet.cast(eye, rays, 110.0)
-    cast = np.where(ids == bullet.ground, NOTHING, ids).reshape(180, 320)
+    cast = np.where(ids == bullet.ground, NO_BODY, ids).reshape(180, 320)
     assert (picture == cast).mean() > 0.985
     assert len(np.unique(picture)) == 4
 
@@ -68,7 +68,7 @@ def test_a_world_without_ground_returns_nothing_from_below():
     world = BulletWorld(ground=False)
     try:
         ranges, ids = world.cast([0.0, 0.0, 1.84], np.array([[0.0, 0.0, -1.0]]), 50.0)
-        assert (ranges[0], ids[0], world.ground) == (np.inf, NOTHING, NOTHING)
+        assert (ranges[0], ids[0], world.ground) == (np.inf, NO_BODY, NO_BODY)
     finally:
         world.close()
 

@@ -132,7 +132,7 @@ def mixed():
 
 def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):
     poses = mixed()
-    monkeypatch.setattr(traffic, "Driver", traffic.IDMVehicle)
+    monkeypatch.setattr(traffic, "LaneDriver", traffic.IDMVehicle)
     monkeypatch.setattr(traffic, "LaneAlongX", traffic.StraightLane)
     monkeypatch.setattr(traffic.RoadVehicle, "forget_lane", lambda vehicle: None)
     assert poses.tobytes() == mixed().tobytes()

@@ -5,7 +5,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
 from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk
-from care_sim.world.world import STEP_S, World, whole_steps
+from care_sim.world.world import WORLD_STEP_S, World, whole_steps
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_events_happen_once_at_their_step(world):
     assert happened == []
     world.advance(0.0, 0.4)
     assert happened == pytest.approx([0.15, 0.3])
-    assert STEP_S == 0.05
+    assert WORLD_STEP_S == 0.05
 
 
 def test_labels_are_for_reported_bodies_of_the_five_classes(world):

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 from care_sim.core.conditions import Conditions
 from care_sim.study.parameters import parameters
 

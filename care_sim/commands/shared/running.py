@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.base.bounds import bounded, settle
+from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.options import USUAL
 from care_sim.study.executors import CORES, MOST_WORKERS
@@ -34,7 +34,7 @@ class Running:
     files are replaced at the end; its journal stays."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
 
     def conduct(self, study: str, configs: "Sequence[Task]", out: Path, left_out: Sequence[str] = ()) -> int:
         """Play the tasks, print their tables, name those that failed and the policies that were left out."""

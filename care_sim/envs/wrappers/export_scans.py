@@ -12,10 +12,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from care_sim.base.errors import InvalidInput, check_path
+from care_sim.base.checks import check_path
+from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_open3d
 from care_sim.base.files import replacing, why_unwritable, write_text
-from care_sim.core.budget_shares import SHARES
+from care_sim.core.actions import SHARES
 from care_sim.core.frames import Floats
 from care_sim.core.types import CLASSES, Action
 from care_sim.envs.wrappers.watching import Watching, numbered

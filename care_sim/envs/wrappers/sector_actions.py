@@ -8,7 +8,8 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from care_sim.core.allocation import allocate, scores_of
+from care_sim.core.actions import scores_of
+from care_sim.core.allocation import allocate
 from care_sim.core.types import Action, Demand
 from care_sim.envs.sensing import sensing
 from care_sim.envs.spaces import checked_scores

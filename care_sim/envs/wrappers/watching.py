@@ -7,7 +7,8 @@ from typing import Any
 
 import gymnasium
 
-from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.loops.closed_loop import ClosedLoop
@@ -82,7 +83,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
 
     @abstractmethod
     def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """The episode is over; `outcome` has the fields of `care_sim.core.types.Outcome`, None for one that was left."""
+        """The episode is over; `outcome` has the fields of `care_sim.loops.records.Outcome`, None for one that was left."""
 
 
 def numbered(path: Path, episode: int) -> Path:

@@ -4,9 +4,11 @@ import time
 
 import numpy as np
 
+from care_sim.core.belief import Belief, Observation
 from care_sim.core.frames import Floats
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.types import CLASSES, Belief, Ego, ImageDetections, Observation, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.driven import driven
 from care_sim.measure.bench.scanning.street import SENSOR, street

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import LARGEST, InvalidInput
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import InvalidInput
 from care_sim.study.episode_config import EpisodeConfig
 
 
@@ -26,7 +27,7 @@ class BenchConfig:
     """Rounds; in each round everything is measured once."""
     samples: int = bounded(200, 1, 1_000_000)
     """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
-    resets: int = bounded(2000, 1, LARGEST)
+    resets: int = bounded(2000, 1, LARGEST_INTEGER)
     """Episodes begun in the worker whose memory is watched."""
     seeds: int = bounded(5, 0, 10_000)
     """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it out."""
@@ -34,7 +35,7 @@ class BenchConfig:
     """File for the figures as JSON; the growth curves are drawn beside it, as PNG and SVG."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
         if self.out is not None and self.out.suffix in (".png", ".svg"):
             raise InvalidInput(f"out must be a file for JSON, got {self.out}; the figure is drawn beside it")
 

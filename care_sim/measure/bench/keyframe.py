@@ -3,7 +3,7 @@
 import time
 from contextlib import ExitStack
 
-from care_sim.core.types import Belief
+from care_sim.core.belief import Belief
 from care_sim.driving.braking import BrakingController
 from care_sim.measure.bench.driven import Environment, driven
 from care_sim.measure.bench.timing import timed

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.base.bounds import bounded, settle
-from care_sim.base.errors import InvalidInput, check_whole
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import check_whole
+from care_sim.base.errors import InvalidInput
 from care_sim.study.executors import MOST_WORKERS
 
 EPISODES, ALL_EPISODES = 1_000, 10_000
@@ -29,7 +30,7 @@ class CertifyConfig:
     """For maintainers, with all: make what is played now the published list."""
 
     def __post_init__(self) -> None:
-        settle(self)
+        check_fields(self)
         if self.episode is not None:
             check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
             if self.every or self.write:

@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from care_sim.base.portable_hash import imprint
+from care_sim.base.portable_hash import portable_bytes
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
@@ -87,7 +87,7 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._note(*_detected(self.env.unwrapped))
 
     def _note(self, *parts: Any) -> None:
-        self._content.update(imprint(*parts))
+        self._content.update(portable_bytes(*parts))
         self._stages.append(self._content.digest()[-1])
 
 

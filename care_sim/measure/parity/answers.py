@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.engines.engine import Bullet, RayEngine
 from care_sim.world.bodies import BodyKind, Triple
-from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.world.bullet import BulletWorld
 
 Answers = tuple[Floats, Integers]
 

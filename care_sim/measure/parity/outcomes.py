@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.types import Keyframe
 from care_sim.evaluation.metrics import outcome
+from care_sim.loops.records import Keyframe
 from care_sim.measure.parity.exact import exactly
 from care_sim.study.designs.paper import configurations
 from care_sim.study.episode_config import EpisodeConfig

@@ -9,7 +9,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import Picture
 from care_sim.sensors.engines.engine import Engine
-from care_sim.world.bullet import NOTHING
+from care_sim.world.bullet import NO_BODY
 
 
 class Pictures:
@@ -26,7 +26,7 @@ class Pictures:
             window = (0, 0, camera.width, camera.height)
             drawn, expected = (which.body_ids(camera, sensor, window) for which in (engine, reference))
             self.pictures += 1
-            self.pixels += int(np.count_nonzero(expected != NOTHING))
+            self.pixels += int(np.count_nonzero(expected != NO_BODY))
             self.other_pixels += int(np.count_nonzero(drawn != expected))
             self._compare_boxes(Picture.of(drawn), Picture.of(expected))
 

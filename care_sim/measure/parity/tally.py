@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.frames import Frame
+from care_sim.core.frames import Frame, Integers
 from care_sim.measure.parity.answers import SAME_M, Answers
 from care_sim.measure.parity.verdicts import LOST, UNEXPLAINED, VERDICTS, Compared
 from care_sim.world.bodies import BodyKind
-from care_sim.world.bullet import Integers
 
 FAMILIES = ("boxes", "round parts", "both")
 GROUPS = ("road or nothing", *(f"{family}, {stance}" for family in FAMILIES for stance in ("upright", "tilted")))

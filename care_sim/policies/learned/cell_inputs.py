@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, wedges
-from care_sim.core.types import CLASSES, Belief, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES
 from care_sim.policies.paper.uncertainty import CLEARANCE_M
 
 MARKS = (

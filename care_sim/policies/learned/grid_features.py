@@ -7,10 +7,11 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import check_whole
+from care_sim.base.checks import check_whole
+from care_sim.core.belief import Belief, Observation
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
-from care_sim.core.types import Belief, Observation, Rig
+from care_sim.core.rig import Rig
 from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")

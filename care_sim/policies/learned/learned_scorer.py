@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
-from care_sim.core.types import Belief, Demand, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.learned.cell_inputs import CUES, MARKS, OUTLOOKS, Cues, Seen
 from care_sim.policies.learned.weights import Weights, load, shipped

@@ -3,7 +3,9 @@
 from os import PathLike
 from typing import ClassVar
 
-from care_sim.core.types import Belief, Demand, Rig
+from care_sim.core.belief import Belief
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.score_map import ScoreMap

@@ -11,7 +11,7 @@ with `place` one number a sector.
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.types import Observation
+from care_sim.core.belief import Observation
 from care_sim.policies.learned.grid_features import CHANNELS, EGO
 from care_sim.policies.learned.weights import Weights
 from care_sim.policies.learned.wrapper_text import Wrapping

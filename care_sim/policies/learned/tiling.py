@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, check_whole
+from care_sim.base.checks import check_whole
+from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid, Cells
 
 

@@ -14,11 +14,12 @@ from zipfile import ZipInfo
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, check_path, is_number
+from care_sim.base.checks import check_path, is_number
+from care_sim.base.errors import InvalidInput
 from care_sim.base.files import ZIP, replacing
 from care_sim.base.json_text import parsed
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 
 FORMAT = "care-sim weights 1"
 LARGEST = 2**26

@@ -3,7 +3,8 @@
 import re
 from dataclasses import dataclass, fields
 
-from care_sim.base.errors import InvalidInput, check_known, check_whole
+from care_sim.base.checks import check_known, check_whole
+from care_sim.base.errors import InvalidInput
 
 ACTIONS = ("SectorReserve", "SectorScores")
 _TEXT = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")

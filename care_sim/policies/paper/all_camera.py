@@ -1,7 +1,8 @@
 """A reserve for everything the camera sees, tracked or not."""
 
+from care_sim.core.belief import Belief
 from care_sim.core.residual import wedges
-from care_sim.core.types import Belief, Demand
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
 

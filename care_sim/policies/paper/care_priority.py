@@ -1,7 +1,8 @@
 """CARE with a second reserve layer: what tracks explain comes after what they do not."""
 
+from care_sim.core.belief import Belief
 from care_sim.core.residual import camera_layers
-from care_sim.core.types import Belief, Demand
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
 

@@ -2,9 +2,11 @@
 
 from inspect import Parameter, Signature, signature
 
+from care_sim.core.belief import Belief
 from care_sim.core.forgetting import Forgetting, ForgettingRules
 from care_sim.core.residual import camera_layers
-from care_sim.core.types import Belief, Demand, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
 

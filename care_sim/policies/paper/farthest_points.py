@@ -3,7 +3,7 @@
 from care_sim.base.extras import import_open3d
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.loops.truth import Truth
 from care_sim.policies.paper.matched_fraction import MatchedFraction
 

@@ -1,6 +1,7 @@
 """History-driven scanning: dense on the forecasts of known tracks, sparse elsewhere."""
 
-from care_sim.core.types import Belief, Demand
+from care_sim.core.belief import Belief
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
 

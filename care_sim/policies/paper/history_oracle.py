@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from care_sim.core.types import Belief, Demand
+from care_sim.core.belief import Belief
+from care_sim.core.types import Demand
 from care_sim.policies.privileged import PrivilegedPolicy
 
 

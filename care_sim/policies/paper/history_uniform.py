@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.types import Belief, Demand, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
 GOLDEN = (np.sqrt(5) - 1) / 2

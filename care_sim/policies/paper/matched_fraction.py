@@ -4,9 +4,10 @@ from abc import abstractmethod
 
 import numpy as np
 
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
-from care_sim.core.types import Belief, Demand
+from care_sim.core.types import Demand
 from care_sim.policies.privileged import PrivilegedPolicy
 
 

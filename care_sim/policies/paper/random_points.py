@@ -4,11 +4,11 @@ from zlib import crc32
 
 import numpy as np
 
-from care_sim.base.errors import check_seed
-from care_sim.base.portable_hash import imprint
+from care_sim.base.checks import check_seed
+from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.loops.truth import Truth
 from care_sim.policies.paper.matched_fraction import MatchedFraction
 
@@ -30,5 +30,5 @@ class RandomPoints(MatchedFraction):
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:
         """`count` cells at random."""
-        rng = np.random.default_rng((self._seed, crc32(imprint(cells, points))))
+        rng = np.random.default_rng((self._seed, crc32(portable_bytes(cells, points))))
         return rng.choice(cells, count, replace=False)

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats, Frame, turned
 from care_sim.core.grid import Cells
-from care_sim.core.types import Belief, Demand, Ego
+from care_sim.core.types import Demand, Ego
 from care_sim.policies.base import Policy
 
 CLEARANCE_M = 0.3

@@ -6,8 +6,8 @@ from pathlib import Path
 from PIL import Image
 
 from care_sim.base.files import PNG, check_output, replacing
-from care_sim.core.types import Keyframe
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 
 

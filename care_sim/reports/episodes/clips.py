@@ -6,8 +6,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from care_sim.core.types import Keyframe
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
 from care_sim.study.episode_play import Watcher
 from care_sim.viewer.pictures.clip_files import check_clip, write_clip
 from care_sim.viewer.pictures.drawing import PAPER

@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from care_sim.base.text import printable
-from care_sim.core.types import Keyframe, Outcome
+from care_sim.loops.records import Keyframe, Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.task import Row
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass
 
-from care_sim.core.types import Outcome
+from care_sim.loops.records import Outcome
 from care_sim.reports.page.replay import Replay, replayed
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.episode_play import answer

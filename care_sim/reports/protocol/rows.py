@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import DEFAULTS, UNFELT_BY_FULL
+from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.core.frames import Floats
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
@@ -59,7 +59,7 @@ class Setting:
 
     def for_full(self) -> "Setting":
         """The setting in which the full scan of the same films is found."""
-        felt = (pair for pair in self.conditions if pair[0] not in UNFELT_BY_FULL)
+        felt = (pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN)
         return Setting(self.source, self.detector, tuple(felt))
 
 

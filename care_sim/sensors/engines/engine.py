@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from care_sim.base.errors import check_known
-from care_sim.core.frames import Floats, Frame
+from care_sim.base.checks import check_known
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.world.bullet import BulletWorld, Integers, Window
+from care_sim.world.bullet import BulletWorld, PixelWindow
 
 
 class RayEngine(Protocol):
@@ -23,7 +23,7 @@ class RayEngine(Protocol):
 class Engine(RayEngine, Protocol):
     """Also draws the bodies for cameras."""
 
-    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """Id of the body that each pixel of a window of `camera` shows, NOTHING where there is none; see
         `care_sim.world.bullet.BulletWorld.body_ids`.
         """
@@ -41,7 +41,7 @@ class Bullet:
         directions = sensor.vectors_to_world(self._grid.directions[cells])
         return self._world.cast(sensor.origin, directions, self._grid.range_m)
 
-    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """Body ids of pixels; see `Engine`."""
         return self._world.body_ids(camera, sensor, window)
 

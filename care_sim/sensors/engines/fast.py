@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.sensors.engines.picture_kernels import paint
 from care_sim.sensors.engines.ray_kernels import scan
 from care_sim.sensors.engines.windows import seen_from
-from care_sim.world.bullet import FAR_M, BulletWorld, Integers, Window
+from care_sim.world.bullet import FAR_M, BulletWorld, PixelWindow
 
 
 class Fast:
@@ -40,10 +40,10 @@ class Fast:
         result: tuple[Floats, Integers] = scan(cells, *self._rays, road, solids, (centres, turns), windows)
         return result
 
-    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: Window) -> Integers:
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
         """Body ids of pixels; see `care_sim.sensors.engines.engine.Engine`."""
         eye, axes = camera.stance(sensor)
         lens = camera.focal, camera.width / 2, camera.height / 2
-        meshes, poses = self._world.looks.tables, self._world.primitives.poses
+        meshes, poses = self._world.polyhedra.tables, self._world.primitives.poses
         ids: Integers = paint((eye, axes), lens, window, (NEAR_M, FAR_M), meshes, poses)
         return ids

@@ -11,20 +11,20 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.world.bullet import NOTHING
+from care_sim.world.bullet import NO_BODY
 
 
 @compiled(error_model="numpy")
 def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untyped-def]
-    """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NOTHING where none is.
+    """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NO_BODY where none is.
 
     `camera` is its place in the world (3,) and its axes forward, left and up (3, 3); `lens` its focal length and
     principal point in pixels; `reach` the least and the greatest depth drawn in metres; `meshes` the tables
-    of `care_sim.world.bullet_shapes.Looks`; `poses` (m, 7) of bodies by id.
+    of `care_sim.world.bullet_shapes.Polyhedra`; `poses` (m, 7) of bodies by id.
     """
     left, top, right, bottom = window
     corners, faces, edges, starts, owners = meshes
-    ids = np.full((bottom - top, right - left), NOTHING)
+    ids = np.full((bottom - top, right - left), NO_BODY)
     inverse_depths = np.full(ids.shape, 1.0 / reach[1])
     for part, owner in enumerate(owners):
         begin, end = starts[part], starts[part + 1]

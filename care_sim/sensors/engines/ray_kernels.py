@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.world.bullet import NOTHING
+from care_sim.world.bullet import NO_BODY
 
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.primitives.SHAPES`."""
@@ -17,10 +17,10 @@ BOX, CYLINDER, SPHERE = range(3)
 
 @compiled(error_model="numpy")
 def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-untyped-def]
-    """Ranges (n,) of ascending `cells`, inf beyond `reach`, and body ids (n,), NOTHING there.
+    """Ranges (n,) of ascending `cells`, inf beyond `reach`, and body ids (n,), NO_BODY there.
 
     `fan` is the grid's (smaller than its directions, and so nearer at hand); `road` is the world's up (3,) in the frame
-    of the sensor, its height and the body id of the plane z = 0 (NOTHING without). `parts` are their shapes, half
+    of the sensor, its height and the body id of the plane z = 0 (NO_BODY without). `parts` are their shapes, half
     extents and body ids, `stances` their centres and axes, `windows` their windows, both of
     `care_sim.sensors.engines.windows`.
     """
@@ -48,8 +48,8 @@ def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-u
 def _road(cells, starts, fan, reach, road):  # type: ignore[no-untyped-def]
     """What the rays meet in a world of road alone."""
     up, height, ground = road
-    ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NOTHING)
-    if ground != NOTHING:
+    ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NO_BODY)
+    if ground != NO_BODY:
         for row in range(len(starts) - 1):
             for n in range(starts[row], starts[row + 1]):
                 distance = -height / _dot(up, _ray(fan, row, cells[n] - row * len(fan[0])))

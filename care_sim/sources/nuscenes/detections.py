@@ -13,7 +13,8 @@ from typing import cast
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput, check_number, check_whole
+from care_sim.base.checks import check_number, check_whole
+from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, ImageDetections

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from care_sim.base.errors import InvalidInput, check_known
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
 
 _VAL_NUMBERS = (

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from care_sim.base.random_streams import closed
+from care_sim.base.random_streams import secret_entropy
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
@@ -52,7 +52,7 @@ def street_film(seed: int, secret: str = "") -> Film:
 def _street_film(seed: int, secret: str) -> Film:
     if not secret:
         return record(make_street(seed))
-    return record(replace(make_street(closed("street", (seed,), secret)), name=f"street-{seed:04d}-secret"))
+    return record(replace(make_street(secret_entropy("street", (seed,), secret)), name=f"street-{seed:04d}-secret"))
 
 
 class _Stage:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from care_sim.base.errors import check_known
+from care_sim.base.checks import check_known
 from care_sim.base.extras import import_imageio_ffmpeg
 from care_sim.base.files import GIF, MP4, PNG, WEBP, check_output, replacing, why_unwritable
 

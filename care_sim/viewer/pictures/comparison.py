@@ -6,9 +6,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.types import Keyframe
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER

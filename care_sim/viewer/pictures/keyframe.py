@@ -7,8 +7,9 @@ from PIL import Image, ImageDraw
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
-from care_sim.core.types import CLASSES, Keyframe, Tracks
+from care_sim.core.types import CLASSES, Tracks
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT, INK, NO_RETURN, NOT_FIRED, PAPER

@@ -7,10 +7,10 @@ import numpy as np
 import rerun as rr
 from rerun.components import InterpolationMode
 
-from care_sim.core.budget_shares import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
-from care_sim.core.types import Keyframe
+from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import Moment
 from care_sim.viewer.recording import entities as looks
 from care_sim.viewer.recording.lane import Lane

@@ -47,7 +47,7 @@ ENTITIES = {
     "states/actor": "the first-sighting actor: in or out of view of the unimpaired camera, or detected by this scan",
     "states/brake": "on or off",
     "events": "what changed, in words",
-    "outcome": "the result of the episode, `care_sim.core.types.Outcome`",
+    "outcome": "the result of the episode, `care_sim.loops.records.Outcome`",
 }
 """Entities of an episode, each below the name of its lane, and what they hold."""
 

@@ -5,10 +5,11 @@ from itertools import compress
 import numpy as np
 import rerun as rr
 
-from care_sim.core.budget_shares import SHARES
+from care_sim.core.actions import SHARES
 from care_sim.core.frames import Floats
 from care_sim.core.residual import wedges
-from care_sim.core.types import CLASSES, ImageDetections, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.watcher import Moment, Stance
 from care_sim.viewer.recording import entities as looks
 from care_sim.viewer.recording.lane import THIN, Lane

@@ -9,7 +9,7 @@ import rerun as rr
 
 from care_sim.base.errors import InvalidInput, unknown
 from care_sim.base.files import RERUN, replacing
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.watcher import Moment
 from care_sim.viewer.recording.camera_photo import photograph

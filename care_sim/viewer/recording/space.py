@@ -8,7 +8,8 @@ from rerun.components import FillMode
 
 from care_sim.core.frames import Floats
 from care_sim.core.residual import bundles
-from care_sim.core.types import CLASSES, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES
 from care_sim.driving.braking import BrakingRules
 from care_sim.loops.watcher import Moment, Stance
 from care_sim.viewer.recording import entities as looks

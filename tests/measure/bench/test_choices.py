@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from care_sim.core.belief import Belief
 from care_sim.core.residual import explained
-from care_sim.core.types import Belief, Rig
+from care_sim.core.rig import Rig
 from care_sim.envs.spaces import observation_space
 from care_sim.measure.bench.choices import TRACKS, choices, observation
 from care_sim.measure.bench.config import BenchConfig

@@ -7,7 +7,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.selection import expanded
-from care_sim.core.types import Belief
+from care_sim.core.belief import Belief
 from care_sim.policies import contenders, policy_names, tags_of
 
 BLIND = {"budget": 0.03, "false_negative_rate": 1.0}

@@ -7,7 +7,8 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import wedges
-from care_sim.core.types import CLASSES, ImageDetections, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.policies.learned.cell_inputs import CUES, MARKS, OUTLOOKS, Cues
 from care_sim.sensors.surround import SURROUND_CAMERAS
 

@@ -6,8 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import Belief
 from care_sim.core.residual import camera_layers
-from care_sim.core.types import CLASSES, Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.policies.learned.grid_features import CHANNELS, GridFeatures
 from care_sim.sensors.camera import FRONT_CAMERA
 

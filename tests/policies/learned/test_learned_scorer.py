@@ -11,8 +11,9 @@ from hypothesis.extra.numpy import arrays
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import Belief, Rig
+from care_sim.core.rig import Rig
 from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS, Cues
 from care_sim.policies.learned.learned_scorer import CellNetwork, LearnedScorer, highest
 from care_sim.policies.learned.weights import Card, load, save, shipped

@@ -1,8 +1,10 @@
 import numpy as np
 
 from care_sim.core.allocation import allocate
+from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import Belief, Ego, ImageDetections, Rig, Tracks
+from care_sim.core.rig import Rig
+from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
 from care_sim.policies.learned.tiling import Tiling
 

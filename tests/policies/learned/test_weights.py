@@ -10,7 +10,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, load, save
 
 ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}

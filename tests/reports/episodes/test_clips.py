@@ -13,7 +13,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.cli import main
 from care_sim.commands.compare import play
-from care_sim.core.types import Keyframe
+from care_sim.loops.records import Keyframe
 from care_sim.policies.paper.care import Care
 from care_sim.reports.episodes.clips import Film
 from care_sim.study.episode_config import EpisodeConfig

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import Rig
+from care_sim.core.rig import Rig
 from care_sim.reports.page.episodes import Episode, chosen, config_of, played_again
 from care_sim.reports.page.replay import SECTORS, fullness, packed, replayed, sightlines
 from care_sim.study.episode_config import EpisodeConfig

@@ -14,7 +14,7 @@ from care_sim.measure.parity.verdicts import GRAZING, LOST, SAME, TOLERANCE, UNE
 from care_sim.sensors.engines.engine import ENGINES
 from care_sim.sensors.engines.fast import Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
-from care_sim.world.bullet import NOTHING, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld
 
 COARSE = AngularGrid(columns=180, rows=24)
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -109,7 +109,7 @@ def test_nothing_beyond_the_reach(bullet):
     body = bullet.add(CATALOGUE["trailer"], (56.0, 0.0, 0.0))
     assert ahead(bullet, SENSOR)[1] == body
     bullet.move(body, (56.1, 0.0, 0.0))
-    assert ahead(bullet, SENSOR) == (np.inf, NOTHING)
+    assert ahead(bullet, SENSOR) == (np.inf, NO_BODY)
 
 
 def test_the_road_is_met_only_where_there_is_one(bullet):
@@ -117,7 +117,7 @@ def test_the_road_is_met_only_where_there_is_one(bullet):
     fall = -sensor.vectors_to_world(COARSE.directions)[:, 2]
     within = fall * 50.0 >= 1.84
     ranges, ids = cast(bullet, sensor)
-    assert np.array_equal(ids, np.where(within, bullet.ground, NOTHING))
+    assert np.array_equal(ids, np.where(within, bullet.ground, NO_BODY))
     assert ranges[within] == pytest.approx(1.84 / fall[within], rel=1e-12)
     with closing(BulletWorld(ground=False)) as bare:
         assert np.isinf(cast(bare, sensor)[0]).all()

@@ -10,7 +10,7 @@ from care_sim.sensors.camera import FRONT_CAMERA, Picture
 from care_sim.sensors.engines.engine import Bullet
 from care_sim.sensors.engines.fast import Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
-from care_sim.world.bullet import NOTHING, BulletWorld
+from care_sim.world.bullet import NO_BODY, BulletWorld
 from care_sim.world.bullet_shapes import directions, polyhedron
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -48,7 +48,7 @@ def test_pictures_of_crowds_are_the_same():
         world, sensor = crowd(seed)
         reference, picture = drawn(world, (FRONT_CAMERA, CROOKED)[seed % 2], sensor)
         world.close()
-        shown += np.count_nonzero(reference != NOTHING)
+        shown += np.count_nonzero(reference != NO_BODY)
         different += np.count_nonzero(reference != picture)
         expected, found = Picture.of(reference), Picture.of(picture)
         if set(expected.bodies) == set(found.bodies):
@@ -66,7 +66,7 @@ def test_a_primitive_near_and_far(bullet, shape, x):
     size = (1.0, 1.0, 1.4 if shape != "sphere" else 1.0)
     bullet.add(BodyKind("one", None, size, (Part(shape, size, (0.0, 0.0, 1.5), (1, 0, 0)),)), (x, 0.3, 0.7))
     reference, picture = drawn(bullet)
-    assert np.count_nonzero(reference != NOTHING) > 50
+    assert np.count_nonzero(reference != NO_BODY) > 50
     assert np.count_nonzero(reference != picture) <= 1
 
 
@@ -80,7 +80,7 @@ def test_what_stands_in_front_hides(bullet):
 def test_transparent_bodies_backdrops_and_the_road_have_no_look(bullet):
     bullet.add(CATALOGUE["car"], (10.0, 0.0, 0.0), transparent=True)
     bullet.add(CATALOGUE["building"], (30.0, 0.0, 0.0), backdrop=True)
-    assert set(drawn(bullet)[1].ravel().tolist()) == {NOTHING}
+    assert set(drawn(bullet)[1].ravel().tolist()) == {NO_BODY}
 
 
 def test_a_camera_inside_a_body_looks_through_it(bullet):

@@ -7,13 +7,13 @@ from typing import Protocol
 import numpy as np
 
 from care_sim.base.errors import MissingExtra
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.bench.scanning.embree import Embree
 from care_sim.measure.bench.scanning.mujoco import MuJoCo
 from care_sim.sensors.engines.engine import ENGINES
 from care_sim.world.bodies import BodyKind
-from care_sim.world.bullet import BulletWorld, Integers
+from care_sim.world.bullet import BulletWorld
 
 
 class Caster(Protocol):

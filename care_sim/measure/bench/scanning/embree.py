@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from care_sim.base.extras import import_open3d
-from care_sim.core.frames import Floats, Frame, turned
+from care_sim.core.frames import Floats, Frame, Integers, turned
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.bullet import NOTHING, Integers
+from care_sim.world.bullet import NO_BODY
 
 ROUND = 8
 """Sides of a cylinder. More would hold Embree up, which builds its tree anew every scan, and move a ray on the leg
@@ -49,7 +49,7 @@ class Embree:
         hits = self._scene.cast_rays(self._open3d.core.Tensor(rays), nthreads=1)
         ranges = hits["t_hit"].numpy().astype(np.float64)
         met = ranges <= self._grid.range_m
-        ids = np.full(len(rays), NOTHING)
+        ids = np.full(len(rays), NO_BODY)
         ids[met] = self._triangle_owner[hits["primitive_ids"].numpy()[met]]
         return np.where(met, ranges, np.inf), ids
 

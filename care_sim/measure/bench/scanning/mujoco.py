@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.base.extras import import_mujoco
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.world.bodies import BodyKind
-from care_sim.world.bullet import NOTHING, Integers
+from care_sim.world.bullet import NO_BODY
 
 
 class MuJoCo:
@@ -45,4 +45,4 @@ class MuJoCo:
             self._model, self._data, sensor.origin, directions, None, True, -1, geoms, ranges, None, n, reach
         )
         met = (geoms >= 0) & (ranges <= reach)
-        return np.where(met, ranges, np.inf), np.where(met, self._model.geom_bodyid[geoms], NOTHING)
+        return np.where(met, ranges, np.inf), np.where(met, self._model.geom_bodyid[geoms], NO_BODY)

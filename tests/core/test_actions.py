@@ -3,10 +3,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.allocation import allocate, fired_cells, scores_of
-from care_sim.core.budget_shares import CHOSEN, EXPLOITATION, FLOOR, NOT_FIRED, RESERVE, shares_of
+from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, NOT_FIRED, RESERVE, fired_cells, scores_of, shares_of
+from care_sim.core.allocation import allocate
 from care_sim.core.grid import AngularGrid
-from care_sim.core.types import Demand, Rig
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 
 GRID = AngularGrid(columns=4, rows=3)
 RIG = Rig(GRID, budget=6, reserve_fraction=0.5)

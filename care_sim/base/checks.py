@@ -1,0 +1,108 @@
+"""Checks of values from outside: each raises one line that names the value and what is allowed."""
+
+import math
+import os
+from collections.abc import Container, Iterable
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.errors import InvalidInput, unknown
+from care_sim.base.text import shown
+
+LARGEST_INTEGER = 2**31 - 1
+"""What a whole number may be where nothing else is said."""
+
+
+LARGEST_SEED = 2**63 - 1
+"""What a column of a results file holds."""
+
+
+LONGEST_PATH, LONGEST_NAME = 4095, 255
+"""Bytes of a path and of a name in it (Linux)."""
+
+
+def check_known(kind: str, name: object, known: Iterable[str]) -> None:
+    """Raise InvalidInput unless `name` is one of the known ones."""
+    if not (isinstance(name, str) and name in known):
+        raise unknown(kind, name, known)
+
+
+def is_number(value: object) -> bool:
+    """Whether `value` is a real number, and no flag."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def check_number(name: str, value: object, least: float = -math.inf, most: float = math.inf) -> None:
+    """Raise InvalidInput unless `value` is a finite number within `least` and `most`."""
+    if not (is_number(value) and least <= _finite(value) <= most):
+        if most < math.inf:
+            allowed = f"lie in [{least:g}, {most:g}]"
+        else:
+            allowed = f"be a finite number >= {least:g}" if least > -math.inf else "be a finite number"
+        raise InvalidInput(f"{name} must {allowed}, got {shown(value)}")
+
+
+def _finite(value: Any) -> float:
+    """The number as a float; NaN, which lies in no range, for what none is near."""
+    try:
+        number = float(value)
+    except OverflowError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan
+
+
+def check_whole(name: str, value: object, least: float, most: float = LARGEST_INTEGER) -> None:
+    """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
+    whole = int(value) if isinstance(value, Integral) and is_number(value) else None
+    if whole is None or not least <= whole <= most:
+        upper = f" and <= {most}" if most < LARGEST_INTEGER or (whole is not None and whole > most) else ""
+        raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
+
+
+def check_range(name: str, value: Any, least: float = -math.inf, most: float = math.inf) -> None:
+    """Raise InvalidInput unless `value` is a pair of numbers, low and high, within `least` and `most`."""
+    fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(is_number, value))
+    if not (fits and least <= _finite(value[0]) <= _finite(value[1]) <= most):
+        within = f", within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
+        raise InvalidInput(f"{name} must be two numbers, low and high{within}, got {shown(value)}")
+
+
+def check_flag(name: str, value: object) -> None:
+    """Raise InvalidInput unless `value` is True or False."""
+    if not isinstance(value, bool):
+        raise InvalidInput(f"{name} must be True or False, got {shown(value)}")
+
+
+def check_seed(seed: object, name: str = "seed") -> None:
+    """Raise InvalidInput for a seed that no column holds."""
+    check_whole(name, seed, 0, LARGEST_SEED)
+
+
+def check_path(name: str, value: object) -> None:
+    """Raise InvalidInput for what no file or folder can be called."""
+    try:
+        path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
+    except (TypeError, UnicodeError) as error:
+        raise InvalidInput(f"{name} must be a path, got {shown(value)}") from error
+    too_long = len(path) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in path.split(b"/"))
+    if not path or b"\0" in path or too_long:
+        least = "empty" if not path else "longer than a file system allows" if too_long else "with a null character"
+        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}")
+
+
+def as_array(name: str, value: Any) -> NDArray[Any]:
+    """`value` as an array. Raises InvalidInput for what has no regular shape."""
+    try:
+        return np.asarray(value)
+    except Exception as error:  # a ragged list, and whatever foreign arrays do
+        raise InvalidInput(f"{name} must be an array, got {shown(value)}") from error
+
+
+def check_choice(name: str, value: object, choices: Container[object]) -> None:
+    """Raise InvalidInput unless `value` is None or one of the named choices."""
+    if value is not None and not (isinstance(value, str) and value in choices):
+        named = " or ".join(map(repr, choices)) if isinstance(choices, Iterable) else str(choices)
+        raise InvalidInput(f"{name} must be None or {named}, got {shown(value)}")

@@ -1,0 +1,127 @@
+"""What a policy may know at a keyframe, and how an observation of Gymnasium holds it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.checks import as_array
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats
+from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
+
+_LABELS = frozenset(range(len(CLASSES)))
+
+
+MAX_DETECTIONS = 128
+"""Rows of the observation; six cameras in dense traffic saw up to 67 boxes in recorded drives."""
+
+
+MAX_TRACKS = 256
+"""Rows of the observation: one that explains every detection, and as many again."""
+
+
+OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
+"""What an observation consists of."""
+
+
+HIGHEST = 2.0**24
+"""No number of an observation is larger: the largest whole number that float32 holds beside all smaller ones."""
+
+
+Observation = Mapping[str, NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Belief:
+    """All a policy may know when it chooses: what Gymnasium shows, and nothing else.
+
+    `budget` is B, the number of cells that may fire; `detections` are the camera's, `tracks` the
+    forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return. The loops make
+    it with `care_sim.core.observation_limits`, within what an observation can hold.
+    """
+
+    ego: Ego
+    budget: int
+    detections: ImageDetections
+    tracks: Tracks
+    ranges: NDArray[np.float32]
+
+    @classmethod
+    def from_observation(cls, observation: Observation) -> "Belief":
+        """Read an observation of the environments back, without loss. Raises InvalidInput for another."""
+        if not (isinstance(observation, Mapping) and all(key in observation for key in OBSERVED)):
+            raise InvalidInput("an observation of CARE-Sim's environments is needed, as they give it without wrappers")
+        ego, (budget,) = (_numbers(observation, key, size) for key, size in (("ego", 3), ("budget", 1)))
+        ranges = _read(observation, "ranges", (None, None)).astype(np.float32, copy=False)
+        if not (0 <= budget <= 1 and ranges.min(initial=0) >= 0 and ranges.max(initial=0) <= HIGHEST):
+            raise InvalidInput("an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more")
+        return cls(
+            Ego(*ego),
+            round(budget * ranges.size),
+            ImageDetections.from_rows(_rows(observation, "detections", ImageDetections.COLUMNS)),
+            Tracks.from_rows(_rows(observation, "tracks", Tracks.COLUMNS)),
+            ranges,
+        )
+
+    def to_observation(self) -> dict[str, NDArray[np.float32]]:
+        """The fixed-shape float32 arrays of the environments' observation space, new ones.
+
+        Raises InvalidInput for more rows than a table has, since what were left out would be missed in silence.
+        """
+        ego = np.array([self.ego.speed, self.ego.yaw_rate, self.ego.acceleration], np.float32)
+        return {
+            "ego": ego,
+            "budget": np.array([self.budget / self.ranges.size], np.float32),
+            "detections": _padded("detections", self.detections.rows(), MAX_DETECTIONS),
+            "tracks": _padded("tracks", self.tracks.rows(), MAX_TRACKS),
+            "ranges": self.ranges.copy(),
+        }
+
+
+def _read(observation: Observation, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another shape."""
+    array = as_array(f"{key} of an observation", observation[key])
+    fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+    if not (fits and array.dtype.kind in "iuf"):
+        wanted = " x ".join("any" if n is None else str(n) for n in shape)
+        raise InvalidInput(f"{key} of an observation must be {wanted} numbers, got {array.dtype} of {array.shape}")
+    return array
+
+
+def _numbers(observation: Observation, key: str, size: int) -> list[float]:
+    """A vector of an observation. Raises InvalidInput for what no sensor says."""
+    numbers: list[float] = _read(observation, key, (size,)).tolist()
+    if not all(-HIGHEST <= number <= HIGHEST for number in numbers):
+        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+    return numbers
+
+
+def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray[Any]:
+    """The rows of a table that are no padding. Raises InvalidInput for those that are neither padding nor of a known
+    class, and for what no sensor says.
+    """
+    table = _read(observation, key, (None, len(columns)))
+    given = table[:, 0] >= 0
+    rows = table[given]
+    if not (rows.min(initial=0) >= -HIGHEST and rows.max(initial=0) <= HIGHEST):
+        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+    leads, labels = rows[:, 0].tolist(), rows[:, columns.index("class")].tolist()
+    padded = (table[~given, 0] == -1).all()
+    if not (padded and all(label in _LABELS for label in labels) and all(lead == int(lead) for lead in leads)):
+        raise InvalidInput(
+            f"{key} of an observation: a row must begin with a whole number, -1 where it is padding, and be of a class "
+            f"0 to {len(CLASSES) - 1}"
+        )
+    return rows
+
+
+def _padded(what: str, rows: Floats, length: int) -> NDArray[np.float32]:
+    if len(rows) > length:
+        raise InvalidInput(f"an observation holds {length} {what} at most, got {len(rows)}")
+    table = np.zeros((length, rows.shape[1]), np.float32)
+    table[:, 0] = -1
+    table[: len(rows)] = rows
+    return table
