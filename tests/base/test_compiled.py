@@ -27,9 +27,6 @@ def test_without_a_folder_for_the_code_it_is_compiled_anew():
 
 TWO_FILES = """
 import sys
-from pathlib import Path
-import care_sim.base.compiled
-care_sim.base.compiled.PACKAGE = Path(sys.argv[1])
 sys.path.insert(0, sys.argv[1])
 from outer_kernels import outer
 print(outer(1), sum(outer.stats.cache_hits.values()))
