@@ -13,6 +13,7 @@ from care_sim.core.types import CLASSES, ImageDetections, Tracks
 from care_sim.world.bullet import BulletWorld
 from tests.helpers.av2_log import at, box, write
 from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
+from tests.helpers.recordings import Read
 
 settings.register_profile("repeatable", deadline=None, derandomize=True, database=None, max_examples=60)
 settings.load_profile("repeatable")
@@ -114,3 +115,10 @@ def third_party(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text(ENTRY_POINTS)
     monkeypatch.syspath_prepend(site)
     return site
+
+
+@pytest.fixture(scope="session")
+def read():
+    """Reads a recording back (`tests.helpers.recordings.Read`); skips what needs it where Rerun is not installed."""
+    pytest.importorskip("rerun")
+    return Read

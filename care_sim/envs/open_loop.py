@@ -180,7 +180,7 @@ def _sightings(film: Film, presence: str) -> Sightings:
 class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
-    The seed of `reset` draws the street (`care_sim.streets`) and everything else that is random. Seeds 0 to 149 are the
+    The seed of `reset` draws the street (`care_sim.sources.streets`) and everything else that is random. Seeds 0 to 149 are the
     evaluation's: train on others. `learned-scorer` learned from 1000 to 1019, the calibration's. With a `secret`
     all are other streets, none of them in the published tables.
     """

@@ -163,7 +163,7 @@ def test_the_folder_is_locked_until_its_results_are_written(tmp_path, monkeypatc
         locked.append(path.name)
         write_rows(rows, path, *more)
 
-    monkeypatch.setattr("care_sim.reports.report.write_rows", write)
+    monkeypatch.setattr("care_sim.commands.shared.conduct.write_rows", write)
     conduct(short(), tmp_path, workers=1)
     assert locked == [EPISODES.file]
 

@@ -10,7 +10,7 @@ from tests.helpers.descendants import Marked, until
 
 PLAY = """
 import sys
-from care_sim.certify import design, playing
+from care_sim.measure.certify import design, playing
 from care_sim.measure.certify.design import drawn
 
 mode = sys.argv[1]

@@ -2,10 +2,6 @@
 
 from collections import defaultdict
 
-import pytest
-
-pytest.importorskip("rerun")
-
 
 class Read:
     """What a recording holds: `fixed` entities, and of the others their rows by keyframe."""
@@ -34,8 +30,3 @@ class Read:
     def numbers(self, entity):
         """The scalars of an entity."""
         return [value for (value,) in self.column(entity, "Scalars:scalars")]
-
-
-@pytest.fixture(scope="session")
-def read():
-    return Read
