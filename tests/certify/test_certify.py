@@ -307,6 +307,13 @@ def test_some_of_the_list_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
+def test_a_seed_finder_of_the_list_knows_the_dense_street_in_the_cut_in_too():
+    known = 4520
+    assert (drawn(known).environment, drawn(known).policy) == ("CARE-CutIn-v0", "seed-finder")
+    verdict = compare(played([known], 1), published.read())
+    assert verdict.as_published, "\n".join(verdict.lines())
+
+
 @pytest.mark.slow
 def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
