@@ -29,7 +29,7 @@ def check_kind(folder: Path, study: Study) -> None:
         if other is not kind and (folder / other.file).exists():
             raise InvalidInput(
                 f"{folder} holds {other.unit} of another study; the {kind.unit} of the study {study.name} need another "
-                "--out"
+                "--out, with --force too"
             )
 
 
