@@ -53,6 +53,11 @@ class Journal:
     def __getitem__(self, digest: str) -> Row:
         return self._rows[digest]
 
+    @property
+    def rows(self) -> list[Row]:
+        """All rows, those of other options too."""
+        return [*self._rows.values()]
+
     def __enter__(self) -> Self:
         return self
 

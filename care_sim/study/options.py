@@ -2,6 +2,7 @@
 
 import ast
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,8 @@ class Options(Conditions):
     """Conditions that all episodes share."""
 
     scenario_parameters: tuple[str, ...] = ()
-    """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
+    """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7 gap_m=0.8,1.2; see
+    `care-sim scenarios`."""
     policy_parameters: tuple[str, ...] = ()
     """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
     POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
@@ -54,8 +56,12 @@ def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
 
 
 def parameters(texts: Sequence[str]) -> "Parameters":
-    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
-    return tuple(_pair(text) for text in texts)
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is given twice."""
+    pairs = tuple(_pair(text) for text in texts)
+    for name, count in Counter(name for name, _ in pairs).items():
+        if count > 1:
+            raise InvalidInput(f"a parameter is given once, got {shown(name)} {count} times")
+    return pairs
 
 
 def _pair(text: str) -> tuple[str, Any]:

@@ -7,6 +7,7 @@ import pytest
 import care_sim
 from care_sim.errors import InvalidInput
 from care_sim.policies import contenders, policy_names, tags_of
+from care_sim.policies.seed_finder import SeedFinder
 from care_sim.study.selection import expanded
 from care_sim.types import Belief
 
@@ -80,6 +81,22 @@ def test_a_seed_that_it_does_not_know_is_played_as_history(make, known):
     observation, _ = env.reset(seed=3)
     np.testing.assert_array_equal(finder(observation), history(observation))
     assert finder.found is None
+
+
+@pytest.mark.parametrize("scenario", ENVIRONMENTS)
+def test_it_knows_the_scenario_of_its_environment(make, scenario):
+    env = make(scenario, budget=0.03)
+    observation, _ = env.reset(seed=9)
+    told, own = care_sim.make_policy("seed-finder", env, scenario=scenario), care_sim.make_policy("seed-finder", env)
+    np.testing.assert_array_equal(own(observation), told(observation))
+    assert own.found == 9
+
+
+def test_of_a_rig_alone_it_knows_the_dense_street(make):
+    env = make("cutin", budget=0.03)
+    observation, _ = env.reset(seed=9)
+    dense = care_sim.make_policy("seed-finder", env, scenario="dense")
+    np.testing.assert_array_equal(SeedFinder(env.unwrapped.rig)(observation), dense(observation))
 
 
 def test_after_reset_it_looks_again(make):
