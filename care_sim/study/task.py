@@ -64,7 +64,8 @@ class Task(ABC):
         """What it shares with tasks that take as long, the closest likeness first."""
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
-        """The policy for the environment."""
+        """The policy for the environment; its files are looked at before it plays, which may load more of its code."""
+        self.installed()
         return make_policy(self.policy, env, **dict(self.policy_parameters))
 
     def digest(self) -> str:
