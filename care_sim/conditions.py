@@ -85,7 +85,9 @@ class Sensing(CameraFaults, LidarFaults):
     """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and odometry."""
 
     ego_speed_sigma: float = bounded(0.0, 0, 10)
-    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign."""
+    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign. The
+    acceleration beside it is exact.
+    """
     engine: str = "fast"
     """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
     reference.
