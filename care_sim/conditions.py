@@ -37,8 +37,8 @@ class CameraFaults:
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
     false_positive_rate: float = bounded(0.0, 0, MOST_GHOSTS)
-    """Mean number of boxes in a picture that show nothing; else they are like the true ones, which they are drawn from
-    (`care_sim.sensors.ghosts`), so that where the camera never sees anybody there are none.
+    """Mean number of boxes in a picture that show nothing; each by itself is much like the true ones, which they are
+    drawn from (`care_sim.sensors.ghosts`), so that where the camera never sees anybody there are none.
     """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""
