@@ -89,6 +89,16 @@ def test_a_parameter_of_a_structure_is_named(tmp_path):
     assert "column policy.x must hold text, numbers, flags or lists of them, got struct" in complaint(tmp_path)
 
 
+@pytest.mark.parametrize("kind", [pa.null(), pa.float64(), pa.string()])
+def test_a_column_of_nothing_is_of_any_type(tmp_path, kind):
+    """Earlier versions wrote numbers there."""
+    content = table("protocol", tmp_path)
+    nothing = pa.nulls(content.num_rows, kind)
+    place = content.column_names.index("differing_cells")
+    put(content.set_column(place, "differing_cells", nothing), "protocol", tmp_path)
+    assert {row["differing_cells"] for row in reported(tmp_path)[0]} == {None}
+
+
 @pytest.mark.parametrize("column", ["class/bus/delay", "film_hash", "tracks", "ttfds", "keyframes", "events"])
 def test_a_missing_column_of_a_play_is_named(tmp_path, column):
     put(table("protocol", tmp_path).drop_columns(column), "protocol", tmp_path)
