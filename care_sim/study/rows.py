@@ -98,8 +98,11 @@ def _read(path: Path) -> pa.Table:
     if not path.is_file():
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:
-        return pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
+        table = pq.read_table(path)
+        table.validate(full=True)
+        table.column_names  # noqa: B018 (names of broken characters show only now)
+        return table
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise InvalidInput(f"{path} is not a readable Parquet file: {_first_line(error)}") from error
 
 

@@ -125,6 +125,16 @@ def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_p
     assert len(reported(tmp_path)[0]) == content.num_rows
 
 
+def test_names_and_texts_of_broken_characters_are_damage(tmp_path):
+    table("protocol", tmp_path)
+    path = tmp_path / STUDIES["protocol"].kind.file
+    content = path.read_bytes()
+    for text in (b"differing_cells", b"film of scene 000"):
+        assert text in content
+        path.write_bytes(content.replace(text, text[:-1] + b"\xed"))
+        assert "is not a readable Parquet file: " in complaint(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("notes", "fault"),
     [
