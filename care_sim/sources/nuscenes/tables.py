@@ -10,9 +10,12 @@ import numpy as np
 
 from care_sim.errors import InvalidInput
 from care_sim.frames import Floats
-from care_sim.json_text import parsed
+from care_sim.json_text import read
 
 Row = dict[str, Any]
+
+LARGEST_TABLE = 2**33
+"""Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of half a kilobyte)."""
 
 FIELDS: dict[str, dict[str, type]] = {
     "scene": {"name": str, "first_sample_token": str, "last_sample_token": str},
@@ -155,10 +158,10 @@ class Database:
 def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
     """The content of a JSON file, every map in it replaced by what is `taken` of it.
 
-    Raises InvalidInput for a file that is missing or truncated.
+    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
     """
     try:
-        return parsed(path.read_text(encoding="utf-8"), taken)
+        return read(path, LARGEST_TABLE, taken)
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
