@@ -195,10 +195,10 @@ def test_damaged_results_are_shown_or_refused(tmp_path, name):
     assert not any("\n" in line for line in refused)
 
 
-@pytest.mark.filterwarnings("ignore:Glyph")
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", ["sweep", "protocol"])
 def test_a_name_of_signs_is_shown_everywhere(tmp_path, name, capsys):
-    odd = "my $x^$ |`<b>_\\ \x1b[31m"
+    odd = "my $x^$ |`<b>_\\ \x1b[31m \u5b66"
     rows = [row | {"policy": odd if row["policy"] == "history" else row["policy"]} for row in ROWS[name]]
     write_rows(rows, tmp_path / STUDIES[name].kind.file, name, ["what \x1b[31m failed"])
     (tmp_path / "config.json").write_text('{"machine": {"system": "\\ud800"}}')
