@@ -76,7 +76,7 @@ def _write(
     write_text(folder / "config.json", _description(configs, study, failures))
     for name, columns in aside.items():
         write_columns(columns, folder / name)
-    write_rows(finished, folder / kind.file, study.name, left_out)
+    write_rows(finished, folder / kind.file, study.name, left_out, study.schema)
     report.write(folder)
 
 

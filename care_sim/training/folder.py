@@ -19,11 +19,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.errors import LARGEST, InvalidInput, is_number
+from care_sim.errors import LARGEST, InvalidInput, check_known, is_number
 from care_sim.files import replacing, write_text
-from care_sim.json_text import parsed
+from care_sim.json_text import check_size, read
 from care_sim.policies.weights import Card, save
-from care_sim.training.config import AgentConfig
+from care_sim.training.config import ALGORITHMS, AgentConfig
 from care_sim.training.evaluation import Score
 from care_sim.training.origin import machine, versions
 from care_sim.training.seeds import TRAINING, validation_seeds
@@ -131,6 +131,7 @@ def read_config(path: Path) -> dict[str, Any]:
     for name, is_kind in kinds.items():
         if not is_kind(config.get(name)):
             raise InvalidInput(f"{path} is no configuration of a training run: {name} is {config.get(name)!r:.80}")
+    check_known(f"algorithm in {path}", config["algorithm"], ALGORITHMS)
     return config
 
 
@@ -150,7 +151,7 @@ def read_rules(path: Path) -> dict[str, dict[str, Any]]:
 
 def _read_map(path: Path) -> dict[str, Any]:
     try:
-        content = parsed(path.read_text(encoding="utf-8"))
+        content = read(path)
     except ValueError as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
     if not isinstance(content, dict):
@@ -163,6 +164,7 @@ def read_curve(path: Path) -> list[Evaluation]:
     if not path.exists():
         return []
     try:
+        check_size(path)
         with path.open(newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
         if tuple(head) != COLUMNS:

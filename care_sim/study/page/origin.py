@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.conditions import DEFAULTS
-from care_sim.json_text import parsed
+from care_sim.json_text import read
 from care_sim.study.kinds import Kind, is_parameter
 from care_sim.study.provenance import code_digest
 from care_sim.study.task import Row
@@ -66,7 +66,7 @@ def _text(value: Any) -> str:
 def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
     """The file that a study writes first of all, and what is wrong with it."""
     try:
-        description = parsed(path.read_text())
+        description = read(path)
     except FileNotFoundError:
         return {}, [f"{CONFIG} is missing: machine, versions and the list of what was to be played are not known."]
     except (OSError, ValueError) as error:
