@@ -287,9 +287,9 @@ def _summary(thing: object) -> str:
 
 
 def _rounded(value: object) -> str:
-    """A default as people write it; numbers to two decimals."""
+    """A default as a shell takes it; numbers to two decimals."""
     if isinstance(value, tuple):
-        return f"({', '.join(map(_rounded, value))})"
+        return ",".join(map(_rounded, value))
     return str(round(value, 2)) if isinstance(value, float) else repr(value)
 
 

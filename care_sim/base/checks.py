@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Container, Iterable
+from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import Any
 
@@ -28,6 +29,16 @@ def check_known(kind: str, name: object, known: Iterable[str]) -> None:
     """Raise InvalidInput unless `name` is one of the known ones."""
     if not (isinstance(name, str) and name in known):
         raise unknown(kind, name, known)
+
+
+def check_arguments(of: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Raise InvalidInput for a name that is none of the arguments of something; it tells the nearest."""
+    known = [*known]
+    for name in given:
+        if name not in known:
+            nearest = get_close_matches(name, known, 1)
+            hint = f", the nearest is {nearest[0]}" if nearest else ""
+            raise InvalidInput(f"unknown argument of {of} {shown(name)}{hint}; known: {', '.join(sorted(known))}")
 
 
 def is_number(value: object) -> bool:

@@ -41,6 +41,8 @@ def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Sequen
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     check_whole("budget", budget, 0, HIGHEST_CELL)
+    if not isinstance(demand, Demand):
+        raise InvalidInput(f"demand must be a Demand, got {shown(demand)}")
     layers = _listed("layers", "a list of layers", demand.layers)
     stages = [_listed("exploitation", SETS, demand.exploitation), *(_listed("a layer", SETS, one) for one in layers)]
     limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(layers)

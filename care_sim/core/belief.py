@@ -56,6 +56,8 @@ class Belief:
             raise InvalidInput("an observation of CARE-Sim's environments is needed, as they give it without wrappers")
         ego, (budget,) = (_numbers(observation, key, size) for key, size in (("ego", 3), ("budget", 1)))
         ranges = _read(observation, "ranges", (None, None)).astype(np.float32, copy=False)
+        if not ranges.size:
+            raise InvalidInput("ranges of an observation must hold a cell at least")
         if not (0 <= budget <= 1 and ranges.min(initial=0) >= 0 and ranges.max(initial=0) <= HIGHEST):
             raise InvalidInput("an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more")
         return cls(

@@ -39,8 +39,8 @@ class CameraFaults:
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
     false_positive_rate: float = bounded(0.0, 0, MOST_FALSE_BOXES)
-    """Mean number of boxes in a picture that show nothing; else they are like the true ones, which they are drawn from
-    (`care_sim.sensors.false_boxes`), so that where the camera never sees anybody there are none.
+    """Mean number of boxes in a picture that show nothing; each by itself is much like the true ones, which they are
+    drawn from (`care_sim.sensors.false_boxes`), so that where the camera never sees anybody there are none.
     """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""
@@ -87,7 +87,9 @@ class Sensing(CameraFaults, LidarFaults):
     """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and odometry."""
 
     ego_speed_sigma: float = bounded(0.0, 0, 10)
-    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign."""
+    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign. The
+    acceleration beside it is exact.
+    """
     engine: str = "fast"
     """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
     reference.

@@ -1,5 +1,6 @@
 """A frame of reference: where a car or a sensor is, and how it is turned."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,9 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
     result[..., 0], result[..., 1] = cos * x - sin * y, sin * x + cos * y
     return result
 
+
+_LOCKED = 1 - 1e-13
+"""Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it is told as yaw."""
 
 _CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))])
 
@@ -55,7 +59,13 @@ class Frame:
     @classmethod
     def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":
         """The frame at `origin` (3,) whose axes are those of the world after `rotation`."""
-        yaw, pitch, roll = rotation.as_euler("ZYX").tolist()
+        i, j, k, w = rotation.as_quat().tolist()
+        lowers = 2 * (w * j - i * k)
+        if abs(lowers) > _LOCKED:
+            left = rotation.as_matrix()[:, 1].tolist()
+            yaw, pitch, roll = math.atan2(-left[0], left[1]), math.copysign(math.pi / 2, lowers), 0.0
+        else:
+            yaw, pitch, roll = rotation.as_euler("ZYX").tolist()
         x, y, z = origin.tolist()
         return cls(x, y, z, yaw, roll, pitch)
 

@@ -86,10 +86,16 @@ class AngularGrid:
         return directions
 
     def cells_of(self, directions: ArrayLike) -> Cells:
-        """The cell each direction (n, 3) falls in; -1 above the top or below the bottom row."""
+        """The cell each direction (n, 3) falls in; -1 above the top or below the bottom row.
+
+        Raises InvalidInput for a direction that holds NaN.
+        """
         x, y, z = np.asarray(directions, dtype=float).reshape(-1, 3).T
-        column = np.floor((np.arctan2(y, x) + np.pi) / self.column_width).astype(np.int64)
-        row = self._row(np.arctan2(z, np.hypot(x, y)))
+        azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        if np.isnan(azimuth).any() or np.isnan(elevation).any():
+            raise InvalidInput("directions must be numbers, none of them NaN")
+        column = np.floor((azimuth + np.pi) / self.column_width).astype(np.int64)
+        row = self._row(elevation)
         inside = (row >= 0) & (row < self.rows)
         return np.where(inside, row * self.columns + column % self.columns, -1)
 

@@ -7,15 +7,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.checks import check_choice, check_number
+from care_sim.base.checks import check_arguments, check_choice, check_number
 from care_sim.core.types import Action
 from care_sim.envs import reward as rewards
-from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.other_drive import seen_on_a_drive
 from care_sim.loops.records import Keyframe
-from care_sim.scenarios import make_scenario
+from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines.engine import check_engine
 from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
@@ -79,8 +79,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ### Arguments
     `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode` None or
     "rgb_array"; `scoring_info` (above); `secret`, a text that enters everything that a seed draws, so that an agent
-    that holds this package cannot look its episodes up (`care_sim.base.random_streams`; none, unless given); any field of the
-    scenario; and the conditions, any field of `care_sim.core.conditions.Conditions`. Of these, the allocator:
+    that holds this package cannot look its episodes up (`care_sim.base.random_streams`; False, for none, unless given;
+    at least 16 random bytes, since a word can be tried like a seed); any field of the scenario; and the conditions, any
+    field of `care_sim.core.conditions.Conditions`. Of these, the allocator:
     `reserve_fraction` rho, `floor`, `floor_seed`, `azimuth_margin`, `elevation_margin`. The detectors: `engine`,
     `min_returns`, `camera_confidence`. Camera faults: `false_negative_rate`, `false_negative_per_m`,
     `false_negative_burst` (keyframes), `false_positive_rate` (a picture), `camera_latency` and `camera_jitter` (whole
@@ -99,13 +100,15 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         keyframe_s: float = 0.1,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
-        secret: str = "",
+        secret: str | bool = False,
         scoring_info: bool = True,
         **parameters: Any,
     ):
         check_number("keyframe_s", keyframe_s, WORLD_STEP_S, LONGEST_KEYFRAME_S)
         whole_steps(keyframe_s)
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
+        kind = SCENARIOS[self.scenario_name]
+        check_arguments(type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__])
         conditions = conditions_of(parameters)
         check_engine(conditions.engine)
         super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info)

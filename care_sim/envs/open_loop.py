@@ -1,6 +1,6 @@
 """The open-loop environments: thin Gymnasium adapters around `care_sim.loops.open_loop`."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from functools import lru_cache
 from os import PathLike
@@ -10,13 +10,13 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.checks import check_choice
+from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput
 from care_sim.base.text import shown
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action
-from care_sim.envs.sensing import Observed, SensingEnv, conditions_of
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import Score
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
@@ -84,18 +84,14 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         detector_parameters: Mapping[str, object] | None = None,
         presence: str = ANNOTATED,
         render_mode: str | None = None,
-        secret: str = "",
+        secret: str | bool = False,
         scoring_info: bool = True,
         **parameters: Any,
     ):
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
-        for name in UNFILMED:
-            if name in parameters:
-                raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
+        _check_arguments(type(self), parameters)
         check_presence(presence)
         conditions = conditions_of(parameters)
-        if parameters:
-            raise InvalidInput(f"{', '.join(parameters)} is no argument of {type(self).__name__}")
         check_detector(detector)
         if detector != PROXY and conditions.min_returns != MIN_RETURNS:
             raise InvalidInput(f"min_returns is of the detector {PROXY}, {detector} does not know it")
@@ -172,6 +168,14 @@ class FilmEnv(OpenLoopEnv):
         return self.start(self.film, self.entropy(seed))
 
 
+def _check_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -> None:
+    for name in UNFILMED:
+        if name in parameters:
+            raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
+    known = [name for name in arguments_of(kind) if name not in UNFILMED]
+    check_arguments(kind.__name__, parameters, known)
+
+
 @lru_cache(maxsize=1)
 def _sightings(film: Film, presence: str) -> Sightings:
     return Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden, presence=presence)
@@ -220,6 +224,7 @@ class ReplayEnv(FilmEnv):
         camera_detections: str | PathLike[str] | None = None,
         **parameters: Any,
     ):
+        _check_arguments(type(self), parameters)
         if not isinstance(scene, str | None):
             raise InvalidInput(f"scene must be a name, got {shown(scene)}")
         options = {"split": split, "version": version, "camera_detections": camera_detections}

@@ -1,5 +1,6 @@
 """What the environments of both loops share: a rig, its spaces, and a budget that no action can overspend."""
 
+import inspect
 from typing import Any, Generic, TypeVar
 
 import gymnasium
@@ -45,7 +46,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         sensor_height_m: float,
         budget: float,
         keyframe_s: float,
-        secret: str,
+        secret: str | bool,
         scoring_info: bool,
     ):
         check_secret(secret)
@@ -55,7 +56,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         grid = AngularGrid()
         dead_cells(grid, conditions.lidar_dead_rows)
         self.conditions, self.scoring_info = conditions, scoring_info
-        self._secret = secret
+        self._secret = secret if isinstance(secret, str) else ""
         self.rig = Rig(
             grid,
             cameras,
@@ -141,6 +142,14 @@ def conditions_of(parameters: dict[str, Any]) -> Conditions:
     """The conditions among keyword arguments, which lose them. Raises InvalidInput for a value not allowed."""
     names = [name for name in parameters if name in Conditions.__dataclass_fields__]
     return Conditions(**{name: parameters.pop(name) for name in names})
+
+
+def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
+    """What an environment's class takes by name: its own arguments and the conditions."""
+    made = [vars(one)["__init__"] for one in kind.__mro__ if issubclass(one, SensingEnv) and "__init__" in vars(one)]
+    named = [each for make in made for each in inspect.signature(make).parameters.values()]
+    own = [each.name for each in named if each.kind is each.KEYWORD_ONLY]
+    return [*dict.fromkeys([*own, *Conditions.__dataclass_fields__])]
 
 
 def sensing(env: gymnasium.Env[Any, Any]) -> SensingEnv[Any]:

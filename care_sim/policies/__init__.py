@@ -93,6 +93,9 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
     check_parameters(name, make, parameters)
     if is_privileged(make):
         given.append(_of_environment(name, env, "truth"))
+    if make is SeedFinder:
+        # A rig does not say through which scenario it drives, and scenarios share their first speeds.
+        parameters = {"scenario": getattr(env.unwrapped, "scenario_name", None), **parameters}
     try:
         policy = make(*given, **parameters)
     except (InvalidInput, MissingExtra):

@@ -1,4 +1,4 @@
-"""False boxes: nothing of their class is there, and no number of theirs says so."""
+"""False boxes: nothing of their class is there, and a single one says little of it. They ignore occlusion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

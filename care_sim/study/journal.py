@@ -12,11 +12,13 @@ from types import TracebackType
 from typing import Self
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import parsed
+from care_sim.base.json_text import check_size, parsed
 from care_sim.study.rows import with_tuples
 from care_sim.study.task import Row
 
 STUDY, CHECK = "study", "check"
+LARGEST_JOURNAL = 2**32
+"""Bytes of a journal: the plays of the largest study (100,000 of 10 kB), four times over."""
 _LINE = re.compile(rf'(\{{.*), "{CHECK}": "([0-9a-f]{{16}})"\}}')
 
 
@@ -26,12 +28,14 @@ class Journal:
     Opening it reads the rows of earlier runs. A line that was torn by a crash, or whose checksum is not that of its
     text, is passed over, so that its task runs again; `damaged` counts them. `studies` are those of the rows, `study`
     is the one whose rows are added. Raises OSError when the folder cannot be written, InvalidInput while another study
-    writes there.
+    writes there, and for a journal larger than `LARGEST_JOURNAL`.
     """
 
     def __init__(self, path: Path, study: str = "sweep"):
         self._study = study
         path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists():
+            _check_journal(path)
         self._file = path.open("a+", encoding="utf-8", errors="replace")
         self._lock(path.parent)
         self._file.seek(0)
@@ -52,6 +56,11 @@ class Journal:
 
     def __getitem__(self, digest: str) -> Row:
         return self._rows[digest]
+
+    @property
+    def rows(self) -> list[Row]:
+        """All rows, those of other options too."""
+        return [*self._rows.values()]
 
     def __enter__(self) -> Self:
         return self
@@ -84,6 +93,13 @@ class Journal:
             self._file.flush()
         except OSError as error:
             raise OSError(error.errno, error.strerror, self._file.name) from error
+
+
+def _check_journal(path: Path) -> None:
+    try:
+        check_size(path, LARGEST_JOURNAL)
+    except ValueError as error:
+        raise InvalidInput(f"{path} is no journal: {error}") from error
 
 
 def _line(row: Row) -> str:

@@ -3,6 +3,7 @@
 import ast
 import os
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -82,8 +83,12 @@ LONGEST = 8192
 
 
 def parameters(texts: Sequence[str]) -> "Parameters":
-    """Parameters given as NAME=VALUE. Raises InvalidInput for another form."""
-    return tuple(_pair(text) for text in texts)
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is given twice."""
+    pairs = tuple(_pair(text) for text in texts)
+    for name, count in Counter(name for name, _ in pairs).items():
+        if count > 1:
+            raise InvalidInput(f"a parameter is given once, got {shown(name)} {count} times")
+    return pairs
 
 
 def _pair(text: str) -> tuple[str, Any]:

@@ -41,6 +41,7 @@ KINDS: dict[str, Callable[[pa.DataType], bool]] = {
     "lists of whole numbers": lambda kind: _is_list_of(pa.types.is_integer, kind),
     _ANY: _is_parameter,
 }
+_WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": pa.int64()}
 
 
 @dataclass(frozen=True)
@@ -52,10 +53,15 @@ class Column:
     least: float = -MOST
     most: float = MOST
 
+    @property
+    def type(self) -> pa.DataType:
+        """What it is written as where no row tells."""
+        return _WRITTEN.get(self.kind, pa.float64())
+
     def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
         """What is wrong with the values of a file, if anything."""
-        if self.gaps and pa.types.is_null(values.type):
-            return
+        if self.gaps and values.null_count == len(values):
+            return  # of nothing the type says nothing: pandas and earlier versions write numbers there
         if not KINDS[self.kind](values.type):
             yield f"must hold {self.kind}, got {values.type}"
         elif values.null_count and not self.gaps:
@@ -117,7 +123,7 @@ class Schema:
             yield "it is empty"
         else:
             for name in self.known(table):
-                yield from (f"its column {name} {fault}" for fault in self._column(name).faults(table[name]))
+                yield from (f"its column {name} {fault}" for fault in self.column(name).faults(table[name]))
 
     def known(self, table: pa.Table) -> list[str]:
         """The columns that are read."""
@@ -130,7 +136,8 @@ class Schema:
         """The same where nothing is needed: of results that an older version wrote."""
         return Schema({}, {**self.needed, **self.further})
 
-    def _column(self, name: str) -> Column:
+    def column(self, name: str) -> Column:
+        """What a column must be; a sum of a stratum, where nothing else is said."""
         if name.startswith(PARAMETERS):
             return {**self.further, **self.needed}.get(name, PARAMETER)
         return {**self.further, **self.needed}.get(name, SUM)

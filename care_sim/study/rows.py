@@ -16,23 +16,30 @@ from care_sim.study.task import Row
 
 STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"
 """Where the schema of a file names the study that its rows belong to, and what is missing in it."""
+ANY = Schema()
+"""Of columns of whatever name and type."""
 
 
-def write_rows(rows: Sequence[Row], path: Path, study: str = "sweep", left_out: Sequence[str] = ()) -> None:
-    """Write rows, the name of their study and what it lacks to a Parquet file."""
+def write_rows(
+    rows: Sequence[Row], path: Path, study: str = "sweep", left_out: Sequence[str] = (), schema: Schema = ANY
+) -> None:
+    """Write rows, the name of their study and what it lacks to a Parquet file; columns of nothing as `schema` says."""
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [row.get(name) for row in rows] for name in names}
-    write_columns(columns, path, {STUDY: study, LEFT_OUT: json.dumps([*left_out])})
+    write_columns(columns, path, {STUDY: study, LEFT_OUT: json.dumps([*left_out])}, schema)
 
 
-def write_columns(columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, str] | None = None) -> None:
+def write_columns(
+    columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, str] | None = None, schema: Schema = ANY
+) -> None:
     """Write columns to a Parquet file, whole or not at all."""
     arrays = {name: pa.array(column) for name, column in columns.items()}
-    measured = {
-        name: column.cast(pa.float64()) if column.type == pa.null() else column for name, column in arrays.items()
+    typed = {
+        name: column.cast(schema.column(name).type) if column.type == pa.null() else column
+        for name, column in arrays.items()
     }
     with replacing(path) as unfinished:
-        pq.write_table(pa.table(measured).replace_schema_metadata(notes), unfinished)
+        pq.write_table(pa.table(typed).replace_schema_metadata(notes), unfinished)
 
 
 def check_columns(rows: Iterable[Row]) -> None:
@@ -64,7 +71,7 @@ def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
     or has not the schema.
     """
     table = _read(path)
-    for fault in (schema or Schema()).faults(table):
+    for fault in (schema or ANY).faults(table):
         raise InvalidInput(f"{path} holds no rows of a study: {fault}")
     known = table.select(schema.known(table)) if schema else table
     try:
@@ -91,8 +98,11 @@ def _read(path: Path) -> pa.Table:
     if not path.is_file():
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:
-        return pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
+        table = pq.read_table(path)
+        table.validate(full=True)
+        table.column_names  # noqa: B018 (names of broken characters show only now)
+        return table
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise InvalidInput(f"{path} is not a readable Parquet file: {_first_line(error)}") from error
 
 

@@ -173,11 +173,13 @@ class _Run:
             self._audience.finished(config, None)
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
-        """Hand a batch over; a fork server that does not answer at once on a busy machine is asked again."""
+        """Hand a batch over; a fork server that does not answer at once on a busy machine, or that is killed while it
+        starts a worker, is asked again: another one takes its place.
+        """
         for patience_s in (0.5, 2.0):
             try:
                 return executor.submit(self._attempt, batch)
-            except ConnectionError:
+            except (ConnectionError, EOFError):
                 time.sleep(patience_s)
         return executor.submit(self._attempt, batch)
 

@@ -66,8 +66,10 @@ class Task(ABC):
         """What it shares with tasks that take as long, the closest likeness first."""
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
-        """The policy for the environment."""
-        return make_policy(self.policy, env, **dict(self.policy_parameters))
+        """The policy for the environment; its files are looked at before it plays, which may load more of its code."""
+        policy = make_policy(self.policy, env, **dict(self.policy_parameters))
+        self.installed()
+        return policy
 
     def digest(self) -> str:
         """Hash of the effective configuration; package version, code and what is installed beside it included.

@@ -153,3 +153,7 @@ class Sac(AgentConfig):
     """Steps that are remembered and learned from; 25 kB each."""
     batch: int = bounded(256, 2, 1_000_000)
     """Steps a gradient."""
+
+
+ALGORITHMS = tuple(config.algorithm for config in (Ppo, RecurrentPpo, Sac))
+"""What a run may have been trained by."""

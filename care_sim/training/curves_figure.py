@@ -32,7 +32,7 @@ def _draw(axes: Axes, runs: Sequence[Run]) -> None:
     for run in runs:
         axes.plot(run.steps, run.values, color=colours[learner], linewidth=0.9, alpha=0.5 if len(runs) > 1 else 1.0)
     _mean(axes, runs, colours[learner])
-    axes.set_xlim(0, max(run.steps[-1] for run in runs))
+    axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))  # a run is evaluated before its first step, too
     if runs[0].closed_loop:
         axes.set_ylim(bottom=0)
     _name_lines(axes, marks | {learner: float(np.mean([run.values[-1] for run in runs]))}, colours)

@@ -19,14 +19,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from care_sim.base.checks import LARGEST_INTEGER, is_number
+from care_sim.base.checks import LARGEST_INTEGER, check_known, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
-from care_sim.base.json_text import parsed
+from care_sim.base.json_text import check_size, read
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save
 from care_sim.training.card_provenance import machine, versions
-from care_sim.training.config import AgentConfig
+from care_sim.training.config import ALGORITHMS, AgentConfig
 from care_sim.training.seeds import TRAINING, validation_seeds
 from care_sim.training.validation import Score
 
@@ -132,6 +132,7 @@ def read_config(path: Path) -> dict[str, Any]:
     for name, is_kind in kinds.items():
         if not is_kind(config.get(name)):
             raise InvalidInput(f"{path} is no configuration of a training run: {name} is {config.get(name)!r:.80}")
+    check_known(f"algorithm in {path}", config["algorithm"], ALGORITHMS)
     return config
 
 
@@ -151,7 +152,7 @@ def read_rules(path: Path) -> dict[str, dict[str, Any]]:
 
 def _read_map(path: Path) -> dict[str, Any]:
     try:
-        content = parsed(path.read_text(encoding="utf-8"))
+        content = read(path)
     except ValueError as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
     if not isinstance(content, dict):
@@ -164,6 +165,7 @@ def read_curve(path: Path) -> list[Evaluation]:
     if not path.exists():
         return []
     try:
+        check_size(path)
         with path.open(newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
         if tuple(head) != COLUMNS:

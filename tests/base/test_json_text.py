@@ -1,15 +1,19 @@
-"""JSON of the user's, as deep as it may be: one line, wherever it is read."""
+"""JSON of the user's, as deep and as large as it may be: one line, wherever it is read."""
 
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import MOST_LEVELS, parsed
+from care_sim.base.json_text import LARGEST, MOST_LEVELS, parsed, read
 from care_sim.policies.learned.weights import load
 from care_sim.reports.page.provenance import CONFIG, _description
-from care_sim.sources.nuscenes.tables import read_json
+from care_sim.sources.nuscenes.tables import LARGEST_TABLE, read_json
+from care_sim.study.journal import LARGEST_JOURNAL, Journal
+from care_sim.training.folder import read_config, read_curve
 
 DEEP = {n: "[" * n + "]" * n for n in (MOST_LEVELS, MOST_LEVELS + 1, 980, 100_000)}
 
@@ -42,3 +46,45 @@ def test_every_reader_says_so_in_one_line(tmp_path, levels):
     description, (trouble,) = _description(tmp_path / CONFIG)
     assert description == {}
     assert "deep" in trouble
+
+
+def zeros(path, size):
+    """So many bytes that take no space, or without a size a device without end."""
+    path.unlink(missing_ok=True)
+    if size is None:
+        path.symlink_to("/dev/zero")
+    else:
+        path.touch()
+        os.truncate(path, size)
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"), [(1, r"it holds \d+ bytes and may hold \d+"), (None, "it is no regular file")]
+)
+def test_every_reader_refuses_what_is_too_large_before_it_is_read(tmp_path, monkeypatch, more, reason):
+    monkeypatch.setattr(Path, "read_text", lambda *_, **__: pytest.fail("it is read"))
+    path = tmp_path / CONFIG
+    zeros(path, more and LARGEST_TABLE + more)
+    with pytest.raises(InvalidInput, match=rf"config\.json: no readable JSON file \({reason}"):
+        read_json(path)
+    zeros(path, more and LARGEST_JOURNAL + more)
+    with pytest.raises(InvalidInput, match=rf"config\.json is no journal: {reason}"):
+        Journal(path)
+    zeros(path, more and LARGEST + more)
+    for reader in (read_config, read_curve):
+        with pytest.raises(InvalidInput, match=rf"config\.json is damaged: {reason}"):
+            reader(path)
+    description, (trouble,) = _description(path)
+    assert description == {}
+    assert "cannot be read (it " in trouble
+
+
+def test_what_exceeds_the_memory_is_a_value_error(tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise MemoryError
+
+    (tmp_path / "a.json").write_text("{}")
+    assert read(tmp_path / "a.json") == {}
+    monkeypatch.setattr(json, "loads", full)
+    with pytest.raises(ValueError, match="memory"):
+        read(tmp_path / "a.json")

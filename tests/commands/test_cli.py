@@ -14,6 +14,7 @@ from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
+from care_sim.study.parameters import parameters
 from care_sim.study.results_files import EPISODES
 from care_sim.study.rows import read_rows, write_rows
 
@@ -59,6 +60,7 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["run", "dense", "--seed", "-1"], ["seed", ">= 0"]),
         (["run", "dense", "--scenario-parameters", "wheels=3"], ["'wheels'", "vehicles"]),
         (["run", "dense", "--scenario-parameters", "wheels"], ["NAME=VALUE", "'wheels'"]),
+        (["run", "dense", "--scenario-parameters", "vehicles=3", "vehicles=4"], ["once", "'vehicles' 2 times"]),
         (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
         (["sweep", "--seeds", "0"], ["seeds", "from 1 to"]),
         (["sweep", "--budgets"], ["--budgets", "at least one"]),
@@ -211,7 +213,8 @@ def test_the_lists(capsys):
     out = run(capsys, "scenarios")[1]
     assert "dartout" in out
     assert "vehicles=7" in out
-    assert "ego_speed_mps=(8.03, 8.63)" in out
+    assert "ego_speed_mps=8.03,8.63 (0.5 to 60)" in out
+    assert parameters(["ego_speed_mps=8.03,8.63"]) == (("ego_speed_mps", (8.03, 8.63)),)
 
 
 def test_an_installed_policy_that_does_not_load_is_listed_with_the_reason(capsys, tmp_path, monkeypatch):

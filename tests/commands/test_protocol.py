@@ -72,6 +72,15 @@ def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):
     assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
 
 
+def test_one_policy_alone_is_read_again(source, tmp_path):
+    """What differs from the reference is known of no row then: a column of nothing, which is still one of counts."""
+    assert not conduct(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
+    counts = pq.read_table(tmp_path / "out" / PLAYS.file).select(["differing_keyframes", "differing_cells"])
+    assert [str(column.type) for column in counts.columns] == ["int64", "int64"]
+    (row,) = reported(tmp_path / "out")[0]
+    assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
+
+
 def test_the_rows_of_a_play_do_not_depend_on_what_was_played_beside_it(source):
     together = small(source, ["history", "care", "full"], floors=(0, 1))
     rows = attempted(together)

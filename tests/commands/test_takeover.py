@@ -68,7 +68,7 @@ def test_rows_that_nobody_asks_for_now_are_named(folder):
     ):
         check_results(folder, [config for config in whole if config.seed < 4], PAPER)
     late = grid(["dense"], ["history", "all-camera", "care", "full"], [0.03], range(5), camera_latencies=(1,))
-    with pytest.raises(InvalidInput, match="; 15 of them"):
+    with pytest.raises(InvalidInput, match=r"; 15 of them, .* 0\.03 \(camera_latency 0, now 1\), would be"):
         check_results(folder, late, PAPER)
 
 
@@ -154,6 +154,36 @@ def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
     assert conduct(short(), tmp_path, workers=1) == []
 
 
+def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
+    begun = short(("history", "care"), range(3))
+    with Journal(tmp_path / JOURNAL, "sweep") as journal:
+        for config in begun[:4]:
+            journal.append(config.row() | {"digest": f"of older code {config.key}"})
+    before = held(tmp_path)
+    for other, gone, what in (
+        (short(seeds=(0, 1)), 2, "seed 2"),
+        (short(("random",)), 4, "dartout history 0.1"),
+        (short(("history", "care"), range(3), camera_latencies=(1,)), 4, "0.1 (camera_latency 0, now 1)"),
+    ):
+        with pytest.raises(InvalidInput) as refused:
+            conduct(other, tmp_path, workers=1)
+        told = str(refused.value)
+        assert f"holds the unfinished study sweep, 4 rows; {gone} of them, the first dartout history 0.1" in told
+        assert what in told
+        assert told.endswith(
+            ", are not asked for now: give the command that began it, another --out, or --force to play beside them"
+        )
+    assert held(tmp_path) == before
+    assert conduct(short(("history", "care"), range(4)), tmp_path, workers=1) == []
+
+
+def test_force_plays_beside_an_interrupted_study(tmp_path):
+    with Journal(tmp_path / JOURNAL, "sweep") as journal:
+        journal.append(short()[0].row() | {"digest": "a"})
+    assert conduct(short(seeds=(1,)), tmp_path, workers=1, force=True) == []
+    assert conduct(short(seeds=(1,)), tmp_path, workers=1) == []
+
+
 def test_the_folder_is_locked_until_its_results_are_written(tmp_path, monkeypatch):
     locked = []
 
@@ -205,8 +235,9 @@ def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tm
         write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
         check_results(tmp_path, by[own], STUDIES["protocol"])
         check_results(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
-        with pytest.raises(InvalidInput, match="; 2 of them, the first street-0000-straight care"):
+        with pytest.raises(InvalidInput, match="; 2 of them, the first street-0000-straight care") as refused:
             check_results(tmp_path, by[other], STUDIES["protocol"])
+        assert f"care 0.1 (presence {own}, now {other}), would be gone" in str(refused.value)
 
 
 def test_every_parameter_is_a_column_that_is_read():

@@ -223,3 +223,9 @@ def test_the_budget_is_rounded(budget, cells, expected):
 def test_a_budget_out_of_its_domain_is_refused_by_name(budget):
     with pytest.raises(InvalidInput, match="budget"):
         budget_cells(budget, 16384)
+
+
+@pytest.mark.parametrize("demand", [b"x", None, [[1, 2]]])
+def test_what_is_no_demand_is_refused_in_one_line(demand):
+    with pytest.raises(InvalidInput, match=r"^demand must be a Demand, got "):
+        allocate(demand, 3, 0.3)

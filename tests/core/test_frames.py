@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from care_sim.core.frames import Frame, turned
 
@@ -41,6 +42,14 @@ def test_what_is_dead_ahead_of_a_turned_car():
 def test_to_world_and_to_local_undo_each_other(frame, boxes):
     assert frame.boxes_to_local(frame.boxes_to_world(boxes)) == pytest.approx(boxes, abs=1e-9)
     assert frame.boxes_to_world(frame.boxes_to_local(boxes)) == pytest.approx(boxes, abs=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+@given(st.sampled_from([-1, 1]), st.floats(-3, 3), st.floats(-3, 3), st.floats(-1e-6, 1e-6))
+def test_what_points_straight_up_or_down_is_turned_the_same(sign, yaw, roll, beside):
+    rotation = Rotation.from_euler("ZYX", [yaw, sign * np.pi / 2 + beside, roll])
+    frame = Frame.turned_by(rotation, np.zeros(3))
+    assert frame.rotation.as_matrix() == pytest.approx(rotation.as_matrix(), abs=1e-6)
 
 
 def test_pitch_lowers_the_front_and_roll_the_right():

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 
@@ -258,3 +259,8 @@ def test_wedges_have_the_margins_of_hulls():
     assert len(rows) == len(bare_rows) + 2
     assert {0, 511} <= set(bare_columns)
     assert 256 not in columns
+
+
+def test_directions_that_are_no_numbers_are_refused_in_one_line():
+    with pytest.raises(InvalidInput, match=r"directions must be numbers, none of them NaN"):
+        GRID.cells_of([[1.0, np.nan, 0.0]])

@@ -107,3 +107,9 @@ def test_rows_whose_whole_numbers_are_none_are_refused_in_one_line(kind, number)
     with pytest.raises(InvalidInput, match="must be numbers up to 9"):
         kind.from_rows(rows)
     assert len(kind.from_rows(rows[:1])) == 1
+
+
+def test_an_observation_of_no_cells_is_refused_in_one_line():
+    observation = {**belief().to_observation(), "ranges": np.empty((0, 7), np.float32)}
+    with pytest.raises(InvalidInput, match=r"ranges of an observation must hold a cell at least"):
+        Belief.from_observation(observation)

@@ -336,7 +336,12 @@ def test_step_before_reset_says_so():
         ({"render_mode": "ascii"}, "render_mode must be"),
         ({"occluder": "cloud"}, "unknown occluder"),
         ({"vehicles": 99}, "vehicles of dense must be a whole number >= 0 and <= 12"),
-        ({"weather": "rain"}, "unknown parameter of dense 'weather'; known: "),
+        ({"weather": "rain"}, "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, vehicles"),
+        ({"secrt": "x"}, "unknown argument of DenseEnv 'secrt', the nearest is secret; known: "),
+        ({"bugdet": 0.1}, "the nearest is budget; known: "),
+        ({"vehicle": 3}, "the nearest is vehicles; known: "),
+        ({"camera_latncy": 1}, "the nearest is camera_latency; known: "),
+        ({"secret": ""}, "secret must not be empty: leave it out, or give False"),
         ({"reward_weights": {"speed": 1.0}}, "unknown reward term"),
     ],
 )

@@ -81,7 +81,7 @@ def same(one, other):
 @pytest.mark.parametrize("name", ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0"])
 def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, name):
     public, secret, again, other = (
-        begins(make(name, budget=1.0, secret=text), 0) for text in ("", SECRET, SECRET, SECRET[::-1])
+        begins(make(name, budget=1.0, secret=text), 0) for text in (False, SECRET, SECRET, SECRET[::-1])
     )
     assert all(map(same, secret[0], again[0]))
     assert secret[1] == again[1]
@@ -92,7 +92,7 @@ def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, n
 
 def test_a_secret_enters_misses_floor_and_losses_of_a_recorded_scene(make):
     faults = {"budget": 0.2, "false_negative_rate": 0.5, "lidar_dropout": 0.5}
-    public, secret, again = (make("CARE-Replay-v0", **faults, secret=text) for text in ("", SECRET, SECRET))
+    public, secret, again = (make("CARE-Replay-v0", **faults, secret=text) for text in (False, SECRET, SECRET))
     fired = []
     for env in (public, secret, again):
         env.reset(seed=0)
@@ -123,6 +123,7 @@ def test_a_secret_makes_another_street_whose_name_does_not_tell_its_seed(make):
     [
         ({"scoring_info": ["x" * 9999]}, "scoring_info must be True or False, got .{,130}$"),
         ({"secret": None}, "secret must be a text"),
+        ({"secret": ""}, "secret must not be empty"),
         ({"scoring_info": 1}, "scoring_info must be True or False, got 1"),
     ],
 )

@@ -208,7 +208,9 @@ def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):
     [
         ({"engine": "bullet"}, "engine is no argument of the open loop"),
         ({"camera_rotation_sigma_deg": 1.0}, "camera_rotation_sigma_deg is no argument of the open loop"),
-        ({"duration_s": 3.0}, "duration_s is no argument"),
+        ({"duration_s": 3.0}, "unknown argument of .*Env 'duration_s'; known: .*budget, .*scoring_info, secret"),
+        ({"scoring_inf": False}, "unknown argument of .*Env 'scoring_inf', the nearest is scoring_info; known: "),
+        ({"secret": ""}, "secret must not be empty"),
         ({"detector": "yolo"}, "unknown detector 'yolo'"),
         ({"detector_parameters": {"size": 3}}, "unknown parameter of detector returns 'size'"),
         ({"detector": "cluster", "min_returns": 5}, "min_returns is of the detector returns"),
@@ -235,6 +237,11 @@ def test_recordings_that_are_not_there_are_named(drive, arguments, complaint):
     arguments = arguments | {"source": arguments["source"].format(drive=drive)}
     with pytest.raises(InvalidInput, match=complaint):
         gymnasium.make("CARE-Replay-v0", disable_env_checker=True, **arguments)
+
+
+def test_a_misspelt_argument_of_a_recording_is_told_the_nearest():
+    with pytest.raises(InvalidInput, match=r"of ReplayEnv 'sorce', the nearest is source; known: .* scene, "):
+        gymnasium.make("CARE-Replay-v0", disable_env_checker=True, sorce="argoverse2:.")
 
 
 def test_a_film_without_cameras_is_refused_in_one_line():

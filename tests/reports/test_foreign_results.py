@@ -89,6 +89,16 @@ def test_a_parameter_of_a_structure_is_named(tmp_path):
     assert "column policy.x must hold text, numbers, flags or lists of them, got struct" in complaint(tmp_path)
 
 
+@pytest.mark.parametrize("kind", [pa.null(), pa.float64(), pa.string()])
+def test_a_column_of_nothing_is_of_any_type(tmp_path, kind):
+    """Earlier versions wrote numbers there."""
+    content = table("protocol", tmp_path)
+    nothing = pa.nulls(content.num_rows, kind)
+    place = content.column_names.index("differing_cells")
+    put(content.set_column(place, "differing_cells", nothing), "protocol", tmp_path)
+    assert {row["differing_cells"] for row in reported(tmp_path)[0]} == {None}
+
+
 @pytest.mark.parametrize("column", ["class/bus/delay", "film_hash", "tracks", "ttfds", "keyframes", "events"])
 def test_a_missing_column_of_a_play_is_named(tmp_path, column):
     put(table("protocol", tmp_path).drop_columns(column), "protocol", tmp_path)
@@ -113,6 +123,16 @@ def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_p
     content = table("sweep", tmp_path)
     put(content.append_column("when", pa.array([2**62] * content.num_rows, pa.timestamp("ms"))), "sweep", tmp_path)
     assert len(reported(tmp_path)[0]) == content.num_rows
+
+
+def test_names_and_texts_of_broken_characters_are_damage(tmp_path):
+    table("protocol", tmp_path)
+    path = tmp_path / STUDIES["protocol"].kind.file
+    content = path.read_bytes()
+    for text in (b"differing_cells", b"film of scene 000"):
+        assert text in content
+        path.write_bytes(content.replace(text, text[:-1] + b"\xed"))
+        assert "is not a readable Parquet file: " in complaint(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -175,10 +195,10 @@ def test_damaged_results_are_shown_or_refused(tmp_path, name):
     assert not any("\n" in line for line in refused)
 
 
-@pytest.mark.filterwarnings("ignore:Glyph")
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", ["sweep", "protocol"])
 def test_a_name_of_signs_is_shown_everywhere(tmp_path, name, capsys):
-    odd = "my $x^$ |`<b>_\\ \x1b[31m"
+    odd = "my $x^$ |`<b>_\\ \x1b[31m \u5b66"
     rows = [row | {"policy": odd if row["policy"] == "history" else row["policy"]} for row in ROWS[name]]
     write_rows(rows, tmp_path / STUDIES[name].kind.file, name, ["what \x1b[31m failed"])
     (tmp_path / "config.json").write_text('{"machine": {"system": "\\ud800"}}')

@@ -1,4 +1,4 @@
-"""False boxes: how many come, where from, and that nothing about one of them says that it is false."""
+"""False boxes: how many come, where from, and how little the numbers of a single one say that it is false."""
 
 import itertools
 import json
@@ -230,11 +230,31 @@ def streets():
     return episodes
 
 
-@pytest.mark.parametrize("world", ["dense", "streets"])
-def test_no_classifier_tells_false_boxes_from_true_ones(world, request):
+@pytest.fixture(scope="module")
+def cutin():
+    """Sixteen episodes of the cut-in."""
+    return haunted("CARE-CutIn-v0", 2.0, range(16))
+
+
+@pytest.fixture(scope="module")
+def dartout():
+    """Thirty-two of the dart-out, where 20 keyframes of an episode show a true box."""
+    return haunted("CARE-Dartout-v0", 2.0, range(32))
+
+
+TOLD = {"dense": 0.55, "cutin": 0.63, "dartout": 0.52, "streets": 0.53}
+"""Area under the curve, the median of the three classifiers, measured with as many boxes as there were, up to 1,000 of
+each kind (24, 60, 60 and 4 drives of CARE at 10%; never less than 513 boxes). No world may tell more than that and what
+chance adds to 300 boxes.
+"""
+
+
+@pytest.mark.parametrize("world", TOLD)
+def test_small_classifiers_of_single_boxes_tell_false_from_true_as_badly_as_they_did(world, request):
+    """With 300 boxes of each kind. What else tells them apart, and how well, is in `docs/concepts.md`."""
     episodes = request.getfixturevalue(world)
     areas = areas_under_the_curve(*(of_kind(episodes, kind) for kind in (0, 1)), np.random.default_rng(0))
-    assert all(abs(area - 0.5) <= CHANCE for area in areas.values()), areas
+    assert all(0.5 - CHANCE <= area <= TOLD[world] + CHANCE for area in areas.values()), areas
 
 
 def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):

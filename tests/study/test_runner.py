@@ -164,6 +164,26 @@ def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
     assert Counter(audience.ended) == Counter((config, True) for config in configs)
 
 
+class BusyServer(ThreadPoolExecutor):
+    """Fails to start a worker at the first call, as a pool whose fork server is busy or was killed does."""
+
+    error: type[Exception]
+
+    def submit(self, *call, **options):
+        if not hasattr(self, "called"):
+            self.called = True
+            raise self.error
+        return super().submit(*call, **options)
+
+
+@pytest.mark.parametrize("error", [ConnectionRefusedError, EOFError])
+def test_a_fork_server_that_fails_once_costs_nothing(tmp_path, error):
+    server = type("Server", (BusyServer,), {"error": error})
+    configs = short(["history"])
+    assert conduct(configs, tmp_path, workers=1, make_executor=server) == []
+    assert len(read_rows(tmp_path / EPISODES.file)) == 1
+
+
 def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
     def fail(error):
         raise error

@@ -53,5 +53,9 @@ class Case:
 
     def tell(self, step):
         """Note what comes next, for whoever reads of a fault."""
-        self.steps.append(str(step))
-        self.listener(f"{step}\n")
+        try:
+            text = str(step)
+        except RecursionError:
+            text = "what is nested too deep to be told"
+        self.steps.append(text)
+        self.listener(f"{text}\n")

@@ -68,6 +68,10 @@ def _told(file, function):
     return f"care_sim/{file.rpartition('/care_sim/')[2]}:{function}"
 
 
+SAID_ALL = "\nResults are in "
+"""The last line of a study that is done."""
+
+
 def ending(code, out, err, arguments=()):
     """How a command ended, of `ENDINGS`. Raises Fault."""
     told = f"{_shown(arguments)}\nexit code {code}\nstdout ...{out[-1500:]!r}\nstderr {err[-4000:]}"
@@ -91,7 +95,8 @@ def ending(code, out, err, arguments=()):
 def _ending(code, out, lines, own, told):
     if code in BY_SIGNAL and own:
         code = 130
-    if code in BY_SIGNAL and out.strip() and not lines:
+    # The system ends a command that has said all: its results are whole, and Python is taking itself down.
+    if code in BY_SIGNAL and out.strip() and (not lines or (not own and SAID_ALL in out)):
         return INTERRUPTED
     if code not in ENDINGS:
         raise Fault(f"exit code {code}", told)

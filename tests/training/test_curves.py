@@ -106,6 +106,8 @@ DEEP = '{"a": ' + "[" * 100_000
         ("config.json", '{"study": "sweep", "configurations": []}'),
         ("config.json", '{"algorithm": "ppo", "env": "E", "budget": [], "episodes": 2}'),
         ("config.json", '{"algorithm": "ppo", "env": "E", "budget": ["a"], "episodes": 2}'),
+        ("config.json", '{"algorithm": "dqn", "env": "E", "budget": [0.1], "episodes": 2}'),
+        ("config.json", '{"algorithm": "\\ud800", "env": "E", "budget": [0.1], "episodes": 2}'),
         ("config.json", '{"algorithm": ["ppo"], "env": "E", "budget": [0.1], "episodes": 2}'),
         ("rules.json", DEEP),
         ("rules.json", "3"),
@@ -134,11 +136,24 @@ def test_files_of_somebody_else_are_one_line(folders, name, text, capsys, tmp_pa
     assert "run-0" in said
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_run_that_was_only_evaluated_before_its_first_step_is_drawn(tmp_path):
+    run = read(folder(tmp_path / "begun", Ppo(), (4.0,)))
+    assert run.steps == [0]
+    assert curves_figure([[run]]).axes[0].get_xlim()[0] == 0
+
+
+@pytest.mark.filterwarnings("error")
 def test_names_are_drawn_as_they_are(folders, tmp_path):
     rules = json.loads((folders[0] / "rules.json").read_text())
-    (folders[0] / "rules.json").write_text(json.dumps(rules | {"my $rule_{": rules["care"]}))
+    names = "my $rule_{", "\ud800\x1b[31m\u5b66"
+    (folders[0] / "rules.json").write_text(json.dumps(rules | dict.fromkeys(names, rules["care"])))
     config = json.loads((folders[0] / "config.json").read_text())
-    (folders[0] / "config.json").write_text(json.dumps(config | {"env": "E $x^$ $\\frac$"}))
+    (folders[0] / "config.json").write_text(json.dumps(config | {"env": "E $x^$ $\\frac$\x00"}))
     with pytest.raises(SystemExit) as end:
         main(["train", "curves", str(folders[0]), "--out", str(tmp_path / "curves.png")])
     assert end.value.code == 0
+    drawn = (tmp_path / "curves.svg").read_text()
+    assert all(f"<!-- {name} -->" in drawn for name in ("my $rule_{", "\\ud800\\x1b[31m\u5b66")), (
+        "names beside the axes"
+    )

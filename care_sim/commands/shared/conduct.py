@@ -35,8 +35,8 @@ def conduct(
     failed, the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`, `tables.tex`
     and the figures of `study`; the folder is this study's until all that is written. Where tasks failed and the folder
     holds rows that were therefore not obtained, these files stay, unless `force`. Raises InvalidInput for no task
-    or no worker, when the folder cannot be written, and unless `force` when it holds another study, or rows of this one
-    that are none of `configs`.
+    or no worker, when the folder cannot be written, and unless `force` when it holds another study, finished or not, or
+    rows of this one that are none of `configs`.
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
@@ -78,7 +78,7 @@ def _check(folder: Path, configs: Sequence[Task], study: Study, force: bool, jou
     if not force:
         check_results(folder, configs, study)
         if journal is not None:
-            check_journal(folder, journal, study)
+            check_journal(folder, configs, journal, study)
 
 
 def _journal(folder: Path, study: Study) -> Journal:
@@ -116,5 +116,5 @@ def _write(
     write_text(folder / "config.json", _description(configs, study, failures))
     for name, columns in aside.items():
         write_columns(columns, folder / name)
-    write_rows(finished, folder / kind.file, study.name, left_out)
+    write_rows(finished, folder / kind.file, study.name, left_out, study.schema)
     report.write(folder)

@@ -18,7 +18,8 @@ class Options(Conditions):
     """Conditions that all episodes share."""
 
     scenario_parameters: tuple[str, ...] = ()
-    """Physics of the scenario as NAME=VALUE, for example vehicles=7 occluder=truck; see `care-sim scenarios`."""
+    """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7 gap_m=0.8,1.2; see
+    `care-sim scenarios`."""
     policy_parameters: tuple[str, ...] = ()
     """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
     POLICY.NAME=VALUE, for example ppo.path=weights.npz."""

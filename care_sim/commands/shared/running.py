@@ -30,8 +30,9 @@ class Running:
     cluster: str | None = None
     """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
     force: bool = False
-    """Play into a folder that holds another study, or rows that are not asked for now: its tables, figures and Parquet
-    files are replaced at the end; its journal stays."""
+    """Play into a folder that holds another study, finished or not, or rows that are not asked for now: its tables,
+    figures and Parquet files are replaced at the end; its journal stays. Episodes never replace the plays of a
+    protocol, nor plays episodes: their files have other names."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -6,6 +6,7 @@ from pathlib import Path
 from care_sim.base.errors import InvalidInput
 from care_sim.base.text import counted
 from care_sim.core.conditions import DEFAULTS
+from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.reports.studies import SWEEP, Study
 from care_sim.study.journal import Journal
 from care_sim.study.results_files import KINDS, is_parameter
@@ -13,6 +14,12 @@ from care_sim.study.rows import read_notes, read_rows
 from care_sim.study.task import Row, Task
 
 WAYS_OUT = "give another --out, or --force to replace it"
+_USUAL = DEFAULTS | {"presence": ANNOTATED}
+"""What a row was asked with that does not say."""
+_NAMES = ("scene", "scenario", "policy", "budget")
+_SEEDS = ("seed", "floor_seed")
+_MOST_TOLD = 3
+"""Differing parameters that a refusal tells."""
 
 
 def check_kind(folder: Path, study: Study) -> None:
@@ -22,7 +29,7 @@ def check_kind(folder: Path, study: Study) -> None:
         if other is not kind and (folder / other.file).exists():
             raise InvalidInput(
                 f"{folder} holds {other.unit} of another study; the {kind.unit} of the study {study.name} need another "
-                "--out"
+                "--out, with --force too"
             )
 
 
@@ -44,8 +51,9 @@ def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
         )
     if gone:
         raise InvalidInput(
-            f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first {_label(gone[0])}, would be "
-            f"gone from the study {study.name} that is asked for, {wanted}: {WAYS_OUT}"
+            f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first "
+            f"{_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study {study.name} that is asked "
+            f"for, {wanted}: {WAYS_OUT}"
         )
 
 
@@ -63,33 +71,70 @@ def lost(folder: Path, played: Sequence[Task], study: Study) -> str:
     )
 
 
-def check_journal(folder: Path, journal: Journal, study: Study) -> None:
-    """Raise InvalidInput where an interrupted study of another name is to go on."""
-    if journal.studies and study.name not in journal.studies and not (folder / study.kind.file).is_file():
+def check_journal(folder: Path, configs: Sequence[Task], journal: Journal, study: Study) -> None:
+    """Raise InvalidInput where an interrupted study is to go on that has another name, or rows that nobody asks for
+    now: once other results lie there, its own command is refused. A row counts by its parameters, whatever code
+    played it, so that a command goes on after a change of the code.
+    """
+    if not len(journal) or (folder / study.kind.file).is_file():
+        return
+    rows = counted(len(journal), "row")
+    if study.name not in journal.studies:
         raise InvalidInput(
-            f"{folder} holds the unfinished study {_joined(journal.studies)}, {counted(len(journal), 'row')}, beside "
+            f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}, beside "
             f"which the study {study.name} would be played: {WAYS_OUT}"
+        )
+    if gone := _gone(journal.rows, configs):
+        raise InvalidInput(
+            f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}; {len(gone)} of them, the first "
+            f"{_label(gone[0])}{_differing(gone[0], configs)}, are not asked for now: give the command that began it, "
+            "another --out, or --force to play beside them"
         )
 
 
 def _rows_and_gone(path: Path, configs: Sequence[Task], study: Study) -> tuple[list[Row], list[Row]]:
     """The rows of a file, and those that are none of `configs`."""
-    rows, own = read_rows(path, study.kind.schema.lenient), {_identity(config.row()) for config in configs}
-    return rows, [row for row in rows if _identity(row) not in own]
+    rows = read_rows(path, study.kind.schema.lenient)
+    return rows, _gone(rows, configs)
+
+
+def _gone(rows: Sequence[Row], configs: Sequence[Task]) -> list[Row]:
+    own = {_identity(config.row()) for config in configs}
+    return [row for row in rows if _identity(row) not in own]
 
 
 def _identity(row: Row) -> frozenset[tuple[str, object]]:
-    """What a row was asked with. A file that was given counts as given, whatever it held."""
+    return frozenset(_asked(row).items())
+
+
+def _asked(row: Row) -> Row:
+    """What a row was asked with, but for what is usual. A file that was given counts as given, whatever it held."""
     given = {name: value for name, value in row.items() if is_parameter(name) and value is not None}
     if "camera_detections" in given:
         given["camera_detections"] = True
-    return frozenset((name, value) for name, value in given.items() if value != DEFAULTS.get(name))
+    return {name: value for name, value in given.items() if value != _USUAL.get(name)}
 
 
 def _label(row: Row) -> str:
-    names = ("scene", "scenario", "policy", "budget")
-    main = [str(row[name]) for name in names if row.get(name) is not None]
-    return " ".join([*main, *(f"{name} {row[name]}" for name in ("seed", "floor_seed") if row.get(name))])
+    main = [str(row[name]) for name in _NAMES if row.get(name) is not None]
+    return " ".join([*main, *(f"{name} {row[name]}" for name in _SEEDS if row.get(name))])
+
+
+def _differing(row: Row, configs: Sequence[Task]) -> str:
+    """In brackets, what tells a row from the task nearest to it, where their labels are the same."""
+    label, there, found = _label(row), _asked(row), []
+    for asked in (config.row() for config in configs):
+        if _label(asked) == label:
+            now = _asked(asked)
+            names = [name for name in sorted({*there, *now}) if there.get(name) != now.get(name)]
+            found.append([f"{name} {_told(name, there)}, now {_told(name, now)}" for name in names])
+    nearest = min(found, key=len, default=[])
+    return f" ({'; '.join(nearest[:_MOST_TOLD])})" if nearest else ""
+
+
+def _told(name: str, asked: Row) -> str:
+    value = asked.get(name, _USUAL.get(name))
+    return "not given" if value is None else str(value)
 
 
 def _joined(names: Collection[str]) -> str:

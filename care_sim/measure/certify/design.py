@@ -39,6 +39,9 @@ POLICIES = (
 )
 """Written out, because one more changes what every episode is made of."""
 
+AS_LISTED: dict[str, dict[str, Any]] = {"seed-finder": {"scenario": "dense"}}
+"""Parameters of policies in the whole list, which was published when `seed-finder` knew the dense street alone."""
+
 SINGLE, INTERLEAVED, SYNC, ASYNC, SUBPROCESS, HASH_SEED = MODES = (
     "single", "interleaved", "sync", "async", "subprocess", "hash-seed",
 )  # fmt: skip

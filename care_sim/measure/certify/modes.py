@@ -15,6 +15,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from care_sim.base.processes import end_with_starter, following, starting
 from care_sim.measure.certify.design import (
+    AS_LISTED,
     ASYNC,
     HASH_SEED,
     INTERLEAVED,
@@ -133,7 +134,7 @@ def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Tra
 
 
 def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:
-    policy = make_policy(episode.policy, env)
+    policy = make_policy(episode.policy, env, **AS_LISTED.get(episode.policy, {}))
     policy.reset()
     return policy
 

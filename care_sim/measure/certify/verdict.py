@@ -23,6 +23,8 @@ class Verdict:
     hash: str | None
     differing: Mapping[int, tuple[str, int | None]]
     failures: Mapping[int, str]
+    only: int | None = None
+    """The number of the episode where one alone was asked for."""
 
     @property
     def as_published(self) -> bool:
@@ -35,6 +37,8 @@ class Verdict:
         counted = f"{fewer}{self.asked:,} episodes" if self.asked > 1 else "1 episode"
         if self.as_published:
             yield f"{counted}: {self.hash}, as published"
+            if self.only is not None:
+                yield _made_of(self.only)
             return
         stages = Counter(name for name, _ in self.differing.values())
         told = ", ".join(f"{count:,} {_where(name)}" for name, count in stages.most_common())
@@ -43,8 +47,9 @@ class Verdict:
         name, keyframe = self.differing[first]
         moment = "" if keyframe is None else f", keyframe {keyframe}"
         yield f"the first is episode {first}, {self.failures.get(first) or f'which differs first in {name}{moment}'}"
-        yield f"  {drawn(first).text}, played in mode {drawn(first).mode}"
-        yield f"  care-sim certify --episode {first}"
+        yield _made_of(first)
+        if self.only is None:
+            yield f"  care-sim certify --episode {first}"
 
 
 def compare(found: Played, published: Sequence[bytes], asked: int = 0) -> Verdict:
@@ -53,9 +58,12 @@ def compare(found: Played, published: Sequence[bytes], asked: int = 0) -> Verdic
     trails = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, bytes)}
     parted = {number: stage(published[number], trail) for number, trail in trails.items() if trail != published[number]}
     differing = parted | dict.fromkeys(failures, (NOT_PLAYED, None))
-    return Verdict(
-        len(found), asked or len(found), None if failures else combined([*trails.values()]), differing, failures
-    )
+    asked, hash_ = asked or len(found), None if failures else combined([*trails.values()])
+    return Verdict(len(found), asked, hash_, differing, failures, next(iter(found)) if asked == 1 else None)
+
+
+def _made_of(number: int) -> str:
+    return f"  {drawn(number).text}, played in mode {drawn(number).mode}"
 
 
 def _where(name: str) -> str:

@@ -18,11 +18,19 @@ if TYPE_CHECKING:
     from care_sim.world.world import World
 
 
+USUAL = "dense"
+"""The scenario that it knows where it is told none."""
+
+
 class SeedFinder(Policy):
     """What an agent can do that holds this package: of the first `seeds` seeds of a public `scenario` it takes the one
     whose ego begins at the speed that it reads, lets that episode's world go on by itself, and reserves the hull of
-    where the hidden actor is by then. It needs no camera and no return. An episode that it does not know (other
-    arguments, a seed beyond `seeds`, a `secret` of the environment) it plays as history does.
+    where the hidden actor is by then. It needs no camera and no return. It plays as history does where no seed that it
+    knows begins at that speed: with a seed beyond `seeds`, a `secret` of the environment, noise of the speed.
+
+    `make_policy` tells it the `scenario` of the environment; made of a rig alone it takes `dense`. It knows scenarios
+    with their default arguments. With others, or in another scenario, the first speed can be the same: it then finds
+    the seed, and fires where the actor would be in the scenario that it knows.
 
     A control, no contender: what it reaches without a camera is what the seeds give away.
     """
@@ -31,9 +39,10 @@ class SeedFinder(Policy):
     tags = ("generator", "control")
     source = "own: what public seeds give away"
 
-    def __init__(self, rig: Rig, scenario: str = "dense", seeds: int = 30):
+    def __init__(self, rig: Rig, scenario: str | None = None, seeds: int = 30):
         from care_sim.scenarios import SCENARIOS
 
+        scenario = USUAL if scenario is None else scenario
         check_known("scenario", scenario, SCENARIOS)
         check_whole("seeds", seeds, 1, 10**6)
         super().__init__(rig)

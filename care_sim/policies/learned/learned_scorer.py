@@ -5,7 +5,6 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
@@ -51,8 +50,6 @@ class CellNetwork:
         self._out = weights.array("out", units)
         hidden = outlooks @ layer[CUES:] + weights.array("bias", units)
         self._outlook = hidden, np.maximum(hidden, 0) @ self._out
-        if not np.isfinite(self._outlook[1]).all():
-            raise InvalidInput(f"weights {weights.path}: too large to score a cell")
         self._layers = _by_code(layer[: len(MARKS)]), *np.ascontiguousarray(layer[len(MARKS) : CUES])
 
     def scores(self, seen: Seen) -> NDArray[np.float32]:

@@ -24,6 +24,9 @@ from care_sim.core.rig import Rig
 FORMAT = "care-sim weights 1"
 LARGEST = 2**26
 """Bytes that a file may hold when it is unpacked; the shipped ones hold some thousands."""
+LARGEST_WEIGHT = 1e6
+"""What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that three layers of
+any shape stay below 1e29, while float32 ends at 3e38; the shipped ones stay below 5."""
 _CARD = "card"
 
 Arrays = dict[str, NDArray[np.float32]]
@@ -157,6 +160,8 @@ def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:
     for name, array in arrays.items():
         if array.dtype != np.float32 or not np.isfinite(array).all():
             raise ValueError(f"array {name!r} is not of finite float32 numbers")
+        if array.size and np.abs(array).max() > LARGEST_WEIGHT:
+            raise ValueError(f"array {name!r} holds numbers beyond {LARGEST_WEIGHT:g}")
     return arrays
 
 

@@ -1,5 +1,6 @@
 """Files of figures: written as PNG and SVG, removed when another study takes their folder."""
 
+import warnings
 from collections.abc import Container, Iterable
 from pathlib import Path
 
@@ -9,20 +10,26 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from care_sim.base.files import PNG, SVG, check_output, replacing
+from care_sim.base.text import printable
 
 _FORMATS = (".png", ".svg")
 
 
 def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as PNG and SVG, with its texts as they are: a $ in a name begins no formula."""
+    """Write a figure as PNG and SVG, with its texts as they are: a $ in a name begins no formula, control codes are
+    shown as escapes, and what the font has no sign for is drawn as a box.
+    """
     of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}  # Matplotlib's own
     for text in figure.findobj(Text):
         if id(text) not in of_ticks:
             text.set_parse_math(False)
-    with replacing(stem.with_suffix(".png")) as unfinished:
-        figure.savefig(unfinished, dpi=200)
-    with rc_context({"svg.hashsalt": stem.name}), replacing(stem.with_suffix(".svg")) as unfinished:
-        figure.savefig(unfinished, metadata={"Date": None})
+            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph .* missing from font")
+        with replacing(stem.with_suffix(".png")) as unfinished:
+            figure.savefig(unfinished, dpi=200)
+        with rc_context({"svg.hashsalt": stem.name}), replacing(stem.with_suffix(".svg")) as unfinished:
+            figure.savefig(unfinished, metadata={"Date": None})
 
 
 def check_figure(stem: Path) -> None:

@@ -10,29 +10,38 @@ from numpy.typing import NDArray
 from pyarrow import feather, types
 
 from care_sim.base.errors import InvalidInput
+from care_sim.sources.plausible import Range
 
 Columns = dict[str, NDArray[Any]]
 
 
-def read_columns(path: Path, kinds: Mapping[str, type]) -> Columns:
-    """The named columns of a Feather file as arrays of the given kinds: int, float or str.
+def read_columns(path: Path, kinds: Mapping[str, type], ranges: Mapping[str, Range]) -> Columns:
+    """The named columns of a Feather file as arrays of the given kinds, int, float or str; numbers lie in their ranges.
 
     Raises InvalidInput for a file that is missing or truncated, lacks a column, holds another kind in it, or has an
-    empty or infinite value.
+    empty or infinite value, or one beyond its range.
     """
     try:
         table = feather.read_table(path)
         table.validate(full=True)
+        names = table.column_names  # those of broken characters show only now
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
-    except (OSError, pyarrow.ArrowException) as error:
+    except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:
         raise InvalidInput(f"{path}: no readable Feather file ({_first_line(error)})") from error
     for name in kinds:
-        count = table.column_names.count(name)
+        count = names.count(name)
         if count != 1:
             found = "lacks the column" if not count else f"has {count} columns"
             raise InvalidInput(f"{path}: {found} {name!r}; needed: {', '.join(kinds)}")
-    return {name: _column(path, table[name], name, kind) for name, kind in kinds.items()}
+    columns = {name: _column(path, table[name], name, kind) for name, kind in kinds.items()}
+    for name, (least, most) in ranges.items():
+        fits = (columns[name] >= least) & (columns[name] <= most)
+        if not fits.all():
+            row = fits.argmin()
+            got = f"got {columns[name][row]:g} in row {row}"
+            raise InvalidInput(f"{path}: column {name!r} must lie in [{least:g}, {most:g}], {got}")
+    return columns
 
 
 def _column(path: Path, column: pyarrow.ChunkedArray, name: str, kind: type) -> NDArray[Any]:

@@ -3,12 +3,13 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, unknown
+from care_sim.base.text import shown
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.sources.argoverse2.feather import Columns, read_columns
+from care_sim.sources.plausible import AWAY_M, MAP_M, SIZES_M, STAMPS_NS, check_span, turn_fault
 
 CATEGORIES: dict[str, str | None] = {
     "REGULAR_VEHICLE": "car",
@@ -59,6 +60,8 @@ _BOX_TYPES = {
     "category": str,
     "num_interior_pts": int,
 }
+_POSE_RANGES = {"timestamp_ns": STAMPS_NS, **dict.fromkeys(PLACE, MAP_M)}
+_BOX_RANGES = {"timestamp_ns": STAMPS_NS, **dict.fromkeys(PLACE, AWAY_M), **dict.fromkeys(SIZE, SIZES_M)}
 
 
 def annotation_file(log: Path) -> Path:
@@ -73,52 +76,55 @@ def read_boxes(path: Path) -> tuple[Cells, Columns]:
     """The annotated timestamps (n,), ascending, and the checked annotations, without the recording car, each with the
     `number` of its track in the film.
 
-    Raises InvalidInput for a file that is missing, truncated or incomplete, an unknown category, a box or a rotation
-    without length, an object annotated twice at once.
+    Raises InvalidInput for a file that is missing, truncated or incomplete, an unknown category, a box that no drive
+    holds (`care_sim.sources.plausible`), an object annotated twice at once.
     """
-    boxes = read_columns(path, _BOX_TYPES)
+    boxes = read_columns(path, _BOX_TYPES, _BOX_RANGES)
     sweeps, kept = np.unique(boxes["timestamp_ns"]), boxes["category"] != RECORDING_CAR
     boxes = {name: column[kept] for name, column in boxes.items()}
     if not kept.any():
         raise InvalidInput(f"{path}: no annotations")
+    check_span(path, (sweeps[-1] - sweeps[0]) * 1e-9)
     for category in np.unique(boxes["category"]).tolist():
         if category not in CATEGORIES:
             raise InvalidInput(f"{path}: {unknown('category', category, CATEGORIES)}")
     numbers = np.unique(boxes["track_uuid"], return_inverse=True)[1]
-    for wrong, message in (
-        ((table(boxes, SIZE) <= 0).any(axis=1), "has a box without length, width or height"),
-        (~table(boxes, TURN).any(axis=1), "has a quaternion qw, qx, qy, qz of length zero"),
-        (_repeated(np.column_stack([boxes["timestamp_ns"], numbers])), "is annotated twice"),
-    ):
-        if wrong.any():
-            row = wrong.argmax()
-            raise InvalidInput(f"{path}: track {boxes['track_uuid'][row]} {message} at {boxes['timestamp_ns'][row]}")
+    fault = turn_fault(table(boxes, TURN))
+    if fault is not None:
+        raise InvalidInput(f"{path}: {_seen(boxes, fault[0])} has {fault[1]}")
+    again = _first_again(np.column_stack([boxes["timestamp_ns"], numbers]))
+    if again is not None:
+        raise InvalidInput(f"{path}: {_seen(boxes, again)} is annotated twice")
     return sweeps, boxes | {"number": numbers}
 
 
 def read_poses(path: Path) -> Columns:
     """The checked poses of the car, in order of time.
 
-    Raises InvalidInput for a file that is missing, truncated or incomplete, a rotation without length, two poses at
-    once.
+    Raises InvalidInput for a file that is missing, truncated or incomplete, a pose that no drive holds
+    (`care_sim.sources.plausible`), two poses at once.
     """
-    poses = read_columns(path, _POSE_TYPES)
+    poses = read_columns(path, _POSE_TYPES, _POSE_RANGES)
     stamps = poses["timestamp_ns"]
-    for wrong, message in (
-        (~table(poses, TURN).any(axis=1), "a quaternion qw, qx, qy, qz of length zero"),
-        (_repeated(stamps[:, None]), "two poses"),
-    ):
-        if wrong.any():
-            raise InvalidInput(f"{path}: {message} at {stamps[wrong.argmax()]}")
+    again = _first_again(stamps[:, None])
+    if again is not None:
+        raise InvalidInput(f"{path}: two poses at {stamps[again]}")
+    fault = turn_fault(table(poses, TURN))
+    if fault is not None:
+        raise InvalidInput(f"{path}: the pose at {stamps[fault[0]]} has {fault[1]}")
     order = np.argsort(stamps)
     return {name: column[order] for name, column in poses.items()}
 
 
-def _repeated(rows: Cells) -> NDArray[np.bool_]:
-    """(n,) which rows (n, k) stand further up as well."""
+def _seen(boxes: Columns, row: int) -> str:
+    return f"the track {shown(str(boxes['track_uuid'][row]))} at {boxes['timestamp_ns'][row]}"
+
+
+def _first_again(rows: Cells) -> int | None:
+    """The first of rows (n, k) that stands further up as well."""
     repeated = np.ones(len(rows), dtype=bool)
     repeated[np.unique(rows, axis=0, return_index=True)[1]] = False
-    return repeated
+    return int(repeated.argmax()) if repeated.any() else None
 
 
 def table(columns: Columns, names: tuple[str, ...]) -> Floats:

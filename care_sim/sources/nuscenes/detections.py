@@ -27,6 +27,8 @@ COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
 """The categories of COCO that the five classes hold."""
 COCO_LAST = 90
 """The categories of COCO are numbered from 1 to this."""
+FARTHEST_PX = 1e5
+"""How far a box may reach, within the picture or beside it: its area is to be a number."""
 SAME_OBJECT_IOU = 0.5
 """A detection lies on the object of its class whose projected box overlaps it at least this much (PASCAL VOC)."""
 
@@ -106,6 +108,8 @@ def _box(numbers: object) -> Floats:
     box = np.array(numbers)
     if box.shape != (4,) or box.dtype.kind not in "if" or not np.isfinite(box).all():
         raise ValueError(f"no box of four numbers: {numbers!r}")
+    if np.abs(box).max() > FARTHEST_PX:
+        raise ValueError(f"a box beyond {FARTHEST_PX:g} pixels: {numbers!r}")
     return box.astype(float)
 
 

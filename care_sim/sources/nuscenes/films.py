@@ -29,10 +29,13 @@ from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.tables import Database, Row
+from care_sim.sources.plausible import AWAY_M, MAP_M, MOUNT_M, SIZES_M, turn_fault
 
 KEYFRAME_S = 0.5
 """nuScenes annotates its keyframes at 2 Hz."""
 LIDAR = "LIDAR_TOP"
+FOCALS = (10.0, 1e5)
+"""Pixels: of a picture 1600 wide, views of 179 degrees and of one."""
 _FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
 """In LIDAR_TOP's own frame x points right and y forward."""
 
@@ -117,23 +120,31 @@ def _recordings(database: Database, sample: Row) -> dict[str, Row]:
 
 def _frame(database: Database, table: str, token: str) -> Frame:
     w, x, y, z = database.numbers(table, token, "rotation", 4).tolist()
-    if not any((w, x, y, z)):
-        raise InvalidInput(f"{database.path(table)}: {token!r} has a rotation of length zero")
-    return Frame.turned_by(Rotation.from_quat([x, y, z, w]), database.numbers(table, token, "translation", 3))
+    mounted = table == "calibrated_sensor"
+    fault = turn_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
+    if fault is not None:
+        raise InvalidInput(f"{database.path(table)}: rotation of {token!r}: {fault[1]}")
+    origin = database.numbers(table, token, "translation", 3, within=MOUNT_M if mounted else MAP_M)
+    return Frame.turned_by(Rotation.from_quat([x, y, z, w]), origin)
 
 
 def _lidar_mount(database: Database, data: Row) -> Frame:
     """The sensor frame in the car's: x forward where LIDAR_TOP has y forward."""
-    own = _frame(database, "calibrated_sensor", data["calibrated_sensor_token"])
+    token = data["calibrated_sensor_token"]
+    own = _frame(database, "calibrated_sensor", token)
+    if own.z < 0:  # the car's frame stands on it
+        path = database.path("calibrated_sensor")
+        raise InvalidInput(f"{path}: {token!r} lies below the road, at {own.z:g} m")
     return Frame.turned_by(own.rotation * _FORWARD_FROM_RIGHT, own.origin)
 
 
 def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
     token = data["calibrated_sensor_token"]
     intrinsic = database.numbers("calibrated_sensor", token, "camera_intrinsic", 3, 3)
-    if intrinsic[0, 0] <= 0:
+    if not FOCALS[0] <= intrinsic[0, 0] <= FOCALS[1]:
         raise InvalidInput(
-            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic without focal length"
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose focal length is not within "
+            f"{FOCALS[0]:g} and {FOCALS[1]:g} pixels"
         )
     if not all(0 <= middle <= size for middle, size in zip(intrinsic[:2, 2], PICTURE, strict=True)):
         raise InvalidInput(
@@ -166,16 +177,18 @@ def _annotations(database: Database, boxes: list[Row], numbers: dict[str, int], 
     classes = [CLASSES.index(str(_class_name(database, box))) for box in boxes]
     objects = [numbers[box["instance_token"]] for box in boxes]
     local = sensor.boxes_to_local(rows)
+    away = np.abs(local[:, :3]).max(axis=1, initial=0)
+    if (away > AWAY_M[1]).any():
+        far = away.argmax()
+        path, token = database.path("sample_annotation"), boxes[far]["token"]
+        raise InvalidInput(f"{path}: {token!r} lies {away[far]:g} m from the LiDAR, may lie {AWAY_M[1]:g} m from it")
     return Annotations(np.array(objects, dtype=np.int64), np.array(classes, dtype=np.int64), local)
 
 
 def _world_box(database: Database, box: Row) -> tuple[float, ...]:
     """Sizes are width, length, height in the table."""
     frame = _frame(database, "sample_annotation", box["token"])
-    width, length, height = database.numbers("sample_annotation", box["token"], "size", 3).tolist()
-    if min(width, length, height) <= 0:
-        path = database.path("sample_annotation")
-        raise InvalidInput(f"{path}: {box['token']!r} has a size without width, length or height")
+    width, length, height = database.numbers("sample_annotation", box["token"], "size", 3, within=SIZES_M).tolist()
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 
 

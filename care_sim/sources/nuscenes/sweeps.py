@@ -12,6 +12,8 @@ from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
 VALUES_A_POINT = 5
 """float32 x, y, z, intensity and ring."""
+LARGEST = 2**28
+"""Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
 OWN_CAR_M = 1.0
 """Points nearer than this lie on the recording car (the radius within which the devkit drops them from sweeps)."""
 
@@ -19,20 +21,24 @@ OWN_CAR_M = 1.0
 def read_points(path: Path) -> Floats:
     """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is right, y forward.
 
-    Raises InvalidInput for a missing or truncated file, and for a place that is not finite.
+    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST`, and for a place that is not
+    finite.
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such file")
+    if path.stat().st_size > LARGEST:
+        raise InvalidInput(f"{path}: {path.stat().st_size} bytes, a sweep may hold {LARGEST}")
     try:
         values = np.fromfile(path, np.uint8)
     except OSError as error:
         raise InvalidInput(f"{path}: cannot be read ({error})") from error
     if values.size % (4 * VALUES_A_POINT) or not values.size:
         raise InvalidInput(f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} bytes")
-    points = values.view("<f4").reshape(-1, VALUES_A_POINT).astype(float)
-    finite = np.isfinite(points[:, :3]).all(axis=1)
+    places = values.view("<f4").reshape(-1, VALUES_A_POINT)[:, :3]
+    finite = np.isfinite(places).all(axis=1)  # before they are cast, which warns of a NaN that signals
     if not finite.all():
         raise InvalidInput(f"{path}: point {finite.argmin()} has a place that is not finite")
+    points = places.astype(float)
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
 
 

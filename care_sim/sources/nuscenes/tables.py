@@ -8,11 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import parsed
+from care_sim.base.json_text import read
 from care_sim.core.frames import Floats
+from care_sim.sources.plausible import STAMPS_NS, Range, check_span
 
 Row = dict[str, Any]
+
+ANY: Range = (float("-inf"), float("inf"))
+LARGEST_TABLE = 2**33
+"""Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of half a kilobyte)."""
 
 FIELDS: dict[str, dict[str, type]] = {
     "scene": {"name": str, "first_sample_token": str, "last_sample_token": str},
@@ -73,8 +79,8 @@ class Database:
             raise InvalidInput(f"{self.path(table)}: no row with the token {token!r}")
         return rows[token]
 
-    def numbers(self, table: str, token: str, field: str, *shape: int) -> Floats:
-        """A field of finite numbers as an array of `shape`."""
+    def numbers(self, table: str, token: str, field: str, *shape: int, within: Range = ANY) -> Floats:
+        """A field of finite numbers as an array of `shape`, all in the range `within`."""
         found = self.row(table, token)[field]
         try:
             values = np.array(found)
@@ -83,6 +89,11 @@ class Database:
         if values.shape != shape or values.dtype.kind not in "if" or not np.isfinite(values).all():
             wanted = " x ".join(map(str, shape))
             raise InvalidInput(f"{self.path(table)}: {token!r} has no {field} of {wanted} finite numbers")
+        least, most = within
+        beyond = values[(values < least) | (values > most)]
+        if beyond.size:
+            place = f"must lie in [{least:g}, {most:g}], got {beyond[0]:g}"
+            raise InvalidInput(f"{self.path(table)}: {field} of {token!r} {place}")
         return values.astype(float)
 
     def keyframe_data(self, sample: str) -> dict[str, Row]:
@@ -108,6 +119,7 @@ class Database:
         token = scene["first_sample_token"]
         while token or not found:
             row = self.row("sample", token)
+            _check_stamp(self.path("sample"), row)
             if found and row["timestamp"] <= found[-1]["timestamp"]:
                 raise InvalidInput(f"{self.path('sample')}: {token!r} is no later than the sample before it")
             found.append(row)
@@ -115,6 +127,7 @@ class Database:
         if found[-1]["token"] != scene["last_sample_token"]:
             end, wanted = found[-1]["token"], scene["last_sample_token"]
             raise InvalidInput(f"{self.path('sample')}: {scene['name']} ends with {end!r}, and should with {wanted!r}")
+        check_span(self.path("sample"), (found[-1]["timestamp"] - found[0]["timestamp"]) * 1e-6)
         return found
 
     def _read(self, table: str) -> dict[str, Row]:
@@ -155,14 +168,19 @@ class Database:
 def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
     """The content of a JSON file, every map in it replaced by what is `taken` of it.
 
-    Raises InvalidInput for a file that is missing or truncated.
+    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
     """
     try:
-        return parsed(path.read_text(encoding="utf-8"), taken)
+        return read(path, LARGEST_TABLE, taken)
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
         raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
+
+
+def _check_stamp(path: Path, sample: Row) -> None:
+    least, most = (nanoseconds // 1000 for nanoseconds in STAMPS_NS)
+    check_whole(f"{path}: timestamp of {sample['token']!r}", sample["timestamp"], least, most)
 
 
 def _only_version(root: Path) -> Path:

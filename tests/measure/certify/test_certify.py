@@ -282,6 +282,17 @@ def test_the_first_that_differs_is_told_with_a_command(capsys):
     assert compare(dict(enumerate(trails)), trails).as_published
 
 
+def test_one_alone_is_told_with_what_it_is_made_of_and_without_its_own_command():
+    trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(6)]
+    made = f"  {drawn(4).text}, played in mode {drawn(4).mode}"
+    same = [*compare({4: trails[4]}, trails, 1).lines()]
+    assert same == [f"1 episode: {published.combined(trails[4:5])}, as published", made]
+    other = [*compare({4: trails[4][:-3] + b"abc"}, trails, 1).lines()]
+    assert other[1].startswith("the first is episode 4, which differs first in")
+    assert other[2:] == [made]
+    assert len([*compare(dict(enumerate(trails)), trails).lines()]) == 1
+
+
 def test_the_combined_hash_is_over_the_order_of_the_numbers():
     one, two = b"a" * 20, b"b" * 20
     assert compare({1: two, 0: one}, [one, two]).hash == published.combined([one, two])
@@ -304,6 +315,13 @@ def test_some_of_the_list_goes_as_published():
     short = [episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12]
     chosen = [one.number for mode in MODES for one in [e for e in short if e.mode == mode][:5]]
     verdict = compare(played(chosen, 1), published.read())
+    assert verdict.as_published, "\n".join(verdict.lines())
+
+
+def test_a_seed_finder_of_the_list_knows_the_dense_street_in_the_cut_in_too():
+    known = 4520
+    assert (drawn(known).environment, drawn(known).policy) == ("CARE-CutIn-v0", "seed-finder")
+    verdict = compare(played([known], 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 

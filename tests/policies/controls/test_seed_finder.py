@@ -9,6 +9,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.selection import expanded
 from care_sim.core.belief import Belief
 from care_sim.policies import contenders, policy_names, tags_of
+from care_sim.policies.controls.seed_finder import SeedFinder
 
 BLIND = {"budget": 0.03, "false_negative_rate": 1.0}
 ENVIRONMENTS = {"dartout": "CARE-Dartout-v0", "dense": "CARE-Dense-v0", "cutin": "CARE-CutIn-v0"}
@@ -80,6 +81,22 @@ def test_a_seed_that_it_does_not_know_is_played_as_history(make, known):
     observation, _ = env.reset(seed=3)
     np.testing.assert_array_equal(finder(observation), history(observation))
     assert finder.found is None
+
+
+@pytest.mark.parametrize("scenario", ENVIRONMENTS)
+def test_it_knows_the_scenario_of_its_environment(make, scenario):
+    env = make(scenario, budget=0.03)
+    observation, _ = env.reset(seed=9)
+    told, own = care_sim.make_policy("seed-finder", env, scenario=scenario), care_sim.make_policy("seed-finder", env)
+    np.testing.assert_array_equal(own(observation), told(observation))
+    assert own.found == 9
+
+
+def test_of_a_rig_alone_it_knows_the_dense_street(make):
+    env = make("cutin", budget=0.03)
+    observation, _ = env.reset(seed=9)
+    dense = care_sim.make_policy("seed-finder", env, scenario="dense")
+    np.testing.assert_array_equal(SeedFinder(env.unwrapped.rig)(observation), dense(observation))
 
 
 def test_after_reset_it_looks_again(make):

@@ -5,17 +5,20 @@ from dataclasses import replace
 from pathlib import Path
 from zipfile import ZipFile
 
+import gymnasium
 import numpy as np
 import pytest
 
+import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.weights import Card, load, save
+from care_sim.policies.learned.weights import LARGEST_WEIGHT, Card, load, save, shipped
 
 ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}
 CARD = Card("learned-scorer", AngularGrid(), budget=492, wrapper="SectorReserve 32 x 4", seeds={"train": [1]})
 RIG = Rig(budget=492)
+SHIPPED = {"learned-scorer": shipped("learned-scorer"), "ppo": shipped("ppo-dense")}
 
 
 @pytest.fixture
@@ -145,6 +148,10 @@ def not_finite(path: Path) -> None:
     save(path, {"weight": np.array([np.nan])}, CARD)
 
 
+def too_large(path: Path) -> None:
+    save(path, {"weight": np.array([0, -1.01 * LARGEST_WEIGHT])}, CARD)
+
+
 def cut(path: Path) -> None:
     save(path, ARRAYS, CARD)
     path.write_bytes(path.read_bytes()[:-40])
@@ -187,6 +194,7 @@ def one_array(path: Path) -> None:
         locked,
         doubles,
         not_finite,
+        too_large,
         cut,
         flipped,
     ],
@@ -197,6 +205,22 @@ def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
     with pytest.raises(InvalidInput, match=r"spoilt\.npz: no \.npz of weights .*, or damaged") as refusal:
         load(path)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("largest", [LARGEST_WEIGHT, -LARGEST_WEIGHT])
+@pytest.mark.parametrize("name", ["learned-scorer", "ppo"])
+def test_the_largest_weights_overflow_nowhere(tmp_path, name, largest):
+    arrays, card = (
+        {n: np.full_like(a, largest) for n, a in load(SHIPPED[name]).arrays.items()},
+        load(SHIPPED[name]).card,
+    )
+    save(tmp_path / "w.npz", arrays, card)
+    with gymnasium.make("CARE-Dartout-v0", budget=0.03, disable_env_checker=True) as env:
+        policy = care_sim.make_policy(name, env, path=str(tmp_path / "w.npz"))
+        observation, _ = env.reset(seed=0)
+        for _ in range(3):
+            observation, *_ = env.step(policy(observation))
 
 
 def test_what_would_run_when_it_is_unpickled_does_not_run(tmp_path):

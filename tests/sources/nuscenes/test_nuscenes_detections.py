@@ -75,6 +75,8 @@ OWN = {"sample_data_token": "t", "bbox_corners": [0, 0, 5, 5], "category_name": 
         ({"sample_data_token": "t"}, "it lacks 'bbox_corners'"),
         (COCO | {"bbox": [0, 0, 1]}, r"no box of four numbers: \[0, 0, 1\]"),
         (COCO | {"bbox": [0, 0, -5, 5]}, "a box without width or height"),
+        (COCO | {"bbox": [0, 0, 5, 1e308]}, r"a box beyond 100000 pixels: \[0, 0, 5, 1e\+308\]"),
+        (OWN | {"bbox_corners": [-2e5, 0, 5, 5]}, "a box beyond 100000 pixels"),
         (COCO | {"bbox": "0055"}, "no box of four numbers: '0055'"),
         (COCO | {"category_id": 0}, "category_id must be a whole number >= 1 and <= 90, got 0"),
         (COCO | {"category_id": 91}, "category_id must be a whole number >= 1 and <= 90, got 91"),
