@@ -16,7 +16,7 @@ MATCH_M = 2.0
 Mask = NDArray[np.bool_]
 
 
-def found(annotations: Annotations, detections: Detections) -> Mask:
+def found_objects(annotations: Annotations, detections: Detections) -> Mask:
     """(n,) whether each annotated object has a detection of its class within 2 m, in the plane.
 
     A detection serves one object. Detections without scores are assigned so that they serve the most objects and,

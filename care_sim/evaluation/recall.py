@@ -5,7 +5,7 @@ which the object is found: 0 where it is found at once, and K where it is not fo
 K - 1 keyframes that follow it. Every event counts, also one nearer than K to the end of the scene or whose object
 leaves before: not found, it counts K. The paper names one censoring time, K = 6 keyframes, for all events (Remark 1),
 and a mean over the events that recall is taken over; a shorter time would make a miss cheaper where the scene happens
-to end or the object drives off. `Score.chances` says at how many of the K keyframes the object was in range, for
+to end or the object drives off. `SceneScore.chances` says at how many of the K keyframes the object was in range, for
 whoever wants only the events that had them all.
 """
 
@@ -49,7 +49,7 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Score:
+class SceneScore:
     """What a policy found of a scene.
 
     `found` (r,) by row of `sightings.frames`; of the events (e,) `delays` are the TTFD in keyframes, `censored_at`
@@ -62,10 +62,10 @@ class Score:
     chances: Cells
 
     @classmethod
-    def of(cls, sightings: Sightings, masks: Sequence[Mask], censored_at: int = CENSORED_AT) -> "Score":
+    def of(cls, sightings: Sightings, masks: Sequence[Mask], censored_at: int = CENSORED_AT) -> "SceneScore":
         """The score of a scene whose keyframes were matched one by one.
 
-        `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found (`matching.found`).
+        `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found (`matching.found_objects`).
         Raises InvalidInput where they are not one a keyframe and one value an annotation, and for a `censored_at` that
         is no whole number of 1 or more.
         """
@@ -106,14 +106,14 @@ class Score:
         return [{"scene": self.sightings.scene, **dict(zip(columns, row, strict=True))} for row in values]
 
 
-def score(sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT) -> Score:
+def score_scene(sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT) -> SceneScore:
     """Score what a policy's detector reported, one entry a keyframe.
 
-    Raises InvalidInput where the reports are not one a keyframe, and as `matching.found` does.
+    Raises InvalidInput where the reports are not one a keyframe, and as `matching.found_objects` does.
     """
     _check_one_a_keyframe(sightings, len(reports), "reports")
-    masks = [matching.found(shown, report) for shown, report in zip(sightings.keyframes, reports, strict=True)]
-    return Score.of(sightings, masks, censored_at)
+    masks = [matching.found_objects(shown, report) for shown, report in zip(sightings.keyframes, reports, strict=True)]
+    return SceneScore.of(sightings, masks, censored_at)
 
 
 def _ages(sightings: Sightings, censored_at: int) -> Cells:

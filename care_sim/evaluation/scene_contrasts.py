@@ -40,7 +40,7 @@ TTFD = Ratio("censored TTFD", "keyframes", 1.0, lambda t: t.delay, lambda t: t.e
 
 
 @dataclass(frozen=True)
-class Level:
+class RatioLevel:
     """A measure of one policy: over all events alike, and with equal weight to every scene; None without any."""
 
     by_event: float | None
@@ -75,13 +75,13 @@ def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
     return {scene: _mean(scene, [seed[scene] for seed in seeds]) for scene in scenes}
 
 
-def level(ratio: Ratio, tallies: Tallies) -> Level:
+def ratio_level(ratio: Ratio, tallies: Tallies) -> RatioLevel:
     """The measure of one policy over its scenes."""
     values = [value for value in map(ratio.of, tallies.values()) if value is not None]
-    return Level(ratio.of(sum(tallies.values(), Tally())), float(np.mean(values)) if values else None)
+    return RatioLevel(ratio.of(sum(tallies.values(), Tally())), float(np.mean(values)) if values else None)
 
 
-def contrast(ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0) -> SceneContrast | None:
+def scene_contrast(ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0) -> SceneContrast | None:
     """`ours` less `theirs` on the scenes that both have; None where nothing is to be found in them.
 
     Raises InvalidInput where the two do not count the same events or object frames of a scene.

@@ -13,7 +13,7 @@ NEAR_M, FAR_M = 20.0, 35.0
 FRONT, REAR = np.pi / 4, 3 * np.pi / 4
 """Bounds of the sectors, radians off straight ahead to either side: a quarter of the turn ahead, one behind and one on
 each side, whatever the mounting of the cameras."""
-THIRDS = ("sparse", "middle", "dense")
+SCENE_THIRDS = ("sparse", "middle", "dense")
 
 Mask = NDArray[np.bool_]
 
@@ -44,5 +44,5 @@ def thirds(counts: Mapping[str, float]) -> dict[str, list[str]]:
     The parts differ by a scene at most; scenes of equal number stand in the order of their names.
     """
     ranked = sorted(counts, key=lambda scene: (counts[scene], scene))
-    bounds = [round(part * len(ranked) / len(THIRDS)) for part in range(len(THIRDS) + 1)]
-    return {name: ranked[start:end] for name, start, end in zip(THIRDS, bounds, bounds[1:], strict=False)}
+    bounds = [round(part * len(ranked) / len(SCENE_THIRDS)) for part in range(len(SCENE_THIRDS) + 1)]
+    return {name: ranked[start:end] for name, start, end in zip(SCENE_THIRDS, bounds, bounds[1:], strict=False)}

@@ -18,9 +18,9 @@ from care_sim.loops.records import Keyframe
 from care_sim.perception.proxy import ReturnsDetector
 from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_on
+from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines.engine import ENGINES
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
 from care_sim.world.world import World
 
@@ -34,7 +34,7 @@ class ClosedLoop:
         rig: Rig,
         sensing: Sensing,
         seeds: Sequence[np.random.SeedSequence],
-        pool: Pool = NOTHING_TO_HAUNT,
+        pool: BoxPool = EMPTY_POOL,
     ):
         self.world, self.rig = world, rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
@@ -117,11 +117,11 @@ class ClosedLoop:
         (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
-        self.sights = sights_of([taken], self._labels)
+        self.seen = faultless_detections([taken], self._labels)
         """What the camera as it stands shows, before misses, false boxes and delay. Truth: for people and scoring."""
         self.belief = self._limits.belief(
             self._odometry.reading(self.world.ego_motion),
-            self._camera.detect(self.sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._camera.detect(self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
             self._memory.tracks(sensor),
             ranges,
         )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Ego
-from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, Sights
+from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Shot:
     sensor: Frame
     ego: Ego
     annotations: Annotations
-    sights: Sights
+    seen: IdentifiedDetections
     cloud: Cloud
 
 

@@ -20,7 +20,7 @@ from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.recorded_lidar import RecordedLidar
 
 ANOTHER_TIME_S = 3.0
@@ -30,7 +30,7 @@ nearer by then, and what was 20 m away is passed.
 
 
 @dataclass(frozen=True)
-class Exposure:
+class OpenLoopKeyframe:
     """The record of one keyframe of the open loop: what was fired, and what the detector made of the returns.
 
     `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 at a first sight.
@@ -53,7 +53,7 @@ class OpenLoop:
         objects = sorted({number for shot in film.shots for number in shot.annotations.objects.tolist()})
         self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, lidar_seed)
-        pool = _seen_another_time(film) if sensing.false_positive_rate else NOTHING_TO_HAUNT
+        pool = _seen_another_time(film) if sensing.false_positive_rate else EMPTY_POOL
         self._camera = CameraDetector(objects, sensing, film.keyframe_s, camera_seed, film.cameras, pool)
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = detector
@@ -73,7 +73,7 @@ class OpenLoop:
         """The keyframe for which cells are chosen now."""
         return self.film.shots[self.index]
 
-    def keyframe(self, fired: Cells) -> Exposure:
+    def keyframe(self, fired: Cells) -> OpenLoopKeyframe:
         """Fire `fired`, detect on what came back, and go on to the next keyframe."""
         index, shot = self.index, self.shot
         cloud = self._lidar.fire(fired, shot.cloud)
@@ -85,7 +85,7 @@ class OpenLoop:
         self._memory.predict()
         if not self.over:
             self._look(self._picture_of(fired, cloud))
-        return Exposure(index, fired, detections, velocities)
+        return OpenLoopKeyframe(index, fired, detections, velocities)
 
     def true_boxes(self, tracks: Tracks) -> Floats:
         """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object, or
@@ -103,7 +103,7 @@ class OpenLoop:
         shot = self.shot
         self.belief = self._limits.belief(
             self._odometry.reading(shot.ego),
-            self._camera.detect(shot.sights, shot.sensor.yaw, self._distances(shot), shot.time_s),
+            self._camera.detect(shot.seen, shot.sensor.yaw, self._distances(shot), shot.time_s),
             self._memory.tracks(shot.sensor),
             ranges,
         )
@@ -124,8 +124,8 @@ class OpenLoop:
 
 
 @lru_cache(maxsize=1)
-def _seen_another_time(film: Film) -> Pool:
+def _seen_another_time(film: Film) -> BoxPool:
     """All boxes of a film. In a short one those serve that are half of it away, so that every keyframe has some."""
     times = [shot.time_s for shot in film.shots]
     apart = min(ANOTHER_TIME_S, (times[-1] - times[0]) / 2)
-    return Pool.of([shot.sights.detections for shot in film.shots], times, film.cameras, apart)
+    return BoxPool.of([shot.seen.detections for shot in film.shots], times, film.cameras, apart)

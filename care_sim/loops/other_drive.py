@@ -9,7 +9,7 @@ import numpy as np
 from care_sim.core.conditions import Sensing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.sensors.false_boxes import Pool
+from care_sim.sensors.false_boxes import BoxPool
 from care_sim.world.world import World
 
 NEAR_S = 2.0
@@ -21,7 +21,7 @@ stands there so often that those which are left would stand out by their places.
 
 def seen_on_a_drive(
     world: World, duration_s: float, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence]
-) -> Pool:
+) -> BoxPool:
     """Drive through `world`, every cell fired, and close it: what the camera shows before misses and delay.
 
     It brakes as a full scan makes it brake, whatever the policy: all meet the same false boxes, and those of a car that
@@ -34,7 +34,7 @@ def seen_on_a_drive(
         loop = ClosedLoop(world, rig, replace(sensing, false_positive_rate=0.0), seeds)
         cells, seen, times, over = np.arange(rig.grid.size), [], [], False
         while not over:
-            seen.append(loop.sights.detections)
+            seen.append(loop.seen.detections)
             times.append(world.time)
             over = loop.keyframe(cells).impact_speed_mps is not None or world.time >= duration_s - 1e-9
-    return Pool.of(seen, times, rig.cameras, near_s=NEAR_S)
+    return BoxPool.of(seen, times, rig.cameras, near_s=NEAR_S)

@@ -13,12 +13,12 @@ from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.annotated import NOBODY, Sights
-from care_sim.sensors.camera import sights_of
+from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
+from care_sim.sensors.camera import faultless_detections
 
 
 @dataclass(frozen=True)
-class Stance:
+class Situation:
     """What is there when the cells of a keyframe are chosen. Truth: for people and scoring, never for a policy.
 
     `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n, 7) of all actors,
@@ -42,12 +42,12 @@ class Stance:
 
 
 @dataclass(frozen=True)
-class Moment:
+class WatchedKeyframe:
     """A keyframe: how things stood, `shares` (E, A) of the fired cells (see `care_sim.core.actions`), what the scan returned
     as `ranges` (E, A) in metres (0 not fired, maximum range no return), and the record for the scoring.
     """
 
-    stance: Stance
+    situation: Situation
     shares: NDArray[np.uint8]
     ranges: NDArray[np.float32]
     frame: Keyframe
@@ -59,8 +59,8 @@ class Moment:
         return cells, grid.directions[cells] * ranges[cells, None]
 
 
-class Witness:
-    """Follows the running episode of a loop from its start: one `stance` before every keyframe, one `moment` after.
+class EpisodeWatcher:
+    """Follows the running episode of a loop from its start: one `situation` before every keyframe, one `watched` after.
 
     `confidence` is the threshold of the camera's detector.
     """
@@ -68,15 +68,15 @@ class Witness:
     def __init__(self, loop: ClosedLoop, confidence: float):
         self._loop, self._confidence = loop, confidence
         self._labels = {actor.body: actor.label for actor in loop.world.actors if actor.label is not None}
-        self._sights: list[Sights] = []
+        self._seen: list[IdentifiedDetections] = []
 
-    def stance(self) -> Stance:
+    def situation(self) -> Situation:
         """How things stand before the next keyframe."""
         loop, world = self._loop, self._loop.world
-        self._sights[loop.index :] = [loop.sights]
+        self._seen[loop.index :] = [loop.seen]
         shown = loop.belief.detections
         objects = self._objects(shown)
-        return Stance(
+        return Situation(
             time_s=world.time,
             sensor=loop.sensor,
             ego=world.boxes_of(np.array([world.ego_body]))[0],
@@ -90,16 +90,16 @@ class Witness:
             missed=self._missed(objects),
         )
 
-    def moment(self, stance: Stance, action: Action, demand: Demand | None, frame: Keyframe) -> Moment:
+    def watched(self, situation: Situation, action: Action, demand: Demand | None, frame: Keyframe) -> WatchedKeyframe:
         """What became of it: the loop has played the keyframe."""
         loop = self._loop
-        return Moment(stance, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame)
+        return WatchedKeyframe(situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame)
 
     def _objects(self, shown: ImageDetections) -> Cells:
         """(n,) the bodies behind detections, NOBODY behind false ones: a box is that of its picture, unchanged."""
         if not len(shown):
             return np.empty(0, np.int64)
-        taken = self._sights[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
+        taken = self._seen[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
         drawn = slice(ImageDetections.COLUMNS.index("age"))
         same = (shown.rows()[:, None, drawn] == taken.detections.rows()[None, :, drawn]).all(axis=2)
         bodies = np.append(taken.objects, NOBODY)
@@ -107,7 +107,7 @@ class Witness:
 
     def _missed(self, given: Cells) -> ImageDetections:
         """What a camera without faults shows now, less the objects that were given."""
-        clear = sights_of([self._loop.picture], self._labels)
+        clear = faultless_detections([self._loop.picture], self._labels)
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence
         return ImageDetections.from_rows(rows[sure & ~np.isin(clear.objects, given)])

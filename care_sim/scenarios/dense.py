@@ -32,7 +32,7 @@ from care_sim.world.world import World
 DOUBLE_PARKED_Y = LANE_WIDTH_M
 KERBS = {"left": LEFT_PARKING_Y, "right": RIGHT_PARKING_Y, "oncoming": DOUBLE_PARKED_Y}
 
-PLACES = (
+VEHICLE_PLACES = (
     ("van", "left", -3.8),
     ("car", "left", 3.9),
     ("truck", "left", 11.0),
@@ -60,13 +60,13 @@ class Dense(CrossingScenario):
     when the person appears, and a driver who follows the ego.
     """
 
-    vehicles: int = bounded(7, 0, len(PLACES))
+    vehicles: int = bounded(7, 0, len(VEHICLE_PLACES))
     place_jitter_m: Range = bounded((-0.4, 0.4), -3, 3)
     """How far a standing vehicle is off its place along the street; across, a quarter of that."""
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""
-        for number, (kind, kerb, beyond) in enumerate(PLACES[: self.vehicles]):
+        for number, (kind, kerb, beyond) in enumerate(VEHICLE_PLACES[: self.vehicles]):
             along, across = draw(rng, self.place_jitter_m), draw(rng, self.place_jitter_m) / 4
             world.add(f"{kind} {number}", kind, (crossing_x + beyond + along, KERBS[kerb] + across, 0.0))
         follower = world.traffic.add_driver(FOLLOWER_M, 0, world.ego.speed, CATALOGUE["car"])

@@ -53,7 +53,7 @@ class Cloud:
 
 
 @dataclass(frozen=True)
-class Sights:
+class IdentifiedDetections:
     """What the unimpaired cameras see: `detections`, age 0, and `objects` (n,) the annotated object behind each box or
     NOBODY.
     """

@@ -14,7 +14,7 @@ from care_sim.sensors.confidence import confidence_of, pixels_of
 
 DUPLICATE_IOU = 0.5
 """Of two boxes of a class that overlap this much a detector reports one (non-maximum suppression, PASCAL VOC)."""
-TRIES = 8
+MOST_DRAWS = 8
 """Draws of a ghost before it is left out, because each lay on a box of its class."""
 NEARER, ASIDE, MORE_HIDDEN = 0.05, 0.005, 0.05
 """How far a ghost departs at most from the box that it was: its distance along the camera's axis and its hidden share
@@ -27,7 +27,7 @@ _BOX = slice(2, 6)
 
 
 @dataclass(frozen=True, eq=False)
-class Pool:
+class BoxPool:
     """True boxes seen another time, from which ghosts are made: `rows` (n, 9) as `ImageDetections.rows`, `times_s` (n,)
     when each was seen, `middles` (n, 2) of their pictures, `moments_s` (k,) when pictures were taken. At a moment those
     serve that were seen at least `apart_s` and at most `near_s` before or after it.
@@ -48,7 +48,7 @@ class Pool:
         cameras: Sequence[PinholeCamera],
         apart_s: float = 0.0,
         near_s: float = np.inf,
-    ) -> "Pool":
+    ) -> "BoxPool":
         """All that `cameras` have `seen` (k,) at the moments `times_s` (k,)."""
         rows = np.concatenate([NO_ROWS, *(detections.rows() for detections in seen)])
         middles = np.array([(camera.width / 2, camera.height / 2) for camera in cameras]).reshape(-1, 2)
@@ -138,22 +138,22 @@ class Pool:
 
 
 NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
-NOTHING_TO_HAUNT = Pool(NO_ROWS, np.empty(0), np.empty((0, 2)), np.empty(0))
+EMPTY_POOL = BoxPool(NO_ROWS, np.empty(0), np.empty((0, 2)), np.empty(0))
 
 
-class Ghosts:
+class FalseBoxes:
     """False boxes by the law of the true ones: a Poisson number per keyframe, `rate` per picture on the mean over
     `cameras` pictures and all moments, more where the pool has more. Each is a box drawn evenly from what serves, and
     varied a little. So their classes, places, sizes, confidences and cameras are those of true boxes. They flicker:
     every keyframe has its own, and none lasts. And they say what any law of true boxes says, where objects tend to be:
     where people always emerge at one place, false people stand there too.
 
-    A ghost that lies on another box of its class is drawn again, up to TRIES times, then left out, as a detector
+    A ghost that lies on another box of its class is drawn again, up to MOST_DRAWS times, then left out, as a detector
     suppresses duplicates. So fewer come where few places are free: up to 4 a picture hardly any is left out. None comes
     at a moment at which the pool has none. The draws do not depend on what is there: every policy meets the same.
     """
 
-    def __init__(self, pool: Pool, rate: float, cameras: int, rng: np.random.Generator):
+    def __init__(self, pool: BoxPool, rate: float, cameras: int, rng: np.random.Generator):
         self._pool, self._mean, self._rng = pool, rate * cameras, rng
 
     def draw(self, true: Floats, time_s: float) -> Floats:
@@ -161,7 +161,7 @@ class Ghosts:
         if not self._mean:
             return NO_ROWS
         serving = self._pool.serving(time_s)
-        draws = self._rng.random((self._rng.poisson(self._mean * self._pool.plenty(time_s)), TRIES, 4))
+        draws = self._rng.random((self._rng.poisson(self._mean * self._pool.plenty(time_s)), MOST_DRAWS, 4))
         if not len(draws):
             return NO_ROWS
         picks = serving[(draws[..., 0] * len(serving)).astype(np.int64)]

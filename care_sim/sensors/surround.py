@@ -11,8 +11,15 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.annotated import NOBODY, Cloud, Sights
-from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
+from care_sim.sensors.annotated import NOBODY, Cloud, IdentifiedDetections
+from care_sim.sensors.camera import (
+    CAMERA_FROM_LIDAR,
+    CAMERA_HEIGHT,
+    CAMERA_WIDTH,
+    Picture,
+    faultless_detections,
+    window_on,
+)
 from care_sim.world.bullet import NO_BODY, BulletWorld
 
 
@@ -31,20 +38,22 @@ SURROUND_CAMERAS = (
 """Front, front left, front right, back left, back right, back."""
 
 
-def look_around(
+def surround_detections(
     world: BulletWorld,
     cameras: tuple[PinholeCamera, ...],
     sensor: Frame,
     labels: Mapping[int, int],
     boxes: Floats,
-) -> Sights:
+) -> IdentifiedDetections:
     """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes, by body id.
 
     `boxes` (n, 7) are those of the bodies in the sensor frame; nothing outside them is rendered.
     """
     windows = [window_on(camera, boxes) for camera in cameras]
     views = zip(cameras, windows, strict=True)
-    return sights_of([Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views], labels)
+    return faultless_detections(
+        [Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views], labels
+    )
 
 
 def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float) -> Cloud:

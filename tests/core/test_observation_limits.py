@@ -17,7 +17,7 @@ from care_sim.envs.spaces import observation_space
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import Annotations, Cloud, Sights
+from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
@@ -71,9 +71,9 @@ def crowd_film(count):
         rows.append(detection(**box, camera=number, confidence=rng.uniform(0.3, 0.9), **{"class": PEDESTRIAN}))
     cells = np.repeat(np.arange(count), 3)
     cloud = Cloud(cells, np.repeat(boxes[:, :3], 3, axis=0), np.repeat(people.objects, 3))
-    sights = Sights(detections_of(*rows), people.objects)
+    identified = IdentifiedDetections(detections_of(*rows), people.objects)
     sensor = Frame(0.0, 0.0, 1.84, 0.0)
-    shots = tuple(Shot(0.5 * k, f"{k}", sensor, STANDING, people, sights, cloud) for k in range(2))
+    shots = tuple(Shot(0.5 * k, f"{k}", sensor, STANDING, people, identified, cloud) for k in range(2))
     return Film("crowd", SURROUND_CAMERAS, 1.84, 0.5, shots)
 
 
@@ -88,7 +88,7 @@ def test_of_tracked_people_with_a_box_each_none_is_read_as_new(count):
     assert (len(new), len(known)) == (0, min(count, MAX_DETECTIONS))
     assert len(shown.tracks) == min(count, MAX_TRACKS)
     assert (np.diff(shown.tracks.ranges) >= 0).all()
-    surest = np.sort(film.shots[1].sights.detections.confidences)[::-1][:MAX_DETECTIONS]
+    surest = np.sort(film.shots[1].seen.detections.confidences)[::-1][:MAX_DETECTIONS]
     assert shown.detections.confidences == pytest.approx(surest)
 
 

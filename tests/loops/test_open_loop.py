@@ -13,7 +13,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, Sights
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
@@ -38,7 +38,7 @@ def shot(index, annotated, speed, bend):
         sensor,
         Ego(4.0 + index),
         Annotations(np.full(len(boxes), OTHER), np.zeros(len(boxes), np.int64), boxes),
-        Sights(ImageDetections.from_rows(picture), np.full(len(picture), OTHER)),
+        IdentifiedDetections(ImageDetections.from_rows(picture), np.full(len(picture), OTHER)),
         Cloud(fired, RIG.grid.directions[fired] * ranges[:, None], objects),
     )
 

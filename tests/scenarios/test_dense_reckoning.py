@@ -13,7 +13,7 @@ from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, sights_of
+from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, faultless_detections
 from care_sim.sensors.lidar import LIDAR_POSITION
 
 pytestmark = pytest.mark.slow
@@ -51,7 +51,7 @@ def scene(world, sensor, person):
     labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
     camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA])
-    seen = camera.detect(sights_of([picture], labels), 0.0, np.full(len(labels), 20.0), 0.0)
+    seen = camera.detect(faultless_detections([picture], labels), 0.0, np.full(len(labels), 20.0), 0.0)
     (of_person,) = [n for n in range(len(seen)) if seen.classes[n] == person.label]
     cells = wedges(seen, RIG)
     return GRID.hulls(nearest_first), cells, cells[of_person]

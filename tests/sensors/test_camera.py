@@ -9,7 +9,7 @@ from care_sim.sensors.camera import (
     FRONT_CAMERA,
     CameraDetector,
     Picture,
-    sights_of,
+    faultless_detections,
     window_on,
 )
 from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
@@ -29,7 +29,9 @@ class Detector(CameraDetector):
 
     def detect(self, picture, heading):
         self.frame += 1
-        return super().detect(sights_of([picture], self.labels), heading, self.ranges, self.frame * self.keyframe_s)
+        return super().detect(
+            faultless_detections([picture], self.labels), heading, self.ranges, self.frame * self.keyframe_s
+        )
 
 
 def detector(labels, keyframe_s=0.1, seed=0, **faults):

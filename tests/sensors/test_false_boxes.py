@@ -15,9 +15,9 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.scenarios.dense import Dense
-from care_sim.sensors.annotated import Sights
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, TRIES, Ghosts, Pool
+from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.nuscenes.cameras import CHANNELS
@@ -45,7 +45,7 @@ def table(*boxes, pixels=400, label=CAR, camera=0):
 def pool(rows, times=None, cameras=(FRONT_CAMERA,), apart=0.0):
     """A pool of rows, each seen at its time."""
     times = np.zeros(len(rows)) if times is None else times
-    return Pool.of([ImageDetections.from_rows(row[None]) for row in rows], times, cameras, apart)
+    return BoxPool.of([ImageDetections.from_rows(row[None]) for row in rows], times, cameras, apart)
 
 
 def spread(number, seed=0):
@@ -56,8 +56,8 @@ def spread(number, seed=0):
 
 
 def drawn(rate, keyframes=400, rows=None, true=None, seed=0):
-    haunted = Ghosts(pool(spread(200) if rows is None else rows), rate, 1, np.random.default_rng(seed))
-    return [haunted.draw(spread(0) if true is None else true, 0.0) for _ in range(keyframes)]
+    false_boxes = FalseBoxes(pool(spread(200) if rows is None else rows), rate, 1, np.random.default_rng(seed))
+    return [false_boxes.draw(spread(0) if true is None else true, 0.0) for _ in range(keyframes)]
 
 
 def overlaps(ours, theirs):
@@ -77,14 +77,14 @@ def test_ghosts_come_in_poisson_numbers():
 
 def test_no_ghosts_by_default_and_none_from_an_empty_pool():
     assert sum(map(len, drawn(0.0, 20))) == 0
-    empty = Ghosts(NOTHING_TO_HAUNT, 5.0, 1, np.random.default_rng(0))
+    empty = FalseBoxes(EMPTY_POOL, 5.0, 1, np.random.default_rng(0))
     assert sum(len(empty.draw(spread(3), 0.0)) for _ in range(20)) == 0
 
 
 def test_the_rate_is_a_mean_over_the_pictures_and_boxes_come_where_true_ones_do():
     rows = np.concatenate([spread(90), table((10, 10, 50, 50), camera=1)[[0] * 10]])
-    haunted = Ghosts(pool(rows, cameras=SURROUND_CAMERAS[:2]), 2.0, 2, np.random.default_rng(0))
-    ghosts = [haunted.draw(spread(0), 0.0) for _ in range(400)]
+    false_boxes = FalseBoxes(pool(rows, cameras=SURROUND_CAMERAS[:2]), 2.0, 2, np.random.default_rng(0))
+    ghosts = [false_boxes.draw(spread(0), 0.0) for _ in range(400)]
     assert np.mean(list(map(len, ghosts))) == pytest.approx(4.0, abs=0.3)
     assert np.mean(np.concatenate(ghosts)[:, 6]) == pytest.approx(0.1, abs=0.03)
 
@@ -100,7 +100,7 @@ def test_a_ghost_on_a_box_of_its_class_is_drawn_again_and_at_last_left_out():
     assert any((rows[:, 2] < 150).any() for rows in alone)
     assert all((rows[:, 2] > 150).all() for rows in beside)
     numbers = np.array([[len(rows) for rows in kind] for kind in (alone, beside)])
-    assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{TRIES} draws find the free place"
+    assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{MOST_DRAWS} draws find the free place"
 
 
 def test_a_ghost_may_lie_on_a_box_of_another_class():
@@ -117,7 +117,7 @@ def test_ghosts_do_not_lie_on_each_other():
 def test_every_policy_meets_the_same_draws_whatever_is_there():
     """The second keyframe's do not depend on what was there at the first."""
     rows = spread(200)
-    ones, others = (Ghosts(pool(rows), 3.0, 1, np.random.default_rng(1)) for _ in range(2))
+    ones, others = (FalseBoxes(pool(rows), 3.0, 1, np.random.default_rng(1)) for _ in range(2))
     ones.draw(spread(0), 0.0)
     others.draw(spread(40, seed=3), 0.0)
     assert np.array_equal(ones.draw(spread(0), 0.1), others.draw(spread(0), 0.1))
@@ -125,8 +125,8 @@ def test_every_policy_meets_the_same_draws_whatever_is_there():
 
 def test_a_film_lends_boxes_of_other_times_only():
     rows = table(*((30 * n, 80, 30 * n + 20, 110) for n in range(10)))
-    haunted = Ghosts(pool(rows, np.arange(10.0), apart=3.0), 3.0, 1, np.random.default_rng(0))
-    lefts = np.concatenate([haunted.draw(spread(0), 5.0) for _ in range(50)])[:, 2]
+    false_boxes = FalseBoxes(pool(rows, np.arange(10.0), apart=3.0), 3.0, 1, np.random.default_rng(0))
+    lefts = np.concatenate([false_boxes.draw(spread(0), 5.0) for _ in range(50)])[:, 2]
     assert set(np.rint(lefts / 30)) == {0, 1, 2, 8, 9}
 
 
@@ -183,8 +183,8 @@ def played(env, seed):
     loop, everything, over = env.unwrapped.loop, np.ones(env.action_space.shape, np.float32), False
     keyframes = []
     while not over:
-        sights = loop.sights if hasattr(loop, "sights") else loop.shot.sights
-        truth = {tuple(row) for row in sights.detections.rows().astype(np.float32)[:, SHOWN].tolist()}
+        identified = loop.seen if hasattr(loop, "seen") else loop.shot.seen
+        truth = {tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()}
         shown = observation["detections"][observation["detections"][:, 0] >= 0]
         true = np.array([tuple(row) in truth for row in shown[:, SHOWN].tolist()], bool)
         keyframes.append((shown[true], shown[~true]))
@@ -193,7 +193,7 @@ def played(env, seed):
     return keyframes
 
 
-def haunted(name, rate, seeds, **more):
+def keyframes_of(name, rate, seeds, **more):
     env = gymnasium.make(name, budget=1.0, false_positive_rate=rate, disable_env_checker=True, **more)
     episodes = [played(env, seed) for seed in seeds]
     env.close()
@@ -215,7 +215,7 @@ def copies(keyframes, kind):
 @pytest.fixture(scope="module")
 def dense():
     """Eight episodes of the dense street with two ghosts a picture."""
-    return haunted("CARE-Dense-v0", 2.0, range(8))
+    return keyframes_of("CARE-Dense-v0", 2.0, range(8))
 
 
 @pytest.fixture(scope="module")
@@ -269,8 +269,8 @@ def test_as_many_ghosts_as_asked_for(dense, streets):
 
 
 def test_a_crooked_camera_sees_ghosts_as_crookedly_as_the_rest():
-    (keyframes,) = haunted("CARE-Dense-v0", 4.0, [PITCHED], camera_rotation_sigma_deg=10.0)
-    (straight,) = haunted("CARE-Dense-v0", 4.0, [PITCHED])
+    (keyframes,) = keyframes_of("CARE-Dense-v0", 4.0, [PITCHED], camera_rotation_sigma_deg=10.0)
+    (straight,) = keyframes_of("CARE-Dense-v0", 4.0, [PITCHED])
     true, false, usual = (
         np.median(np.concatenate(rows)[:, [3, 5]].mean(axis=1))
         for rows in ([b[0] for b in keyframes], [b[1] for b in keyframes], [b[0] for b in straight])
@@ -303,7 +303,7 @@ def test_the_other_drive_is_of_a_world_of_its_own_and_leaves_no_client_behind(mo
 
 
 def test_ghosts_change_nothing_of_what_is_true():
-    plain, with_ghosts = haunted("CARE-Dartout-v0", 0.0, [0]), haunted("CARE-Dartout-v0", 1.0, [0])
+    plain, with_ghosts = keyframes_of("CARE-Dartout-v0", 0.0, [0]), keyframes_of("CARE-Dartout-v0", 1.0, [0])
     assert all(np.array_equal(a[0], b[0]) for a, b in zip(plain[0], with_ghosts[0], strict=True))
     assert {row[0] for _, false in with_ghosts[0] for row in false} == {PEDESTRIAN}, "nobody else has a box here"
 
@@ -316,8 +316,8 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
         lent = pool(false)
         lent.__dict__["varied"] = lambda rows, draws, lent=lent: lent.rows[rows]
         camera = CameraDetector([], Sensing(false_positive_rate=9), 0.1, SEED, [FRONT_CAMERA], lent)
-        sights = Sights(ImageDetections.from_rows(true), np.array([0]))
-        orders.append(camera.detect(sights, 0.0, np.empty(0), 0.0).boxes.tolist())
+        identified = IdentifiedDetections(ImageDetections.from_rows(true), np.array([0]))
+        orders.append(camera.detect(identified, 0.0, np.empty(0), 0.0).boxes.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
 
 
@@ -334,7 +334,7 @@ def ghosts_of(film, rate=1.0, seeds=range(4)):
 
 
 def true_of(film):
-    return np.concatenate([shot.sights.detections.rows() for shot in film.shots])
+    return np.concatenate([shot.seen.detections.rows() for shot in film.shots])
 
 
 def pixels_of_area(rows):
@@ -368,7 +368,7 @@ def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
     annotated = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
     rng, rows = np.random.default_rng(0), []
     for shot in annotated.shots:
-        seen = shot.sights.detections
+        seen = shot.seen.detections
         for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
             found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
             found["sample_data_token"] = f"{shot.token}-{CHANNELS[camera]}"

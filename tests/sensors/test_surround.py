@@ -5,7 +5,7 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.sensors.annotated import NOBODY
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
 
@@ -68,9 +68,9 @@ def test_cameras_report_labelled_bodies_alone(bullet):
     boxes = SENSOR.boxes_to_local(
         np.array([[20.0, -2.0, 1.7, *CATALOGUE["bus"].size, 0.0], [-15.0, -2.0, 1.2, *CATALOGUE["van"].size, 0.0]])
     )
-    sights = look_around(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2}, boxes)
-    assert set(sights.objects.tolist()) == {bus}
-    assert set(sights.detections.classes.tolist()) == {2}
-    both = look_around(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2, van: 1}, boxes)
+    identified = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2}, boxes)
+    assert set(identified.objects.tolist()) == {bus}
+    assert set(identified.detections.classes.tolist()) == {2}
+    both = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2, van: 1}, boxes)
     assert set(both.objects.tolist()) == {bus, van}
     assert numbers_of(both.objects, {bus: 7}).tolist() == [7 if b == bus else NOBODY for b in both.objects]

@@ -15,7 +15,7 @@ from care_sim.perception.cluster.grouping import clusters_of
 from care_sim.perception.cluster.road import ROAD_M, heights_above, road_plane
 from care_sim.perception.cluster.size_classes import MOST_MISFIT, Guess, best_guess
 
-OWN_CAR_M = 2.0
+OWN_ROOF_M = 2.0
 """Nearer to the sensor than this there is the roof that carries it: of a recorded nuScenes sweep a quarter."""
 
 _GRID = AngularGrid()
@@ -55,7 +55,7 @@ class ClusterDetector:
         Raises InvalidInput for points that are not (P, 3) finite numbers.
         """
         points = _in_order(points)
-        points = points[np.hypot(points[:, 0], points[:, 1]) > OWN_CAR_M]
+        points = points[np.hypot(points[:, 0], points[:, 1]) > OWN_ROOF_M]
         plane = road_plane(points, sensor_height_m)
         heights = heights_above(points, plane)
         above = heights > ROAD_M

@@ -15,7 +15,7 @@ from care_sim.perception.cluster.box_fitting import DECIMALS, Sides
 from care_sim.perception.cluster.grouping import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius
 from care_sim.world.bodies import CATALOGUE
 
-SPREAD = 0.1
+SIZE_SPREAD = 0.1
 """Standard deviation of sizes within a class, as a share: passenger cars are 3.7 to 5.5 m long, adults 1.5 to 2 m."""
 FIT_M = 0.1
 """Standard deviation of a fitted side, beside what the grid leaves open: rounded corners, mirrors, a swung arm."""
@@ -61,7 +61,7 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: AngularGr
     steps = np.array([grid.column_width, grid.column_width, grid.row_height / np.sqrt(2)]) * range_m
     shown = np.minimum(_ALONG, np.append(_hanging(sides, grid), sensor_height_m + range_m * np.tan(grid.top)))
     blurred = np.where(shown < _ALONG, cluster_radius(grid, range_m), 0.0)
-    variance = (SPREAD * _ALONG) ** 2 + FIT_M**2 + steps**2 / 6 + blurred**2
+    variance = (SIZE_SPREAD * _ALONG) ** 2 + FIT_M**2 + steps**2 / 6 + blurred**2
     deviation = np.maximum(seen - _ALONG, 0.0) + np.minimum(seen - shown, 0.0)
     return np.asarray((deviation**2 / variance).sum(axis=1))
 
