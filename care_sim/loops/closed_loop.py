@@ -43,7 +43,9 @@ class ClosedLoop:
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
         self._labels = labels
-        self._camera = CameraDetector(list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool)
+        self._camera = CameraDetector(
+            list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool
+        )
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns
@@ -90,19 +92,26 @@ class ClosedLoop:
         )
 
     def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object
-        keeps its forecast. Truth: for the privileged alone.
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without
+        an object keeps its forecast. Truth: for the privileged alone.
         """
         return self._identities.boxes(
-            tracks, lambda bodies: dict(zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True))
+            tracks,
+            lambda bodies: dict(
+                zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True)
+            ),
         )
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
+        """What every cell would return now, before noise and dropout. Truth: for the privileged
+        alone.
+        """
         return self._lidar.peek(self.sensor)
 
     def detectable(self) -> bool:
-        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the reward alone."""
+        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the
+        reward alone.
+        """
         target = self.world.first_sighting
         if target is None or target.label is None:
             return False
@@ -118,10 +127,14 @@ class ClosedLoop:
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
         self.seen = faultless_detections([taken], self._labels)
-        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for people and scoring."""
+        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for
+        people and scoring.
+        """
         self.belief = self._limits.belief(
             self._odometry.reading(self.world.ego_motion),
-            self._camera.detect(self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._camera.detect(
+                self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time
+            ),
             self._memory.tracks(sensor),
             ranges,
         )

@@ -1,7 +1,8 @@
 """What the open loop replays: the keyframes of a scene, the same for every policy.
 
-A film is made once, from a generated street, a recorded drive whose boxes become bodies, or recorded clouds. Nothing
-in it depends on a policy. It holds truth; policies see of it what `care_sim.core.belief.Belief` carries.
+A film is made once, from a generated street, a recorded drive whose boxes become bodies, or
+recorded clouds. Nothing in it depends on a policy. It holds truth; policies see of it what
+`care_sim.core.belief.Belief` carries.
 """
 
 from dataclasses import dataclass
@@ -14,8 +15,8 @@ from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, Ident
 
 @dataclass(frozen=True)
 class Shot:
-    """One keyframe: `time_s` from the start, `token` by which its source names it, the LiDAR's `sensor` frame, the
-    car's own motion, and everything that could be seen.
+    """One keyframe: `time_s` from the start, `token` by which its source names it, the LiDAR's
+    `sensor` frame, the car's own motion, and everything that could be seen.
     """
 
     time_s: float
@@ -29,10 +30,12 @@ class Shot:
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between keyframes.
+    """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
+    keyframes.
 
-    `hidden` are the objects that its source annotates at the first keyframe though no sensor tells of them there:
-    neither a return nor a pixel. No shot annotates them, so nobody has to find them; they were present all the same.
+    `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
+    of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
+    they were present all the same.
     """
 
     name: str

@@ -9,7 +9,8 @@ from care_sim.core.types import Scan, Tracks
 class Truth(Protocol):
     """The truth at the coming keyframe, as a privileged policy may ask for it.
 
-    It never enters a `Belief`: `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else.
+    It never enters a `Belief`: `make_policy` hands it to subclasses of `PrivilegedPolicy` and to
+    nobody else.
     """
 
     def boxes(self, tracks: Tracks) -> Floats:
@@ -20,5 +21,7 @@ class Truth(Protocol):
         ...
 
     def full_scan(self) -> Scan:
-        """What a scan of every cell would return, before noise and dropout: `cells` are all cells, ascending."""
+        """What a scan of every cell would return, before noise and dropout: `cells` are all cells,
+        ascending.
+        """
         ...

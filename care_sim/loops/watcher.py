@@ -1,4 +1,6 @@
-"""Keyframes of the closed loop as told by somebody who sees all; gathered only while somebody watches."""
+"""Keyframes of the closed loop as told by somebody who sees all; gathered only while somebody
+watches.
+"""
 
 from dataclasses import dataclass
 
@@ -19,13 +21,14 @@ from care_sim.sensors.camera import faultless_detections
 
 @dataclass(frozen=True)
 class Situation:
-    """What is there when the cells of a keyframe are chosen. Truth: for people and scoring, never for a policy.
+    """What is there when the cells of a keyframe are chosen. Truth: for people and scoring, never
+    for a policy.
 
-    `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n, 7) of all actors,
-    with `names` and `labels` (n), an index into `CLASSES` or None; `target` is the row of the first-sighting actor,
-    None without one. `belief` is all that the policy was shown. Of its detections, `known` (k,) says which a forecast
-    explains and `false` (k,) which show nothing; `missed` are those that the camera without its faults would have
-    given besides.
+    `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n,
+    7) of all actors, with `names` and `labels` (n), an index into `CLASSES` or None; `target` is
+    the row of the first-sighting actor, None without one. `belief` is all that the policy was
+    shown. Of its detections, `known` (k,) says which a forecast explains and `false` (k,) which
+    show nothing; `missed` are those that the camera without its faults would have given besides.
     """
 
     time_s: float
@@ -43,8 +46,9 @@ class Situation:
 
 @dataclass(frozen=True)
 class WatchedKeyframe:
-    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see `care_sim.core.actions`), what the scan returned
-    as `ranges` (E, A) in metres (0 not fired, maximum range no return), and the record for the scoring.
+    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see
+    `care_sim.core.actions`), what the scan returned as `ranges` (E, A) in metres (0 not fired,
+    maximum range no return), and the record for the scoring.
     """
 
     situation: Situation
@@ -60,14 +64,17 @@ class WatchedKeyframe:
 
 
 class EpisodeWatcher:
-    """Follows the running episode of a loop from its start: one `situation` before every keyframe, one `watched` after.
+    """Follows the running episode of a loop from its start: one `situation` before every keyframe,
+    one `watched` after.
 
     `confidence` is the threshold of the camera's detector.
     """
 
     def __init__(self, loop: ClosedLoop, confidence: float):
         self._loop, self._confidence = loop, confidence
-        self._labels = {actor.body: actor.label for actor in loop.world.actors if actor.label is not None}
+        self._labels = {
+            actor.body: actor.label for actor in loop.world.actors if actor.label is not None
+        }
         self._seen: list[IdentifiedDetections] = []
 
     def situation(self) -> Situation:
@@ -90,20 +97,28 @@ class EpisodeWatcher:
             missed=self._missed(objects),
         )
 
-    def watched(self, situation: Situation, action: Action, demand: Demand | None, frame: Keyframe) -> WatchedKeyframe:
+    def watched(
+        self, situation: Situation, action: Action, demand: Demand | None, frame: Keyframe
+    ) -> WatchedKeyframe:
         """What became of it: the loop has played the keyframe."""
         loop = self._loop
-        return WatchedKeyframe(situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame)
+        return WatchedKeyframe(
+            situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame
+        )
 
     def _objects(self, shown: ImageDetections) -> Cells:
-        """(n,) the bodies behind detections, NOBODY behind false ones: a box is that of its picture, unchanged."""
+        """(n,) the bodies behind detections, NOBODY behind false ones: a box is that of its
+        picture, unchanged.
+        """
         if not len(shown):
             return np.empty(0, np.int64)
         taken = self._seen[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
         drawn = slice(ImageDetections.COLUMNS.index("age"))
         same = (shown.rows()[:, None, drawn] == taken.detections.rows()[None, :, drawn]).all(axis=2)
         bodies = np.append(taken.objects, NOBODY)
-        return bodies[np.where(same.any(axis=1), same.argmax(axis=1) if same.size else NOBODY, NOBODY)]
+        return bodies[
+            np.where(same.any(axis=1), same.argmax(axis=1) if same.size else NOBODY, NOBODY)
+        ]
 
     def _missed(self, given: Cells) -> ImageDetections:
         """What a camera without faults shows now, less the objects that were given."""

@@ -18,12 +18,17 @@ class Identities:
         self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
 
     def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
-        """(n, 7) where the objects behind forecasts are now; a track without one keeps its forecast.
+        """(n, 7) where the objects behind forecasts are now; a track without one keeps its
+        forecast.
 
         `boxes_of` gives the present sensor-frame boxes of objects, without those that are nowhere.
         """
         boxes = tracks.boxes.copy()
-        known = [(row, self._objects[track]) for row, track in enumerate(tracks.ids.tolist()) if track in self._objects]
+        known = [
+            (row, self._objects[track])
+            for row, track in enumerate(tracks.ids.tolist())
+            if track in self._objects
+        ]
         present = boxes_of([number for _, number in known])
         for row, number in known:
             boxes[row] = present.get(number, boxes[row])

@@ -11,7 +11,9 @@ from care_sim.world.world import World
 
 Range = tuple[float, float]
 LONGEST_EPISODE_S = 60.0
-"""Of an episode: a car at 60 km/h comes to the end of the road, and a picture is as old as an observation can say."""
+"""Of an episode: a car at 60 km/h comes to the end of the road, and a picture is as old as an
+observation can say.
+"""
 EGO_SPEEDS_MPS = (0.5, 60.0)
 """From a walk to far beyond any street's traffic: what the ego's speed may be."""
 
@@ -51,7 +53,9 @@ def draw(rng: np.random.Generator, values: Range) -> float:
 
 
 def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
-    """Closed house fronts at y = `right_y` and y = `left_y`, from behind the ego to beyond its view."""
+    """Closed house fronts at y = `right_y` and y = `left_y`, from behind the ego to beyond its
+    view.
+    """
     length, depth, _ = CATALOGUE["terrace"].size
     middle = length / 2 - 30.0
     world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0), backdrop=True)

@@ -1,4 +1,6 @@
-"""Contrasts of two policies over scenes: values by hand, pairing, weights, thirds, and what cannot be compared."""
+"""Contrasts of two policies over scenes: values by hand, pairing, weights, thirds, and what cannot
+be compared.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +19,9 @@ from care_sim.evaluation.scene_contrasts import (
 
 
 def tallies(*scenes):
-    """Scenes from (events, sighted), ten object frames an event, two frames found for each event sighted."""
+    """Scenes from (events, sighted), ten object frames an event, two frames found for each event
+    sighted.
+    """
     return {
         f"scene {n}": Tally(events, sighted, 6 * (events - sighted), 10 * events, 2 * sighted)
         for n, (events, sighted) in enumerate(scenes)
@@ -25,7 +29,9 @@ def tallies(*scenes):
 
 
 def test_levels_by_event_and_by_scene():
-    """4 of 10, 1 of 2 and 0 of 8: 5 of 20 events, or 30% of an average scene; one without events is in neither."""
+    """4 of 10, 1 of 2 and 0 of 8: 5 of 20 events, or 30% of an average scene; one without events is
+    in neither.
+    """
     found = ratio_level(FIRST_SIGHTING, tallies((10, 4), (2, 1), (8, 0), (0, 0)))
     assert found.by_event == pytest.approx(100 * 5 / 20)
     assert found.by_scene == pytest.approx(30.0)
@@ -34,7 +40,11 @@ def test_levels_by_event_and_by_scene():
 
 
 def test_a_level_of_nothing():
-    assert ratio_level(FIRST_SIGHTING, {}) == ratio_level(FIRST_SIGHTING, tallies((0, 0))) == (ratio_level(TTFD, {}))
+    assert (
+        ratio_level(FIRST_SIGHTING, {})
+        == ratio_level(FIRST_SIGHTING, tallies((0, 0)))
+        == (ratio_level(TTFD, {}))
+    )
     assert ratio_level(FIRST_SIGHTING, {}).by_event is None
 
 
@@ -52,8 +62,13 @@ def test_a_contrast_weighs_events_alike_and_beside_it_scenes():
 def test_a_contrast_turned_round_changes_its_sign():
     rng = np.random.default_rng(2)
     ours, theirs = (tallies(*[(20, int(rng.integers(3, 9))) for _ in range(30)]) for _ in range(2))
-    there, back = scene_contrast(FIRST_SIGHTING, ours, theirs), scene_contrast(FIRST_SIGHTING, theirs, ours)
-    assert there.by_event == pytest.approx([-back.by_event.mean, -back.by_event.high, -back.by_event.low])
+    there, back = (
+        scene_contrast(FIRST_SIGHTING, ours, theirs),
+        scene_contrast(FIRST_SIGHTING, theirs, ours),
+    )
+    assert there.by_event == pytest.approx(
+        [-back.by_event.mean, -back.by_event.high, -back.by_event.low]
+    )
 
 
 def test_less_excludes_zero_as_more_does():
@@ -64,9 +79,16 @@ def test_less_excludes_zero_as_more_does():
 
 def test_the_draws_of_a_contrast_are_seeded():
     rng = np.random.default_rng(3)
-    ours, theirs = (tallies(*[(int(rng.integers(5, 40)), int(rng.integers(0, 5))) for _ in range(20)]) for _ in "ab")
-    theirs = {s: Tally(ours[s].events, t.sighted, 0, ours[s].frames, t.found) for s, t in theirs.items()}
-    one, same, other = (scene_contrast(FIRST_SIGHTING, ours, theirs, seed=seed) for seed in (1, 1, 2))
+    ours, theirs = (
+        tallies(*[(int(rng.integers(5, 40)), int(rng.integers(0, 5))) for _ in range(20)])
+        for _ in "ab"
+    )
+    theirs = {
+        s: Tally(ours[s].events, t.sighted, 0, ours[s].frames, t.found) for s, t in theirs.items()
+    }
+    one, same, other = (
+        scene_contrast(FIRST_SIGHTING, ours, theirs, seed=seed) for seed in (1, 1, 2)
+    )
     assert one == same
     assert one.by_event.low != other.by_event.low
     assert one.by_scene.low != other.by_scene.low
@@ -98,7 +120,9 @@ def test_pairing_removes_what_scenes_share():
 
 @pytest.mark.parametrize(("scenes", "excludes"), [(4, False), (5, True)])
 def test_four_scenes_carry_no_claim(scenes, excludes):
-    found = scene_contrast(FIRST_SIGHTING, tallies(*[(10, 5)] * scenes), tallies(*[(10, 4)] * scenes))
+    found = scene_contrast(
+        FIRST_SIGHTING, tallies(*[(10, 5)] * scenes), tallies(*[(10, 4)] * scenes)
+    )
     assert found.excludes_zero == excludes
 
 
@@ -108,7 +132,10 @@ def test_no_contrast_of_nothing():
 
 
 def test_floor_seeds_are_averaged_scene_by_scene():
-    seeds = [{"a": Tally(4, sighted, 6, 10, found), "b": Tally()} for sighted, found in [(1, 4), (2, 5), (3, 9)]]
+    seeds = [
+        {"a": Tally(4, sighted, 6, 10, found), "b": Tally()}
+        for sighted, found in [(1, 4), (2, 5), (3, 9)]
+    ]
     assert averaged(seeds) == {"a": Tally(4, 2, 6, 10, 6), "b": Tally()}
     assert averaged([seeds[0], {"b": Tally()}]) == {"b": Tally()}
     assert averaged([]) == {}
@@ -116,7 +143,9 @@ def test_floor_seeds_are_averaged_scene_by_scene():
 
 def test_tallies_of_other_films_are_refused():
     other = tallies((9, 4))
-    with pytest.raises(InvalidInput, match=r"scene 0: .* one film, got 9 events in 90 .* and 10 events in 100"):
+    with pytest.raises(
+        InvalidInput, match=r"scene 0: .* one film, got 9 events in 90 .* and 10 events in 100"
+    ):
         scene_contrast(FIRST_SIGHTING, tallies((10, 4)), other)
     with pytest.raises(InvalidInput, match=r"scene 0: .* one film"):
         averaged([tallies((10, 4)), other])

@@ -43,13 +43,16 @@ def counts(notes):
     """Of every keyframe: detections that arrived, false ones among them, missed ones."""
     situations = [watched.situation for watched in notes.moments]
     return [
-        SimpleNamespace(given=len(s.belief.detections), false=s.false.sum(), missed=len(s.missed)) for s in situations
+        SimpleNamespace(given=len(s.belief.detections), false=s.false.sum(), missed=len(s.missed))
+        for s in situations
     ]
 
 
 def test_a_camera_without_faults_misses_nothing_and_invents_nothing():
     notes = watch()
-    assert [(c.given, c.false, c.missed) for c in counts(notes)] == [(shown, 0, 0) for shown in notes.shown]
+    assert [(c.given, c.false, c.missed) for c in counts(notes)] == [
+        (shown, 0, 0) for shown in notes.shown
+    ]
     assert sum(notes.shown) > 60
 
 
@@ -97,7 +100,9 @@ def test_a_moment_holds_the_truth_of_its_keyframe():
         assert situation.time_s == frame.time_s
         assert situation.names[situation.target] == "person"
         x, y = situation.bodies[situation.target, :2]
-        assert np.hypot(x - situation.sensor.x, y - situation.sensor.y) == pytest.approx(frame.distance_m)
+        assert np.hypot(x - situation.sensor.x, y - situation.sensor.y) == pytest.approx(
+            frame.distance_m
+        )
         np.testing.assert_array_equal(np.flatnonzero(watched.shares), frame.fired)
         np.testing.assert_array_equal(np.flatnonzero(watched.ranges), frame.fired)
     first, last = notes.moments[0].situation, notes.moments[-1].situation

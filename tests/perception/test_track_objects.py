@@ -22,7 +22,10 @@ def noted(*pairs):
 def places(identities, tracks):
     """Where the objects behind the tracks are; -1 where the forecast was kept."""
     boxes = identities.boxes(tracks, present)
-    return [-1 if np.array_equal(box, kept) else box[0] for box, kept in zip(boxes, tracks.boxes, strict=True)]
+    return [
+        -1 if np.array_equal(box, kept) else box[0]
+        for box, kept in zip(boxes, tracks.boxes, strict=True)
+    ]
 
 
 def test_a_track_is_where_its_object_is_and_one_without_stays(tracks_at):

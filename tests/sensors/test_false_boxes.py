@@ -56,13 +56,18 @@ def spread(number, seed=0):
 
 
 def drawn(rate, keyframes=400, rows=None, true=None, seed=0):
-    false_boxes = FalseBoxes(pool(spread(200) if rows is None else rows), rate, 1, np.random.default_rng(seed))
+    false_boxes = FalseBoxes(
+        pool(spread(200) if rows is None else rows), rate, 1, np.random.default_rng(seed)
+    )
     return [false_boxes.draw(spread(0) if true is None else true, 0.0) for _ in range(keyframes)]
 
 
 def overlaps(ours, theirs):
     """(n, m) intersection over union of boxes of one class and camera, else 0."""
-    low, high = np.maximum(ours[:, None, 2:4], theirs[:, 2:4]), np.minimum(ours[:, None, 4:6], theirs[:, 4:6])
+    low, high = (
+        np.maximum(ours[:, None, 2:4], theirs[:, 2:4]),
+        np.minimum(ours[:, None, 4:6], theirs[:, 4:6]),
+    )
     common = np.prod(np.clip(high - low, 0, None), axis=-1)
     areas = [np.prod(rows[:, 4:6] - rows[:, 2:4], axis=1) for rows in (ours, theirs)]
     alike = (ours[:, None, 0] == theirs[:, 0]) & (ours[:, None, 6] == theirs[:, 6])
@@ -83,7 +88,9 @@ def test_no_ghosts_by_default_and_none_from_an_empty_pool():
 
 def test_the_rate_is_a_mean_over_the_pictures_and_boxes_come_where_true_ones_do():
     rows = np.concatenate([spread(90), table((10, 10, 50, 50), camera=1)[[0] * 10]])
-    false_boxes = FalseBoxes(pool(rows, cameras=SURROUND_CAMERAS[:2]), 2.0, 2, np.random.default_rng(0))
+    false_boxes = FalseBoxes(
+        pool(rows, cameras=SURROUND_CAMERAS[:2]), 2.0, 2, np.random.default_rng(0)
+    )
     ghosts = [false_boxes.draw(spread(0), 0.0) for _ in range(400)]
     assert np.mean(list(map(len, ghosts))) == pytest.approx(4.0, abs=0.3)
     assert np.mean(np.concatenate(ghosts)[:, 6]) == pytest.approx(0.1, abs=0.03)
@@ -125,7 +132,9 @@ def test_every_policy_meets_the_same_draws_whatever_is_there():
 
 def test_a_film_lends_boxes_of_other_times_only():
     rows = table(*((30 * n, 80, 30 * n + 20, 110) for n in range(10)))
-    false_boxes = FalseBoxes(pool(rows, np.arange(10.0), apart=3.0), 3.0, 1, np.random.default_rng(0))
+    false_boxes = FalseBoxes(
+        pool(rows, np.arange(10.0), apart=3.0), 3.0, 1, np.random.default_rng(0)
+    )
     lefts = np.concatenate([false_boxes.draw(spread(0), 5.0) for _ in range(50)])[:, 2]
     assert set(np.rint(lefts / 30)) == {0, 1, 2, 8, 9}
 
@@ -133,12 +142,17 @@ def test_a_film_lends_boxes_of_other_times_only():
 edges = st.tuples(st.integers(0, 280), st.integers(0, 150), st.integers(1, 39), st.integers(1, 29))
 
 
-@given(st.lists(st.tuples(edges, st.floats(0.05, 1)), min_size=1, max_size=12), st.integers(0, 2**32 - 1))
+@given(
+    st.lists(st.tuples(edges, st.floats(0.05, 1)), min_size=1, max_size=12),
+    st.integers(0, 2**32 - 1),
+)
 def test_ghosts_of_rendered_pictures_have_whole_edges_and_pixels_that_fit(boxes, seed):
     """And stay as far from the border, and as sure, as the boxes that they are made from."""
     rows = np.concatenate(
         [
-            table((left, top, left + width, top + height), pixels=max(round(fill * width * height), 1))
+            table(
+                (left, top, left + width, top + height), pixels=max(round(fill * width * height), 1)
+            )
             for (left, top, width, height), fill in boxes
         ]
     )
@@ -149,7 +163,9 @@ def test_ghosts_of_rendered_pictures_have_whole_edges_and_pixels_that_fit(boxes,
     pixels = 36 * ghosts[:, 1] / (1 - ghosts[:, 1])
     assert np.array_equal(ghosts[:, 2:6], np.rint(ghosts[:, 2:6]))
     assert pixels == pytest.approx(np.rint(pixels), abs=1e-6)
-    assert np.all((left < right) & (top < bottom) & (pixels <= (right - left) * (bottom - top) + 1e-6))
+    assert np.all(
+        (left < right) & (top < bottom) & (pixels <= (right - left) * (bottom - top) + 1e-6)
+    )
     assert ghosts[:, 1].min() >= rows[:, 1].min() - 1e-12
     assert np.all(ghosts[:, 2:4].min(axis=0) >= rows[:, 2:4].min(axis=0))
     assert np.all(ghosts[:, 4:6].max(axis=0) <= rows[:, 4:6].max(axis=0))
@@ -164,7 +180,9 @@ def test_what_the_edge_of_the_picture_cuts_it_cuts_in_a_ghost_too():
 
 
 def test_ghosts_are_written_with_the_decimals_of_the_file_that_they_come_from():
-    """The recorded picture is off the rig's by a part of a pixel, so that no edge is a round number."""
+    """The recorded picture is off the rig's by a part of a pixel, so that no edge is a round
+    number.
+    """
     rng = np.random.default_rng(0)
     corners = np.round(rng.uniform(0, 600, (30, 2)), 1)
     boxes = np.column_stack([corners, corners + np.round(rng.uniform(20, 200, (30, 2)), 1)])
@@ -174,17 +192,27 @@ def test_ghosts_are_written_with_the_decimals_of_the_file_that_they_come_from():
     ghosts = pool(rows).varied(rng.integers(30, size=200), rng.random((200, 3)))
     for values, decimals in ((ghosts[:, 2:6] - off, 1), (ghosts[:, 1], 3)):
         assert values == pytest.approx(np.round(values, decimals), abs=1e-6)
-    assert len({tuple(row) for row in ghosts[:, 2:6].tolist()} & {tuple(row) for row in rows[:, 2:6].tolist()}) < 10
+    assert (
+        len(
+            {tuple(row) for row in ghosts[:, 2:6].tolist()}
+            & {tuple(row) for row in rows[:, 2:6].tolist()}
+        )
+        < 10
+    )
 
 
 def played(env, seed):
-    """Tables of the true and of the false boxes of every keyframe of an episode in which every cell is fired."""
+    """Tables of the true and of the false boxes of every keyframe of an episode in which every cell
+    is fired.
+    """
     observation, _ = env.reset(seed=seed)
     loop, everything, over = env.unwrapped.loop, np.ones(env.action_space.shape, np.float32), False
     keyframes = []
     while not over:
         identified = loop.seen if hasattr(loop, "seen") else loop.shot.seen
-        truth = {tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()}
+        truth = {
+            tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()
+        }
         shown = observation["detections"][observation["detections"][:, 0] >= 0]
         true = np.array([tuple(row) in truth for row in shown[:, SHOWN].tolist()], bool)
         keyframes.append((shown[true], shown[~true]))
@@ -194,7 +222,9 @@ def played(env, seed):
 
 
 def keyframes_of(name, rate, seeds, **more):
-    env = gymnasium.make(name, budget=1.0, false_positive_rate=rate, disable_env_checker=True, **more)
+    env = gymnasium.make(
+        name, budget=1.0, false_positive_rate=rate, disable_env_checker=True, **more
+    )
     episodes = [played(env, seed) for seed in seeds]
     env.close()
     return episodes
@@ -209,7 +239,9 @@ def copies(keyframes, kind):
     """Share of the boxes that stand, to the last digit, at another keyframe too."""
     rows = [[tuple(row) for row in np.concatenate(both)[:, SHOWN].tolist()] for both in keyframes]
     seen = Counter(itertools.chain.from_iterable(map(set, rows)))
-    return np.mean([seen[tuple(row)] > 1 for both in keyframes for row in both[kind][:, SHOWN].tolist()])
+    return np.mean(
+        [seen[tuple(row)] > 1 for both in keyframes for row in both[kind][:, SHOWN].tolist()]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +257,14 @@ def streets():
     for seed in (3000, 3001):
         street = make_street(seed)
         first = slice(0, 24)
-        film = record(replace(street, poses=street.poses[first], ego=street.ego[first], motion=street.motion[first]))
+        film = record(
+            replace(
+                street,
+                poses=street.poses[first],
+                ego=street.ego[first],
+                motion=street.motion[first],
+            )
+        )
         episodes.append(played(FilmEnv(film, budget=1.0, false_positive_rate=3.0), 0))
     return episodes
 
@@ -233,14 +272,24 @@ def streets():
 @pytest.mark.parametrize("world", ["dense", "streets"])
 def test_no_classifier_tells_false_boxes_from_true_ones(world, request):
     episodes = request.getfixturevalue(world)
-    areas = areas_under_the_curve(*(of_kind(episodes, kind) for kind in (0, 1)), np.random.default_rng(0))
+    areas = areas_under_the_curve(
+        *(of_kind(episodes, kind) for kind in (0, 1)), np.random.default_rng(0)
+    )
     assert all(abs(area - 0.5) <= CHANCE for area in areas.values()), areas
 
 
 def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
-    """Scenarios run by the clock: 40% of the false people stood there too early when any moment lent its boxes."""
+    """Scenarios run by the clock: 40% of the false people stood there too early when any moment
+    lent its boxes.
+    """
     true, false = (
-        [n for episode in dense for n, both in enumerate(episode) for row in both[kind] if row[0] == PEDESTRIAN]
+        [
+            n
+            for episode in dense
+            for n, both in enumerate(episode)
+            for row in both[kind]
+            if row[0] == PEDESTRIAN
+        ]
         for kind in (0, 1)
     )
     assert len(false) > 30
@@ -249,8 +298,15 @@ def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
 
 @pytest.mark.parametrize("world", ["dense", "streets"])
 def test_who_remembers_all_boxes_meets_no_more_copies_among_the_false_ones(world, request):
-    """Give or take what chance does: three standard errors of a share of one in ten of some hundred boxes."""
-    shares = np.array([[copies(keyframes, kind) for kind in (0, 1)] for keyframes in request.getfixturevalue(world)])
+    """Give or take what chance does: three standard errors of a share of one in ten of some hundred
+    boxes.
+    """
+    shares = np.array(
+        [
+            [copies(keyframes, kind) for kind in (0, 1)]
+            for keyframes in request.getfixturevalue(world)
+        ]
+    )
     true, false = shares.mean(axis=0)
     assert false <= true + 0.05
 
@@ -303,13 +359,20 @@ def test_the_other_drive_is_of_a_world_of_its_own_and_leaves_no_client_behind(mo
 
 
 def test_ghosts_change_nothing_of_what_is_true():
-    plain, with_ghosts = keyframes_of("CARE-Dartout-v0", 0.0, [0]), keyframes_of("CARE-Dartout-v0", 1.0, [0])
+    plain, with_ghosts = (
+        keyframes_of("CARE-Dartout-v0", 0.0, [0]),
+        keyframes_of("CARE-Dartout-v0", 1.0, [0]),
+    )
     assert all(np.array_equal(a[0], b[0]) for a, b in zip(plain[0], with_ghosts[0], strict=True))
-    assert {row[0] for _, false in with_ghosts[0] for row in false} == {PEDESTRIAN}, "nobody else has a box here"
+    assert {row[0] for _, false in with_ghosts[0] for row in false} == {PEDESTRIAN}, (
+        "nobody else has a box here"
+    )
 
 
 def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
-    """Confidence and left edge decide; a true and a false box that have both in common may come in either order."""
+    """Confidence and left edge decide; a true and a false box that have both in common may come in
+    either order.
+    """
     boxes = high, low = table((10, 20, 30, 40)), table((10, 60, 30, 80))
     orders = []
     for true, false in (boxes, boxes[::-1]):
@@ -355,8 +418,12 @@ def test_ghosts_of_projected_annotations_have_their_visible_shares_and_edges(nus
     film = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
     ghosts, true = ghosts_of(film), true_of(film)
     assert len(ghosts) > 50
-    assert pixels_of_area(ghosts) == pytest.approx(pixels_of_area(true)[0], rel=1e-3), "all are wholly visible"
-    assert not {tuple(row) for row in ghosts[:, 2:6]} & {tuple(row) for row in true[:, 2:6].astype(np.float32)}
+    assert pixels_of_area(ghosts) == pytest.approx(pixels_of_area(true)[0], rel=1e-3), (
+        "all are wholly visible"
+    )
+    assert not {tuple(row) for row in ghosts[:, 2:6]} & {
+        tuple(row) for row in true[:, 2:6].astype(np.float32)
+    }
     for camera in np.unique(ghosts[:, 6]):
         ours, theirs = (rows[rows[:, 6] == camera] for rows in (ghosts, true))
         assert np.all(ours[:, 2:4] >= theirs[:, 2:4].min(axis=0) - 1e-3)
@@ -372,9 +439,13 @@ def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
         for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
             found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
             found["sample_data_token"] = f"{shot.token}-{CHANNELS[camera]}"
-            rows.append(found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()})
+            rows.append(
+                found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()}
+            )
     (tmp_path / "found.json").write_text(json.dumps(rows))
-    film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film("scene-0103")
+    film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film(
+        "scene-0103"
+    )
     ghosts, true = ghosts_of(film), true_of(film)
     assert len(ghosts) > 50
     assert ghosts[:, 1] == pytest.approx(np.round(ghosts[:, 1], 2), abs=1e-6)

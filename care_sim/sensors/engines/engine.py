@@ -1,4 +1,6 @@
-"""Engines behind one seam: who answers which body a ray hits, how far away, and which body a pixel shows."""
+"""Engines behind one seam: who answers which body a ray hits, how far away, and which body a pixel
+shows.
+"""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -14,8 +16,8 @@ class RayEngine(Protocol):
     """Casts the rays of one grid at the bodies of one world."""
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,), NOTHING there, of
-        `cells` (n,) fired from the frame `sensor`.
+        """Ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,),
+        NOTHING there, of `cells` (n,) fired from the frame `sensor`.
         """
         ...
 
@@ -24,8 +26,8 @@ class Engine(RayEngine, Protocol):
     """Also draws the bodies for cameras."""
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """Id of the body that each pixel of a window of `camera` shows, NOTHING where there is none; see
-        `care_sim.world.bullet.BulletWorld.body_ids`.
+        """Id of the body that each pixel of a window of `camera` shows, NOTHING where there is
+        none; see `care_sim.world.bullet.BulletWorld.body_ids`.
         """
         ...
 
