@@ -17,7 +17,7 @@ from care_sim.loops.other_drive import seen_on_a_drive
 from care_sim.loops.records import Keyframe
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.sensors.engines.engine import check_engine
+from care_sim.sensors.engines import check_engine
 from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import WORLD_STEP_S, whole_steps

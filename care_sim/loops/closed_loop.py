@@ -19,7 +19,7 @@ from care_sim.perception.proxy import ReturnsDetector
 from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
 from care_sim.world.world import World

@@ -10,7 +10,7 @@ from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import Scan
-from care_sim.sensors.engines.engine import RayEngine
+from care_sim.sensors.engines import RayEngine
 from care_sim.world.bullet import NO_BODY
 
 LIDAR_POSITION = (-0.445, 0.0, 1.84)

@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.types import Scan
-from care_sim.sensors.engines.engine import ENGINES, check_engine
+from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import Lidar, dead_cells, noisy
 from care_sim.world.bodies import CATALOGUE
 

@@ -11,7 +11,8 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.parity.answers import Answers, Millimetres
 from care_sim.measure.parity.scenes import AWAY
-from care_sim.sensors.engines.engine import ENGINES, Bullet
+from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.engines.bullet import Bullet
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.primitives import SHAPES, Primitives
@@ -28,7 +29,7 @@ class Exact(Bullet):
         self._bodies, self._exact = 0, Millimetres([], grid)
 
     def cast(self, sensor: Frame, cells: Cells) -> Answers:
-        """Ranges and body ids; see `care_sim.sensors.engines.engine.RayEngine`."""
+        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
         known = self._world.primitives
         if self._bodies != len(known.poses):
             self.close()

@@ -14,7 +14,7 @@ from care_sim.measure.parity.pictures import Pictures
 from care_sim.measure.parity.scenes import AWAY
 from care_sim.measure.parity.tally import AgreementCounts, groups
 from care_sim.measure.parity.verdicts import Engines, compare
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 
 POLICY, BUDGET = "care", 0.1

@@ -8,7 +8,7 @@ from care_sim.measure.parity.answers import Millimetres
 from care_sim.measure.parity.scenes import GRIDS, SCENES_A_CAST, draw_bodies, draw_scene
 from care_sim.measure.parity.tally import AgreementCounts, groups
 from care_sim.measure.parity.verdicts import Engines, compare
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet import BulletWorld
 

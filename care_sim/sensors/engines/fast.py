@@ -27,7 +27,7 @@ class Fast:
         self._lattice = (grid.columns, grid.rows, float(grid.top), float(grid.row_height))
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        """Ranges and body ids; see `care_sim.sensors.engines.engine.RayEngine`."""
+        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
         if (cells[1:] < cells[:-1]).any():
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])
@@ -54,7 +54,7 @@ class Fast:
         return result
 
     def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
-        """Body ids of pixels; see `care_sim.sensors.engines.engine.Engine`."""
+        """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
         eye, axes = camera.stance(sensor)
         lens = camera.focal, camera.width / 2, camera.height / 2
         meshes, poses = self._world.polyhedra.tables, self._world.primitives.poses

@@ -19,7 +19,7 @@ from care_sim.measure.parity.tally import GROUPS, AgreementCounts, groups
 from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
 from care_sim.scenarios import SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.world.bodies import CATALOGUE
 
