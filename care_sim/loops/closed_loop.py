@@ -15,8 +15,8 @@ from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
+from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import ReturnsDetector
-from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
@@ -51,7 +51,7 @@ class ClosedLoop:
         self._min_returns = sensing.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
-        self._identities = Identities()
+        self._track_objects = TrackObjects()
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
             world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
@@ -67,7 +67,7 @@ class ClosedLoop:
         scan, bodies = self._lidar.fire(fired, sensor)
         detections, detected = self._detector.detect(bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
-        self._identities.note(tracks, detected)
+        self._track_objects.note(tracks, detected)
         command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
 
         distance = self._distance_to_first_sighting(sensor)
@@ -95,7 +95,7 @@ class ClosedLoop:
         """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without
         an object keeps its forecast. Truth: for the privileged alone.
         """
-        return self._identities.boxes(
+        return self._track_objects.boxes(
             tracks,
             lambda bodies: dict(
                 zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True)

@@ -17,8 +17,8 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import Detector
-from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
@@ -72,7 +72,7 @@ class OpenLoop:
         self._detector = detector
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
-        self._identities = Identities()
+        self._track_objects = TrackObjects()
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -92,7 +92,7 @@ class OpenLoop:
         cloud = self._lidar.fire(fired, shot.cloud)
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
-        self._identities.note(tracks, objects)
+        self._track_objects.note(tracks, objects)
         velocities = self._memory.velocities(tracks, shot.sensor)
         self.index += 1
         self._memory.predict()
@@ -107,7 +107,7 @@ class OpenLoop:
         """
         annotations = self.shot.annotations
         present = dict(zip(annotations.objects.tolist(), annotations.boxes, strict=True))
-        return self._identities.boxes(
+        return self._track_objects.boxes(
             tracks, lambda numbers: {n: present[n] for n in numbers if n in present}
         )
 
