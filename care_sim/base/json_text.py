@@ -5,14 +5,16 @@ from collections.abc import Callable
 from typing import Any
 
 MOST_LEVELS = 200
-"""Levels that lists and maps may be nested: more than any file here needs, few enough for all that walk them."""
+"""Levels that lists and maps may be nested: more than any file here needs, few enough for all that
+walk them.
+"""
 
 
 def parsed(text: str | bytes, taken: Callable[[dict[str, Any]], object] | None = None) -> Any:
     """The content of a text, every map in it replaced by what is `taken` of it.
 
-    Raises ValueError for what is no JSON, and for what is nested deeper than `MOST_LEVELS`, or so deep that Python cannot
-    read it.
+    Raises ValueError for what is no JSON, and for what is nested deeper than `MOST_LEVELS`, or so
+    deep that Python cannot read it.
     """
     try:
         content = json.loads(text, object_hook=taken)

@@ -1,4 +1,5 @@
-"""The files that decide what an installed policy or detector does, as far as distribution and code name them.
+"""The files that decide what an installed policy or detector does, as far as distribution and code
+name them.
 
 Not seen are names that code puts together while it plays, or reads from elsewhere.
 """
@@ -28,11 +29,16 @@ _OF_THE_SYSTEM = tuple(map(Path, ("/proc", "/sys", "/dev")))
 
 
 def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
-    """The files that came with an entry point, by name: of its package, or beside its module where no list of its
-    distribution names it; and those of that list. None where the code has no files to read.
+    """The files that came with an entry point, by name: of its package, or beside its module where
+    no list of its distribution names it; and those of that list. None where the code has no files
+    to read.
     """
     spec = find_spec(_top(entry))
-    roots = [Path(place) for place in spec.submodule_search_locations or [spec.origin or ""]] if spec else []
+    roots = (
+        [Path(place) for place in spec.submodule_search_locations or [spec.origin or ""]]
+        if spec
+        else []
+    )
     if not roots or not all(root.name and root.exists() for root in roots):
         return None
     files = _listed(entry)
@@ -45,8 +51,9 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
 
 
 def files_named_by(entry: EntryPoint) -> dict[str, Path]:
-    """The files and folders that the defaults of an entry point's parameters, and the constants of its classes and
-    modules, name; relative names from here and from its module. Nothing of code that cannot be loaded.
+    """The files and folders that the defaults of an entry point's parameters, and the constants of
+    its classes and modules, name; relative names from here and from its module. Nothing of code
+    that cannot be loaded.
 
     A folder that holds the module, or the place where it is played, names no file in particular.
     """
@@ -65,8 +72,8 @@ def files_named_by(entry: EntryPoint) -> dict[str, Path]:
 
 
 def files_named_in(files: Collection[Path]) -> dict[str, Path]:
-    """The further files that texts in the code among these name, wherever they stand in it: relative names from here
-    and from the code. A folder that a text happens to name is left out.
+    """The further files that texts in the code among these name, wherever they stand in it:
+    relative names from here and from the code. A folder that a text happens to name is left out.
     """
     own = {file.resolve() for file in files}
     found = {
@@ -76,12 +83,14 @@ def files_named_in(files: Collection[Path]) -> dict[str, Path]:
         for text in _file_names(source)
         for number, path in enumerate(paths_in(text, source.parent))
     }
-    return {name: path for name, path in found.items() if path.is_file() and path.resolve() not in own}
+    return {
+        name: path for name, path in found.items() if path.is_file() and path.resolve() not in own
+    }
 
 
 def paths_in(value: object, *places: Path, depth: int = MOST_NESTED) -> Iterator[Path]:
-    """What a value names of files and folders that are there, from here or from further places; of structures what
-    they hold.
+    """What a value names of files and folders that are there, from here or from further places; of
+    structures what they hold.
     """
     if isinstance(value, str | PathLike):
         yield from _named_by(value, places)
@@ -112,12 +121,18 @@ def _named_by(value: "str | PathLike[str]", places: Iterable[Path]) -> Iterator[
 
 @cache
 def _file_names(source: Path) -> tuple[str, ...]:
-    """The texts in a file of code that look like a file's name, once a process, which has it loaded."""
+    """The texts in a file of code that look like a file's name, once a process, which has it
+    loaded.
+    """
     try:
         tree = ast.parse(source.read_bytes())
     except (OSError, ValueError, SyntaxError, RecursionError):
         return ()
-    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    texts = {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
     return tuple(sorted(text for text in texts if text.isprintable() and Path(text).suffix))
 
 
@@ -138,7 +153,9 @@ def _listed(entry: EntryPoint) -> dict[str, Path]:
 
 
 def _counts(name: Path) -> bool:
-    """Whether a file is the author's own: no installer's note or script, not what Python and Numba keep beside code."""
+    """Whether a file is the author's own: no installer's note or script, not what Python and Numba
+    keep beside code.
+    """
     inner = [part for part in name.parts if part != ".."]
     return not (
         "__pycache__" in inner
@@ -157,8 +174,14 @@ def _values(entry: EntryPoint, make: Callable[..., Any]) -> Iterable[tuple[str, 
         parameters = []
     yield from ((parameter.name, parameter.default) for parameter in parameters)
     top = _top(entry)
-    own = [sys.modules[name] for name in sorted(sys.modules) if name == top or name.startswith(f"{top}.")]
-    classes = [each for each in getattr(make, "__mro__", ()) if each.__module__.partition(".")[0] == top]
+    own = [
+        sys.modules[name]
+        for name in sorted(sys.modules)
+        if name == top or name.startswith(f"{top}.")
+    ]
+    classes = [
+        each for each in getattr(make, "__mro__", ()) if each.__module__.partition(".")[0] == top
+    ]
     for holder in (*own, *classes):
         yield from _constants(holder)
 

@@ -10,8 +10,8 @@ from importlib.util import find_spec, module_from_spec
 def bare(package: str) -> Iterator[None]:
     """Modules of `package` are imported without running the package's own code while this lasts.
 
-    They are forgotten at the end: whoever imports the package later gets it whole, in copies of its own. A package
-    that is imported already is left as it is.
+    They are forgotten at the end: whoever imports the package later gets it whole, in copies of its
+    own. A package that is imported already is left as it is.
     """
     spec = None if package in sys.modules else find_spec(package)
     if spec is None:

@@ -1,4 +1,6 @@
-"""PyBullet's clients within this process, used again and again: to connect costs more than to empty one."""
+"""PyBullet's clients within this process, used again and again: to connect costs more than to empty
+one.
+"""
 
 from care_sim.world.quiet_pybullet import pybullet
 
@@ -26,7 +28,9 @@ def give_back(client: int) -> None:
 
 
 def leave(client: int) -> None:
-    """Give a client back where PyBullet may not be called: garbage is collected in the middle of its calls, too."""
+    """Give a client back where PyBullet may not be called: garbage is collected in the middle of
+    its calls, too.
+    """
     _free.append(client)
 
 

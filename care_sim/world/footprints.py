@@ -26,14 +26,22 @@ class Footprints:
         boxes = self.boxes[bodies]
         boxes[:, :2], boxes[:, 6] = poses[:, :2], poses[:, 2]
         self.boxes[bodies] = boxes
-        (length, width), cos, sin = boxes[:, 3:5].T, np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
-        self._halves[bodies] = np.stack([length * cos + width * sin, length * sin + width * cos], axis=1) / 2
+        (length, width), cos, sin = (
+            boxes[:, 3:5].T,
+            np.abs(np.cos(poses[:, 2])),
+            np.abs(np.sin(poses[:, 2])),
+        )
+        self._halves[bodies] = (
+            np.stack([length * cos + width * sin, length * sin + width * cos], axis=1) / 2
+        )
 
     def near(self, body: int, within: float) -> Integers:
-        """Ids of the other bodies that may be within `within` metres of one: all but those further from it by the
-        rectangles, along x and y, around the footprints.
+        """Ids of the other bodies that may be within `within` metres of one: all but those further
+        from it by the rectangles, along x and y, around the footprints.
         """
-        gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (self._halves + self._halves[body])
+        gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (
+            self._halves + self._halves[body]
+        )
         close = (gaps[:, 0] <= within) & (gaps[:, 1] <= within)
         close[body] = False
         return np.flatnonzero(close)

@@ -1,4 +1,6 @@
-"""The bodies of a world as flat arrays: what a compiled engine reads without asking about each body."""
+"""The bodies of a world as flat arrays: what a compiled engine reads without asking about each
+body.
+"""
 
 from collections.abc import Sequence
 
@@ -13,9 +15,9 @@ SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")
 class Primitives:
     """Every part of the opaque bodies of one world, and where the bodies are.
 
-    `shapes` (k,) places in SHAPES, `halves` (k, 3) half extents and `offsets` (k, 3) centres of the parts in the
-    body frame, metres; `owners` (k,) body ids. `poses` (m, 7), one row a body id: x, y, z in metres and the
-    quaternion x, y, z, w, world frame.
+    `shapes` (k,) places in SHAPES, `halves` (k, 3) half extents and `offsets` (k, 3) centres of the
+    parts in the body frame, metres; `owners` (k,) body ids. `poses` (m, 7), one row a body id: x,
+    y, z in metres and the quaternion x, y, z, w, world frame.
     """
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ import rerun as rr
 from rerun.components import FillMode
 
 from care_sim.core.frames import Floats
-from care_sim.core.residual import bundles
+from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.driving.braking import BrakingRules
@@ -52,7 +52,7 @@ class Space:
         self._log_returns(watched)
         self._log_tracks(situation)
         for kind, chosen in (("residual", ~situation.known), ("explained", situation.known)):
-            self._log_wedges(kind, bundles(situation.belief.detections, self._rig)[chosen][:, CORNERS])
+            self._log_wedges(kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, CORNERS])
 
     def _log_bodies(self, situation: Situation, state: str) -> None:
         colours = [
