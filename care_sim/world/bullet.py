@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from care_sim.core.frames import Floats, Frame, Integers, Pose
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.bullet_clients import borrow, give_back, leave
-from care_sim.world.bullet_shapes import Polyhedra
-from care_sim.world.primitives import Primitives
-from care_sim.world.quiet_pybullet import pybullet
+from care_sim.world.body_tables import Primitives
+from care_sim.world.bullet_clients import borrow, give_back, leave, pybullet
+from care_sim.world.polyhedra import Polyhedra
 
 PixelWindow = tuple[int, int, int, int]
 """Left, top, right, bottom in whole pixels."""

@@ -9,17 +9,14 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from highway_env.road.lane import StraightLane
+from highway_env.road.road import Road, RoadNetwork
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+from highway_env.vehicle.objects import Obstacle
 
 from care_sim.core.frames import Pose
-from care_sim.world.bare import bare
 from care_sim.world.bodies import BodyKind
-
-with bare("highway_env"):  # its environments load pandas, Matplotlib and pygame
-    from highway_env.road.lane import StraightLane
-    from highway_env.road.road import Road, RoadNetwork
-    from highway_env.vehicle.behavior import IDMVehicle
-    from highway_env.vehicle.kinematics import Vehicle
-    from highway_env.vehicle.objects import Obstacle
 
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)

@@ -10,8 +10,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats, Integers, Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
+from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.footprints import Footprints
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05

@@ -14,8 +14,8 @@ from care_sim.measure.parity.scenes import AWAY
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.engines.bullet import Bullet
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.body_tables import SHAPES, Primitives
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.primitives import SHAPES, Primitives
 
 NAME = "bullet in millimetres"
 _UNSEEN = BodyKind("unseen", None, (1.0, 1.0, 1.0), (Part("box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), (0.5, 0.5, 0.5)),))

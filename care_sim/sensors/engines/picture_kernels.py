@@ -22,7 +22,7 @@ def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untype
 
     `camera` is its place in the world (3,) and its axes forward, left and up (3, 3); `lens` its
     focal length and principal point in pixels; `reach` the least and the greatest depth drawn in
-    metres; `meshes` the tables of `care_sim.world.bullet_shapes.Polyhedra`; `poses` (m, 7) of
+    metres; `meshes` the tables of `care_sim.world.polyhedra.Polyhedra`; `poses` (m, 7) of
     bodies by id.
     """
     left, top, right, bottom = window

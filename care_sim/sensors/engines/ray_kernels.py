@@ -12,7 +12,7 @@ from care_sim.base.compiled import compiled
 from care_sim.world.bullet import NO_BODY
 
 BOX, CYLINDER, SPHERE = range(3)
-"""Places in `care_sim.world.primitives.SHAPES`."""
+"""Places in `care_sim.world.body_tables.SHAPES`."""
 
 
 @compiled(error_model="numpy")

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.footprints import Footprints
 
 BUS, EGO = CATALOGUE["bus"], CATALOGUE["ego"]
 
