@@ -25,11 +25,11 @@ env.close()
 print(json.dumps(sorted(sys.modules)))
 """
 HEAVY = {
-    "dask", "distributed", "mujoco", "open3d", "plotly", "pyarrow", "rerun", "rich", "sklearn",
+    "dask", "distributed", "mujoco", "open3d", "plotly", "rerun", "rich", "sklearn",
     "stable_baselines3", "torch", "tyro",
 }  # fmt: skip
 """What an episode does not need. highway-env, whose roads and drivers it does, loads its own environments and with them
-pandas, Matplotlib and pygame: 96 MB and a second of every worker, since no part of it comes without the rest."""
+pandas (with PyArrow), Matplotlib and pygame: 96 MB and a second of every worker, since no part of it comes without the rest."""
 
 
 @pytest.mark.parametrize("engine", ["bullet", "fast"])
