@@ -7,7 +7,7 @@ import griffe
 
 
 class DynamicDocstrings(griffe.Extension):
-    """Polyhedra at classes and modules that assign `__doc__`."""
+    """Looks at classes and modules that assign `__doc__`."""
 
     def on_class_members(self, *, cls: griffe.Class, **_: Any) -> None:
         """Replace the docstring of the source by that of the imported class."""

@@ -1,1 +1,3 @@
-"""What every room stands on: errors, bounds, files, processes, random streams. Nothing here knows LiDAR."""
+"""What every room stands on: errors, bounds, files, processes, random streams. Nothing here knows
+LiDAR.
+"""

@@ -1,7 +1,9 @@
-"""What a field of a dataclass may be: stated beside its default, checked when the dataclass is made, and told by lists.
+"""What a field of a dataclass may be: stated beside its default, checked when the dataclass is
+made, and told by lists.
 
-The kind follows from the default: a flag, text, a whole number, a number, or a range of numbers (low, high). Numbers of
-any type become Python's own, so that equal configurations are written alike.
+The kind follows from the default: a flag, text, a whole number, a number, or a range of numbers
+(low, high). Numbers of any type become Python's own, so that equal configurations are written
+alike.
 """
 
 from dataclasses import Field, field, fields

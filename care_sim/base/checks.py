@@ -46,13 +46,17 @@ def is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
-def check_number(name: str, value: object, least: float = -math.inf, most: float = math.inf) -> None:
+def check_number(
+    name: str, value: object, least: float = -math.inf, most: float = math.inf
+) -> None:
     """Raise InvalidInput unless `value` is a finite number within `least` and `most`."""
     if not (is_number(value) and least <= _finite(value) <= most):
         if most < math.inf:
             allowed = f"lie in [{least:g}, {most:g}]"
         else:
-            allowed = f"be a finite number >= {least:g}" if least > -math.inf else "be a finite number"
+            allowed = (
+                f"be a finite number >= {least:g}" if least > -math.inf else "be a finite number"
+            )
         raise InvalidInput(f"{name} must {allowed}, got {shown(value)}")
 
 
@@ -66,15 +70,23 @@ def _finite(value: Any) -> float:
 
 
 def check_whole(name: str, value: object, least: float, most: float = LARGEST_INTEGER) -> None:
-    """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and `most`."""
+    """Raise InvalidInput unless `value` is a whole number (of an integer type) within `least` and
+    `most`.
+    """
     whole = int(value) if isinstance(value, Integral) and is_number(value) else None
     if whole is None or not least <= whole <= most:
-        upper = f" and <= {most}" if most < LARGEST_INTEGER or (whole is not None and whole > most) else ""
+        upper = (
+            f" and <= {most}"
+            if most < LARGEST_INTEGER or (whole is not None and whole > most)
+            else ""
+        )
         raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
 
 
 def check_range(name: str, value: Any, least: float = -math.inf, most: float = math.inf) -> None:
-    """Raise InvalidInput unless `value` is a pair of numbers, low and high, within `least` and `most`."""
+    """Raise InvalidInput unless `value` is a pair of numbers, low and high, within `least` and
+    `most`.
+    """
     fits = isinstance(value, tuple | list) and len(value) == 2 and all(map(is_number, value))
     if not (fits and least <= _finite(value[0]) <= _finite(value[1]) <= most):
         within = f", within [{least:g}, {most:g}]" if (least, most) != (-math.inf, math.inf) else ""
@@ -98,10 +110,20 @@ def check_path(name: str, value: object) -> None:
         path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
     except (TypeError, UnicodeError) as error:
         raise InvalidInput(f"{name} must be a path, got {shown(value)}") from error
-    too_long = len(path) > LONGEST_PATH or any(len(part) > LONGEST_NAME for part in path.split(b"/"))
+    too_long = len(path) > LONGEST_PATH or any(
+        len(part) > LONGEST_NAME for part in path.split(b"/")
+    )
     if not path or b"\0" in path or too_long:
-        least = "empty" if not path else "longer than a file system allows" if too_long else "with a null character"
-        raise InvalidInput(f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}")
+        least = (
+            "empty"
+            if not path
+            else "longer than a file system allows"
+            if too_long
+            else "with a null character"
+        )
+        raise InvalidInput(
+            f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}"
+        )
 
 
 def as_array(name: str, value: Any) -> NDArray[Any]:

@@ -53,8 +53,14 @@ def _held(value: object, own: bool) -> Iterable[object]:
         return [value.__wrapped__]
     if isinstance(value, FunctionType):
         return [value.__defaults__, value.__kwdefaults__, *vars(value).values()] if own else []
-    held = [getattr(value, field.name, None) for field in fields(value)] if is_dataclass(value) else []
+    held = (
+        [getattr(value, field.name, None) for field in fields(value)] if is_dataclass(value) else []
+    )
     if own or isinstance(value, SimpleNamespace):
         items = [*getattr(value, "__dict__", {}).items()]
-        held += [each for name, each in items if isinstance(each, FunctionType) or not name.startswith("__")]
+        held += [
+            each
+            for name, each in items
+            if isinstance(each, FunctionType) or not name.startswith("__")
+        ]
     return [*held, *value.__mro__[1:]] if isinstance(value, type) and own else held

@@ -19,7 +19,7 @@ from numba.core import event
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
-def compiled(**options: Any) -> Callable[[_F], Any]:
+def compiled(**options: Any) -> Callable[[_F], _F]:
     """Compile a function at its first call; `options` are those of `numba.njit`.
 
     The code is kept beside the file, or in the user's cache folder, or where NUMBA_CACHE_DIR says.
@@ -42,8 +42,8 @@ def compiled(**options: Any) -> Callable[[_F], Any]:
 
 @cache
 def _sources_digest(name: str) -> str:
-    """Hash of all that is compiled into the functions of a module: its source, the constants that it
-    holds or imports, and the same of the modules whose functions and named tuples it uses.
+    """Hash of all that is compiled into the functions of a module: its source, the constants that
+    it holds or imports, and the same of the modules whose functions and named tuples it uses.
     """
     module = sys.modules[name]
     constants = [

@@ -13,13 +13,17 @@ MOST_FILES = 10_000
 
 
 def file_digest(path: Path) -> str | None:
-    """Hash of the content of a file, or of the files below a folder and their names; empty where there is neither,
-    None of a folder with more than `MOST_FILES`.
+    """Hash of the content of a file, or of the files below a folder and their names; empty where
+    there is neither, None of a folder with more than `MOST_FILES`.
     """
     found = [path] if path.is_file() else [*islice(files_below(path), MOST_FILES + 1)]
     if len(found) > MOST_FILES:
         return None
-    hashes = [f"{file.relative_to(path)} {content_digest(file)}" for file in sorted(found) if file.suffix != ".pyc"]
+    hashes = [
+        f"{file.relative_to(path)} {content_digest(file)}"
+        for file in sorted(found)
+        if file.suffix != ".pyc"
+    ]
     return combined_digest(hashes) if hashes else ""
 
 

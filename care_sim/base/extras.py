@@ -16,9 +16,13 @@ def import_open3d() -> ModuleType:
     try:
         import open3d
     except ModuleNotFoundError as error:
-        raise MissingExtra(f"Open3D needs the extra 'open3d': pip install 'care-sim[open3d]' ({error})") from error
+        raise MissingExtra(
+            f"Open3D needs the extra 'open3d': pip install 'care-sim[open3d]' ({error})"
+        ) from error
     except (ImportError, OSError) as error:
-        raise MissingExtra(f"Open3D lacks a system library: apt-get install {OPEN3D_PACKAGES} ({error})") from error
+        raise MissingExtra(
+            f"Open3D lacks a system library: apt-get install {OPEN3D_PACKAGES} ({error})"
+        ) from error
     module: ModuleType = open3d
     return module
 
@@ -64,7 +68,9 @@ def _import(module: str, name: str, extra: str) -> ModuleType:
     try:
         return import_module(module)
     except ImportError as error:
-        raise MissingExtra(f"{name} needs the extra '{extra}': pip install 'care-sim[{extra}]' ({error})") from error
+        raise MissingExtra(
+            f"{name} needs the extra '{extra}': pip install 'care-sim[{extra}]' ({error})"
+        ) from error
 
 
 def _load_libusb() -> None:

@@ -1,4 +1,6 @@
-"""Files that are there whole or not at all: every file that CARE-Sim writes, but for journals, goes through here."""
+"""Files that are there whole or not at all: every file that CARE-Sim writes, but for journals, goes
+through here.
+"""
 
 import errno
 import os
@@ -15,7 +17,14 @@ from tempfile import TemporaryDirectory
 from care_sim.base.errors import InvalidInput
 
 PNG, GIF, WEBP, MP4 = rb"\x89PNG", rb"GIF8", rb"RIFF", rb".{4}ftyp"
-HTML, JSON, SVG, ZIP, PARQUET, RERUN = rb"<!DOCTYPE", rb"\s*[{[]", rb"<\?xml|<svg", rb"PK", rb"PAR1", rb"RRF"
+HTML, JSON, SVG, ZIP, PARQUET, RERUN = (
+    rb"<!DOCTYPE",
+    rb"\s*[{[]",
+    rb"<\?xml|<svg",
+    rb"PK",
+    rb"PAR1",
+    rb"RRF",
+)
 """What files of these kinds begin with, as patterns. Weights and checkpoints are ZIP."""
 
 _MORE_BYTES = 2**16
@@ -24,8 +33,9 @@ _being_written: set[Path] = set()
 
 @contextmanager
 def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
-    """A file to write to, with the same ending, which takes the place of `path` in one move at the end: readers see the
-    old file or the new. A link stays a link to it. What cannot be replaced, a device or a pipe, is written into.
+    """A file to write to, with the same ending, which takes the place of `path` in one move at the
+    end: readers see the old file or the new. A link stays a link to it. What cannot be replaced, a
+    device or a pipe, is written into.
 
     Raises what `check_output` does, before anything is computed; an error of writing names `path`.
     """
@@ -35,8 +45,9 @@ def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
 
 
 def check_output(path: Path, kind: bytes = b"") -> None:
-    """Raise InvalidInput for a `path` that nothing can be written to, that this process is writing already, or where
-    there is a file that does not begin like one of `kind`, OSError where writing is not allowed. The folder is made.
+    """Raise InvalidInput for a `path` that nothing can be written to, that this process is writing
+    already, or where there is a file that does not begin like one of `kind`, OSError where writing
+    is not allowed. The folder is made.
     """
     _resolved(path)
     if _is_stream(path):
@@ -71,10 +82,14 @@ def _check_old(path: Path, kind: bytes) -> None:
 
 @contextmanager
 def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
-    """A file beside what `path` is or links to, with its rights, which is moved there or, if not kept, removed."""
+    """A file beside what `path` is or links to, with its rights, which is moved there or, if not
+    kept, removed.
+    """
     place = _resolved(path)
     if place in _being_written:
-        raise InvalidInput(f"{path} is being written already: close what writes it, or name another file")
+        raise InvalidInput(
+            f"{path} is being written already: close what writes it, or name another file"
+        )
     unfinished = place.with_name(f".{_host()}.{os.getpid()}.{_end_of_name(place)}")
     _being_written.add(place)
     try:
@@ -93,7 +108,9 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
 
 
 def why_unwritable(path: Path) -> str | None:
-    """Why a file cannot grow, which libraries that wrote to it may not have told; None where it can."""
+    """Why a file cannot grow, which libraries that wrote to it may not have told; None where it
+    can.
+    """
     try:
         with path.open("ab", buffering=0) as file:
             written = file.write(bytes(_MORE_BYTES))

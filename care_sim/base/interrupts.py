@@ -1,6 +1,8 @@
-"""What ends a command from outside: an interrupt or a quit typed, a terminal that closes, a request to end.
+"""What ends a command from outside: an interrupt or a quit typed, a terminal that closes, a request
+to end.
 
-It imports nothing that takes time: the command `care-sim` is interrupted in one line from the first of its imports on.
+It imports nothing that takes time: the command `care-sim` is interrupted in one line from the first
+of its imports on.
 """
 
 import os
@@ -14,7 +16,11 @@ from typing import Any
 
 INTERRUPTED = 130
 """Exit code of what was interrupted."""
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name))
+SIGNALS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+    if hasattr(signal, name)
+)
 """All end a command in the same way."""
 _HEARD = (*SIGNALS, signal.SIGALRM)
 SOON_S = 0.02
@@ -27,9 +33,9 @@ def end_at_once() -> None:
 
 
 def raise_them() -> None:
-    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls into an import,
-    which may turn it into another error, comes after it, or with the next one; one that falls into code whose errors
-    nobody can catch (finalisers, callbacks) comes again.
+    """From now on an interrupt is a KeyboardInterrupt, raised where it is not lost: one that falls
+    into an import, which may turn it into another error, comes after it, or with the next one; one
+    that falls into code whose errors nobody can catch (finalisers, callbacks) comes again.
     """
     _listen(_raise)
     signal.signal(signal.SIGALRM, _raise)
@@ -37,7 +43,9 @@ def raise_them() -> None:
 
 
 def end_in_silence() -> None:
-    """From now on an interrupt is the system's to handle: all is said, and the interpreter is ending."""
+    """From now on an interrupt is the system's to handle: all is said, and the interpreter is
+    ending.
+    """
     signal.setitimer(signal.ITIMER_REAL, 0)
     _listen(signal.SIG_DFL)
 

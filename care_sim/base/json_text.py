@@ -7,16 +7,23 @@ from pathlib import Path
 from typing import Any
 
 MOST_LEVELS = 200
-"""Levels that lists and maps may be nested: more than any file here needs, few enough for all that walk them."""
+"""Levels that lists and maps may be nested: more than any file here needs, few enough for all that
+walk them.
+"""
 LARGEST = 2**28
-"""Bytes of a file: more than the longest of ours, the configurations of a study (100,000 tasks of 2 kB)."""
+"""Bytes of a file: more than the longest of ours, the configurations of a study (100,000 tasks of 2
+kB).
+"""
 
 
-def read(path: Path, most: int = LARGEST, taken: Callable[[dict[str, Any]], object] | None = None) -> Any:
-    """The content of a file of at most `most` bytes, every map in it replaced by what is `taken` of it.
+def read(
+    path: Path, most: int = LARGEST, taken: Callable[[dict[str, Any]], object] | None = None
+) -> Any:
+    """The content of a file of at most `most` bytes, every map in it replaced by what is `taken` of
+    it.
 
-    Raises OSError for a file that cannot be read, ValueError as `check_size` and `parsed` do, and for one that the
-    memory does not hold.
+    Raises OSError for a file that cannot be read, ValueError as `check_size` and `parsed` do, and
+    for one that the memory does not hold.
     """
     check_size(path, most)
     try:
@@ -26,7 +33,9 @@ def read(path: Path, most: int = LARGEST, taken: Callable[[dict[str, Any]], obje
 
 
 def check_size(path: Path, most: int = LARGEST) -> None:
-    """Raise ValueError for a file of more than `most` bytes, and for what is none, such as a device without end."""
+    """Raise ValueError for a file of more than `most` bytes, and for what is none, such as a device
+    without end.
+    """
     there = path.stat()
     if not stat.S_ISREG(there.st_mode):
         raise ValueError("it is no regular file")
@@ -37,8 +46,8 @@ def check_size(path: Path, most: int = LARGEST) -> None:
 def parsed(text: str | bytes, taken: Callable[[dict[str, Any]], object] | None = None) -> Any:
     """The content of a text, every map in it replaced by what is `taken` of it.
 
-    Raises ValueError for what is no JSON, and for what is nested deeper than `MOST_LEVELS`, or so deep that Python cannot
-    read it.
+    Raises ValueError for what is no JSON, and for what is nested deeper than `MOST_LEVELS`, or so
+    deep that Python cannot read it.
     """
     try:
         content = json.loads(text, object_hook=taken)

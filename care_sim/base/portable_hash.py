@@ -1,19 +1,23 @@
-"""Bytes that are equal wherever the same happened, for hashes: numbers that count exactly, measured ones rounded.
+"""Bytes that are equal wherever the same happened, for hashes: numbers that count exactly, measured
+ones rounded.
 
-Processors, mathematical libraries and their versions differ in the last bits of sine, arctangent or a matrix product.
-What is hashed as raw bits therefore moves with the machine although nothing else happened.
+Processors, mathematical libraries and their versions differ in the last bits of sine, arctangent or
+a matrix product. What is hashed as raw bits therefore moves with the machine although nothing else
+happened.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 STEP = 1e-4
-"""Metres, radians, metres a second: what measured numbers are rounded to. A whole episode computed with other features
-of the processor moves poses by less than 1e-13, and the float32 ranges of an observation by their last bit, 4e-6; what
-an outcome rests on (sizes, margins, the spacing of rays) is centimetres."""
+"""Metres, radians, metres a second: what measured numbers are rounded to. A whole episode computed
+with other features of the processor moves poses by less than 1e-13, and the float32 ranges of an
+observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of rays)
+is centimetres."""
 SHIFT = (5**0.5 - 1) / 2
-"""Shares of a step by which the borders between steps lie beside the round numbers that scenes are made of (0, 0.05,
-1.5, a half of anything): a number on a border would be rounded by its last bit."""
+"""Shares of a step by which the borders between steps lie beside the round numbers that scenes are
+made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
+"""
 
 _INFINITE, _NONE = 2**62, 2**62 + 1
 _LARGEST = 2.0**61
@@ -24,8 +28,8 @@ Content = str | ArrayLike
 def portable_bytes(*parts: Content | tuple[Content, ...]) -> bytes:
     """The bytes of texts, arrays and numbers, and of tuples of them, with their shapes.
 
-    Whole numbers and flags are taken exactly, the others to `STEP`; -0.0 is 0, float32 and float64 are one, infinities
-    and NaN are numbers of their own.
+    Whole numbers and flags are taken exactly, the others to `STEP`; -0.0 is 0, float32 and float64
+    are one, infinities and NaN are numbers of their own.
     """
     return b"".join(map(_bytes_of, parts))
 

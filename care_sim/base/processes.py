@@ -1,4 +1,6 @@
-"""Processes that this one starts: deaf to interrupts, which are this one's to handle, and gone when it is gone."""
+"""Processes that this one starts: deaf to interrupts, which are this one's to handle, and gone when
+it is gone.
+"""
 
 import multiprocessing
 import os
@@ -23,11 +25,12 @@ UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
 
 @contextmanager
 def starting() -> Iterator[None]:
-    """Processes started meanwhile, and theirs, never hear the terminal's interrupts; this one hears them afterwards,
-    when nothing is half started.
+    """Processes started meanwhile, and theirs, never hear the terminal's interrupts; this one hears
+    them afterwards, when nothing is half started.
     """
     with held_back():
-        # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a line.
+        # Blocked signals stay blocked over fork and exec: a new process is deaf before it runs a
+        # line.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, UNHEARD)
         try:
             # It outlives the processes whose leavings it clears away; starting it unblocks SIGINT.
@@ -39,12 +42,15 @@ def starting() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """End this process, which multiprocessing started, as soon as the one that asked for it is gone, however that
-    ended. Of a fork server's workers that is not the fork server, which goes when the last of them has gone.
+    """End this process, which multiprocessing started, as soon as the one that asked for it is
+    gone, however that ended. Of a fork server's workers that is not the fork server, which goes
+    when the last of them has gone.
     """
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=_end_after, args=[parent], name="end with parent", daemon=True).start()
+        threading.Thread(
+            target=_end_after, args=[parent], name="end with parent", daemon=True
+        ).start()
 
 
 def following(make: Callable[[], T]) -> T:
@@ -55,7 +61,9 @@ def following(make: Callable[[], T]) -> T:
 
 def end_with_starter(starter: int) -> None:
     """End this process, an interpreter that the process `starter` started, as soon as that is gone."""
-    threading.Thread(target=_end_without, args=[starter], name="end with starter", daemon=True).start()
+    threading.Thread(
+        target=_end_without, args=[starter], name="end with starter", daemon=True
+    ).start()
 
 
 def _end_without(starter: int) -> None:

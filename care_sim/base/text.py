@@ -2,12 +2,14 @@
 
 
 def printable(text: str) -> str:
-    """The text with what a terminal or a file would obey rather than show (control codes, directions, halves of
-    characters) written as escapes.
+    """The text with what a terminal or a file would obey rather than show (control codes,
+    directions, halves of characters) written as escapes.
     """
     if text.isprintable():
         return text
-    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+    return "".join(
+        sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text
+    )
 
 
 def percent(budget: float) -> str:

@@ -76,5 +76,5 @@ def found(config: "PlayConfig") -> "dict[str, list[Row]]":
     from care_sim.study.scene_play import play
 
     film = config.source.film(config.scene)
-    moments = zip(film.shots, play(config, film).exposures, strict=True)
-    return {shot.token: boxes(shot, exposure.detections, exposure.velocities) for shot, exposure in moments}
+    moments = zip(film.shots, play(config, film).keyframes, strict=True)
+    return {shot.token: boxes(shot, record.detections, record.velocities) for shot, record in moments}

@@ -1,4 +1,6 @@
-"""The action of the environments: a score per cell, the cells that it fires, and the share of the budget of each."""
+"""The action of the environments: a score per cell, the cells that it fires, and the share of the
+budget of each.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,9 @@ def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
     return scores.reshape(shape)
 
 
-def fired_cells(scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, floor: Cells | None) -> Cells:
+def fired_cells(
+    scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, floor: Cells | None
+) -> Cells:
     """The cells an action fires, ascending: the `budget` highest strictly positive scores, ties by
     ascending index, topped up from `floor` when there are fewer (None leaves them unspent).
     """
@@ -25,7 +29,9 @@ def fired_cells(scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, f
     if len(chosen) > budget:
         chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]
     elif floor is not None and len(chosen) < budget:
-        free = floor[:budget]  # enough of it, whatever is chosen: of these at most len(chosen) are taken
+        free = floor[
+            :budget
+        ]  # enough of it, whatever is chosen: of these at most len(chosen) are taken
         chosen = np.concatenate([chosen, free[flat[free] <= 0][: budget - len(chosen)]])
     return np.sort(chosen)
 
@@ -39,9 +45,9 @@ NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN = range(len(SHARES))
 def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> NDArray[np.uint8]:
     """(E, A) the share of every cell, an index into `SHARES`.
 
-    Exploitation fills first, whatever the layers ask for, so that the allocator without the layers tells where it
-    ended. Without the `demand` behind the `action`, or if it is not the one behind it, what the action scored is no
-    more than "chosen".
+    Exploitation fills first, whatever the layers ask for, so that the allocator without the layers
+    tells where it ended. Without the `demand` behind the `action`, or if it is not the one behind
+    it, what the action scored is no more than "chosen".
     """
     shares = np.zeros(rig.grid.size, np.uint8)
     shares[fired] = FLOOR
@@ -51,5 +57,7 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
         taken = allocate(demand, rig.budget, rig.reserve_fraction)
         if np.array_equal(np.sort(taken), scored):
             shares[taken] = RESERVE
-            shares[allocate(Demand(demand.exploitation), rig.budget, rig.reserve_fraction)] = EXPLOITATION
+            shares[allocate(Demand(demand.exploitation), rig.budget, rig.reserve_fraction)] = (
+                EXPLOITATION
+            )
     return shares.reshape(rig.grid.shape)

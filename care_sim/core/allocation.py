@@ -1,12 +1,18 @@
-"""Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced."""
+"""Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced.
+
+Exploitation comes first, then the reserve layers, then the shared random floor. Eq. 1, the budget
+in cells, stands here as well.
+"""
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole, is_number
+from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.base.text import shown
 from care_sim.core.grid import Cells, cell_indices
@@ -17,67 +23,99 @@ RESERVE_FRACTION = 0.3
 HIGHEST_CELL = 2**24
 """A thousand times the cells of the paper's grid."""
 
-SETS = "a list of sets of cells"
+_SETS = "a list of sets of cells"
 _NO_CELLS = np.empty(0, np.int64)
 
 
 def budget_cells(budget: float, cells: int) -> int:
-    """B = round(beta * N) (Eq. 1). Raises InvalidInput for a fraction outside (0, 1] or without a cell."""
+    """B = round(beta * N) (Eq. 1): the cells that a fraction `budget` of all `cells` is.
+
+    Raises InvalidInput for a fraction outside (0, 1], and for one that leaves no cell.
+    """
     if not (is_number(budget) and 0 < budget <= 1):
         raise InvalidInput(f"budget must lie in (0, 1], got {shown(budget)}")
     if round(float(budget) * cells) < 1:
-        raise InvalidInput(f"budget {budget} leaves no cell of {cells}; the least is {1 / cells:.2g}")
+        raise InvalidInput(
+            f"budget {budget} leaves no cell of {cells}; the least is {1 / cells:.2g}"
+        )
     return round(float(budget) * cells)
 
 
-def allocate(demand: Demand, budget: int, reserve_fraction: float, floor: Sequence[int] | Cells | None = None) -> Cells:
-    """Choose at most `budget` cells, in order of selection.
+def allocate(
+    demand: Demand,
+    budget: int,
+    reserve_fraction: float,
+    floor: Sequence[int] | Cells | None = None,
+) -> Cells:
+    """Choose at most `budget` cells, in order of selection (Algorithm 1).
 
-    Exploitation sets fill at most round((1 - rho) B) cells, round-robin; then each reserve layer in
-    order, round-robin, up to B; then `floor`, a permutation of all cells, up to B. Within a set cells
-    are taken in ascending order, and a cell already taken costs the set no turn. rho = 0 keeps no
-    reserve: layers then take only what exploitation leaves. Raises InvalidInput for another
-    form of demand or floor.
+    Exploitation sets fill at most round((1 - rho) B) cells, round-robin. Then each reserve layer in
+    order fills up to B, round-robin. Then `floor`, a permutation of all cells, fills up to B; None
+    leaves the rest unspent. Within a set, cells are taken in ascending order, and a cell that is
+    already taken costs the set no turn. rho = 0 keeps no reserve: layers then take only what
+    exploitation leaves. Raises InvalidInput for another form of demand or floor.
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     check_whole("budget", budget, 0, HIGHEST_CELL)
     if not isinstance(demand, Demand):
         raise InvalidInput(f"demand must be a Demand, got {shown(demand)}")
-    layers = _listed("layers", "a list of layers", demand.layers)
-    stages = [_listed("exploitation", SETS, demand.exploitation), *(_listed("a layer", SETS, one) for one in layers)]
+    layers = _sequence("layers", "a list of layers", demand.layers)
+    stages = [
+        _sequence("exploitation", _SETS, demand.exploitation),
+        *(_sequence("a layer", _SETS, layer) for layer in layers),
+    ]
+    # A layer may use all that is left of B, so that it inherits what exploitation did not need.
     limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(layers)
-    chosen = _in_turns(stages, limits)
-    return chosen if floor is None else np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
+    chosen = _filled(stages, limits)
+    if floor is None:
+        return chosen
+    return np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
 
 
-def _listed(name: str, form: str, given: Any) -> Sequence[Any]:
-    """What a demand holds there. Raises InvalidInput unless it is a sequence."""
+class RandomFloor:
+    """The shared random floor: at every keyframe a permutation of all cells, the same for every
+    policy that plays the episode. Number 0 is the seed's own floor, the others are drawn from its
+    children.
+    """
+
+    def __init__(self, seed: np.random.SeedSequence, number: int, cells: int):
+        children = (number - 1,) if number else ()
+        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
+        self._rng = np.random.default_rng(own)
+        self._cells = cells
+
+    def next(self) -> Cells:
+        """The floor of the coming keyframe. It must be drawn at every keyframe, spent or not."""
+        return self._rng.permutation(self._cells)
+
+
+def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
+    """A part of a demand. Raises InvalidInput unless it is a sequence."""
     if not (given.ndim if isinstance(given, np.ndarray) else isinstance(given, Sequence)):
         raise InvalidInput(f"{name} must be {form}, got {shown(given)}")
     sequence: Sequence[Any] = given
     return sequence
 
 
-def _in_turns(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
-    """Stage after stage, round-robin over its sets up to its limit in all."""
-    from care_sim.core.allocation_kernels import in_turns, survey
-
+def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
+    """Stage after stage, round-robin over its sets, up to its limit in all."""
     sets = [cell_indices(cells) for stage in stages for cells in stage]
     cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
     ends = np.array([*accumulate(map(len, sets))], np.int64)
-    lowest, highest, ascending = survey(cells, ends)
+    lowest, highest, ascending = _survey(cells, ends)
     if highest - lowest > HIGHEST_CELL:
-        raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {lowest if lowest < 0 else highest}")
+        wrong = lowest if lowest < 0 else highest
+        raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
     if not ascending:
         cells = np.concatenate([np.sort(part) for part in np.split(cells, ends)])
     last_sets = np.array([*accumulate(map(len, stages))], np.int64)
-    chosen: Cells = in_turns(cells, ends, last_sets, np.array(limits, np.int64), (lowest, highest))
-    return chosen
+    return _fill_stages(cells, ends, last_sets, np.array(limits, np.int64), lowest, highest)
 
 
 def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
     """The first `count` cells of the floor that are not chosen."""
-    taken, free = set(chosen.tolist()), list[int]()
+    taken = set(chosen.tolist())
+    free = list[int]()
     for cell in cell_indices(floor, "floor").tolist():
         if len(free) >= count:
             break
@@ -87,14 +125,92 @@ def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
     return np.array(free, np.int64)
 
 
-class RandomFloor:
-    """Number 0 is the seed's own floor, the others are drawn from its children."""
+class _Sets(NamedTuple):
+    """Sets of cells: set s still offers `cells[places[s]:ends[s]]`."""
 
-    def __init__(self, seed: np.random.SeedSequence, number: int, cells: int):
-        children = (number - 1,) if number else ()
-        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
-        self._rng, self._cells = np.random.default_rng(own), cells
+    cells: Cells
+    places: Cells
+    ends: Cells
 
-    def next(self) -> Cells:
-        """The floor of the coming keyframe; to be drawn at every one, spent or not."""
-        return self._rng.permutation(self._cells)
+
+class _Selection(NamedTuple):
+    """The cells chosen so far, in order, at the start of `chosen`; `taken[cell - lowest]` says of
+    every cell whether it is among them.
+    """
+
+    chosen: Cells
+    taken: NDArray[np.bool_]
+    lowest: int
+
+
+@compiled()
+def _survey(cells: Cells, ends: Cells) -> tuple[int, int, bool]:
+    """Lowest (at most 0) and highest (at least 0) of the cells, and whether every set is ascending.
+
+    Sets lie one after the other in `cells`; set s ends at `ends[s]`.
+    """
+    lowest = highest = start = 0
+    ascending = True
+    for end in ends:
+        for n in range(start, end):
+            lowest, highest = min(lowest, cells[n]), max(highest, cells[n])
+            ascending &= n == start or cells[n - 1] <= cells[n]
+        start = end
+    return lowest, highest, ascending
+
+
+@compiled()
+def _fill_stages(
+    cells: Cells, ends: Cells, last_sets: Cells, limits: Cells, lowest: int, highest: int
+) -> Cells:
+    """The cells taken, in order of selection.
+
+    Sets lie as in `_survey`, each ascending. Stages of sets follow each other likewise: stage k
+    ends at set `last_sets[k]` and fills up to `limits[k]` cells in all. No cell is lower than
+    `lowest` (at most 0) or higher than `highest`.
+    """
+    # A set offers its cells from its own start, which is where the set before it ends.
+    places = np.empty(len(ends), np.int64)
+    places[:1], places[1:] = 0, ends[:-1]
+    sets = _Sets(cells, places, ends)
+
+    # Negative indices are refused later by whoever knows the grid. The table of what is taken must
+    # hold them until then, hence the offset.
+    taken = np.zeros(highest - lowest + 1, np.bool_)
+    chosen = np.empty(max(0, min(limits.max(), len(cells))), np.int64)
+    selection = _Selection(chosen, taken, lowest)
+
+    count = first = 0
+    for stage, last in enumerate(last_sets):
+        count = _round_robin(sets, np.arange(first, last), selection, count, limits[stage])
+        first = last
+    return chosen[:count]
+
+
+@compiled()
+def _round_robin(sets: _Sets, waiting: Cells, selection: _Selection, count: int, limit: int) -> int:
+    """Take one cell per set and round, until `limit` cells are chosen or all sets have run dry.
+
+    `waiting` are the numbers of the sets; `count` cells are chosen before. Returns how many are
+    chosen afterwards.
+    """
+    left = len(waiting)
+    while left and count < limit:
+        going = 0
+        for one in waiting[:left]:
+            # Cells that are already taken are passed over, and cost the set no turn.
+            place = sets.places[one]
+            while place < sets.ends[one] and selection.taken[sets.cells[place] - selection.lowest]:
+                place += 1
+            sets.places[one] = place + 1
+
+            # A set that gave a cell waits for the next round, in the same order. Writing it back
+            # into `waiting` is safe: `going` never overtakes the place that is being read.
+            if place < sets.ends[one] and count < limit:
+                selection.taken[sets.cells[place] - selection.lowest] = True
+                selection.chosen[count] = sets.cells[place]
+                count += 1
+                waiting[going] = one
+                going += 1
+        left = going
+    return count

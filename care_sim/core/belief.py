@@ -12,35 +12,29 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
-_LABELS = frozenset(range(len(CLASSES)))
-
-
 MAX_DETECTIONS = 128
 """Rows of the observation; six cameras in dense traffic saw up to 67 boxes in recorded drives."""
-
-
 MAX_TRACKS = 256
 """Rows of the observation: one that explains every detection, and as many again."""
-
-
 OBSERVED = ("ego", "budget", "detections", "tracks", "ranges")
 """What an observation consists of."""
-
-
 HIGHEST = 2.0**24
-"""No number of an observation is larger: the largest whole number that float32 holds beside all smaller ones."""
-
+"""No number of an observation is larger: the largest whole number that float32 holds beside all
+smaller ones."""
 
 Observation = Mapping[str, NDArray[np.float32]]
+
+_LABELS = frozenset(range(len(CLASSES)))
 
 
 @dataclass(frozen=True)
 class Belief:
-    """All a policy may know when it chooses: what Gymnasium shows, and nothing else.
+    """All that a policy may know when it chooses: what Gymnasium shows, and nothing else.
 
-    `budget` is B, the number of cells that may fire; `detections` are the camera's, `tracks` the
-    forecasts for this keyframe; `ranges` (E, A) the last scan, 0 not fired, maximum range no return. The loops make
-    it with `care_sim.core.observation_limits`, within what an observation can hold.
+    `ego` is the car's own motion as its odometry reads it. `budget` is B, the number of cells that
+    may fire. `detections` are the camera's, `tracks` the forecasts for this keyframe. `ranges`
+    (E, A) are the last scan in metres: 0 not fired, maximum range no return. The loops make it with
+    `care_sim.core.observation_limits`, within what an observation can hold.
     """
 
     ego: Ego
@@ -51,27 +45,39 @@ class Belief:
 
     @classmethod
     def from_observation(cls, observation: Observation) -> "Belief":
-        """Read an observation of the environments back, without loss. Raises InvalidInput for another."""
+        """Read an observation of the environments back, without loss.
+
+        Raises InvalidInput for anything else: another structure, another shape, numbers that no
+        sensor says.
+        """
         if not (isinstance(observation, Mapping) and all(key in observation for key in OBSERVED)):
-            raise InvalidInput("an observation of CARE-Sim's environments is needed, as they give it without wrappers")
-        ego, (budget,) = (_numbers(observation, key, size) for key, size in (("ego", 3), ("budget", 1)))
-        ranges = _read(observation, "ranges", (None, None)).astype(np.float32, copy=False)
+            raise InvalidInput(
+                "an observation of CARE-Sim's environments is needed, as they give it without wrappers"
+            )
+        ego = _vector(observation, "ego", 3)
+        (budget,) = _vector(observation, "budget", 1)
+        ranges = _array(observation, "ranges", (None, None)).astype(np.float32, copy=False)
         if not ranges.size:
             raise InvalidInput("ranges of an observation must hold a cell at least")
-        if not (0 <= budget <= 1 and ranges.min(initial=0) >= 0 and ranges.max(initial=0) <= HIGHEST):
-            raise InvalidInput("an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more")
+        # NaN fails both comparisons, so that finite numbers need no check of their own.
+        fits = ranges.min(initial=0) >= 0 and ranges.max(initial=0) <= HIGHEST
+        if not (0 <= budget <= 1 and fits):
+            raise InvalidInput(
+                "an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more"
+            )
         return cls(
             Ego(*ego),
             round(budget * ranges.size),
-            ImageDetections.from_rows(_rows(observation, "detections", ImageDetections.COLUMNS)),
-            Tracks.from_rows(_rows(observation, "tracks", Tracks.COLUMNS)),
+            ImageDetections.from_table(_rows(observation, "detections", ImageDetections.COLUMNS)),
+            Tracks.from_table(_rows(observation, "tracks", Tracks.COLUMNS)),
             ranges,
         )
 
     def to_observation(self) -> dict[str, NDArray[np.float32]]:
         """The fixed-shape float32 arrays of the environments' observation space, new ones.
 
-        Raises InvalidInput for more rows than a table has, since what were left out would be missed in silence.
+        Raises InvalidInput for more rows than a table has: what were left out would be missed in
+        silence.
         """
         ego = np.array([self.ego.speed, self.ego.yaw_rate, self.ego.acceleration], np.float32)
         return {
@@ -83,44 +89,61 @@ class Belief:
         }
 
 
-def _read(observation: Observation, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another shape."""
+def _array(observation: Observation, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another
+    shape or type.
+    """
     array = as_array(f"{key} of an observation", observation[key])
-    fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+    fits = array.ndim == len(shape) and all(
+        n in (None, m) for n, m in zip(shape, array.shape, strict=True)
+    )
     if not (fits and array.dtype.kind in "iuf"):
         wanted = " x ".join("any" if n is None else str(n) for n in shape)
-        raise InvalidInput(f"{key} of an observation must be {wanted} numbers, got {array.dtype} of {array.shape}")
+        raise InvalidInput(
+            f"{key} of an observation must be {wanted} numbers, got {array.dtype} of {array.shape}"
+        )
     return array
 
 
-def _numbers(observation: Observation, key: str, size: int) -> list[float]:
+def _vector(observation: Observation, key: str, size: int) -> list[float]:
     """A vector of an observation. Raises InvalidInput for what no sensor says."""
-    numbers: list[float] = _read(observation, key, (size,)).tolist()
+    numbers: list[float] = _array(observation, key, (size,)).tolist()
     if not all(-HIGHEST <= number <= HIGHEST for number in numbers):
-        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+        raise _beyond(key)
     return numbers
 
 
-def _rows(observation: Observation, key: str, columns: Sequence[str]) -> NDArray[Any]:
-    """The rows of a table that are no padding. Raises InvalidInput for those that are neither padding nor of a known
-    class, and for what no sensor says.
+def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
+    """The rows of a table that are no padding, checked here once and for all. Raises InvalidInput
+    for rows that are neither padding nor of a known class, and for what no sensor says.
     """
-    table = _read(observation, key, (None, len(columns)))
-    given = table[:, 0] >= 0
-    rows = table[given]
-    if not (rows.min(initial=0) >= -HIGHEST and rows.max(initial=0) <= HIGHEST):
-        raise InvalidInput(f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN")
+    table = _array(observation, key, (None, len(columns)))
+    first = table[:, 0]
+    rows: Floats = table[first >= 0].astype(np.float64)
+    if len(rows) and not (rows.min() >= -HIGHEST and rows.max() <= HIGHEST):
+        raise _beyond(key)
+    padding = int(np.count_nonzero(first == -1))
     leads, labels = rows[:, 0].tolist(), rows[:, columns.index("class")].tolist()
-    padded = (table[~given, 0] == -1).all()
-    if not (padded and all(label in _LABELS for label in labels) and all(lead == int(lead) for lead in leads)):
+    if (
+        padding + len(rows) != len(table)
+        or not _LABELS.issuperset(labels)
+        or not all(map(float.is_integer, leads))
+    ):
         raise InvalidInput(
-            f"{key} of an observation: a row must begin with a whole number, -1 where it is padding, and be of a class "
-            f"0 to {len(CLASSES) - 1}"
+            f"{key} of an observation: a row must begin with a whole number, -1 where it is padding,"
+            f" and be of a class 0 to {len(CLASSES) - 1}"
         )
     return rows
 
 
+def _beyond(key: str) -> InvalidInput:
+    return InvalidInput(
+        f"{key} of an observation must hold numbers up to {HIGHEST:g}, none of them NaN"
+    )
+
+
 def _padded(what: str, rows: Floats, length: int) -> NDArray[np.float32]:
+    """A table of `length` rows, of which those that are left over begin with -1."""
     if len(rows) > length:
         raise InvalidInput(f"an observation holds {length} {what} at most, got {len(rows)}")
     table = np.zeros((length, rows.shape[1]), np.float32)

@@ -1,7 +1,8 @@
 """The conditions of an environment: how well the car senses, and how its budget is spent.
 
-The fields are at once keyword arguments of the environments, options of the command line and columns of
-the results. Every fault is off by default. Their bounds are far beyond what any sensor does.
+The fields are at once keyword arguments of the environments, options of the command line and
+columns of the results. Every fault is off by default. Their bounds are far beyond what any sensor
+does.
 """
 
 from dataclasses import dataclass, fields
@@ -39,8 +40,9 @@ class CameraFaults:
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
     false_positive_rate: float = bounded(0.0, 0, MOST_FALSE_BOXES)
-    """Mean number of boxes in a picture that show nothing; each by itself is much like the true ones, which they are
-    drawn from (`care_sim.sensors.false_boxes`), so that where the camera never sees anybody there are none.
+    """Mean number of boxes in a picture that show nothing; each by itself is much like the true
+    ones, which they are drawn from (`care_sim.sensors.false_boxes`), so that where the camera never
+    sees anybody there are none.
     """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""
@@ -51,13 +53,19 @@ class CameraFaults:
     blackout_s: float = bounded(0.0, 0, LONGEST_BLACKOUT_S)
     """How long the camera's pictures are black, seconds."""
     camera_rotation_sigma_deg: float = bounded(0.0, 0, 180)
-    """Spread of the error in yaw and pitch with which the camera is mounted, degrees; drawn once an episode."""
+    """Spread of the error in yaw and pitch with which the camera is mounted, degrees; drawn once an
+    episode.
+    """
     camera_position_sigma_m: float = bounded(0.0, 0, 10)
-    """Spread of the error in x, y and z with which the camera is mounted, metres; drawn once an episode."""
+    """Spread of the error in x, y and z with which the camera is mounted, metres; drawn once an
+    episode.
+    """
 
     def black_at(self, time_s: float) -> bool:
         """Whether a picture taken at `time_s` is black."""
-        return self.blackout_start_s - 1e-9 <= time_s < self.blackout_start_s + self.blackout_s - 1e-9
+        return (
+            self.blackout_start_s - 1e-9 <= time_s < self.blackout_start_s + self.blackout_s - 1e-9
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +73,8 @@ class LidarFaults:
     """What the LiDAR gets wrong."""
 
     lidar_range_sigma: float = bounded(0.0, 0, 50)
-    """Gaussian noise on every range, metres, folded back at 0 and at the reach; policies meet it, the proxy detector,
-    whose boxes are true, does not.
+    """Gaussian noise on every range, metres, folded back at 0 and at the reach; policies meet it,
+    the proxy detector, whose boxes are true, does not.
     """
     lidar_dropout: float = bounded(0.0, 0, 1)
     """Share of returns that are lost, 0 to 1."""
@@ -75,7 +83,9 @@ class LidarFaults:
 
     def _settle_rows(self) -> None:
         rows: Any = self.lidar_dead_rows
-        if not (isinstance(rows, list | tuple) or (isinstance(rows, np.ndarray) and rows.ndim == 1)):
+        if not (
+            isinstance(rows, list | tuple) or (isinstance(rows, np.ndarray) and rows.ndim == 1)
+        ):
             raise InvalidInput(f"lidar_dead_rows must be a list of rows, got {shown(rows)}")
         for row in rows:
             check_whole("lidar_dead_rows", row, 0, MOST_ROWS)
@@ -84,20 +94,24 @@ class LidarFaults:
 
 @dataclass(frozen=True, kw_only=True)
 class Sensing(CameraFaults, LidarFaults):
-    """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and odometry."""
+    """How well the car senses: engine, thresholds, and everything that degrades camera, LiDAR and
+    odometry.
+    """
 
     ego_speed_sigma: float = bounded(0.0, 0, 10)
-    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns the sign. The
-    acceleration beside it is exact.
+    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns
+    the sign. The acceleration beside it is exact.
     """
     engine: str = "fast"
-    """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`, PyBullet's own, the
-    reference.
+    """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`,
+    PyBullet's own, the reference.
     """
     min_returns: int = bounded(MIN_RETURNS, 1, LARGEST_INTEGER)
     """Fired rays that must hit an object for it to be detected."""
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
-    """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has 0.25."""
+    """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
+    0.25.
+    """
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -108,7 +122,8 @@ class Sensing(CameraFaults, LidarFaults):
 class Conditions(Sensing):
     """All conditions: sensing, and how the budget is spent.
 
-    `care_sim.core.rig.Rig` checks what the allocator is given, the environments whether engine and rows exist.
+    `care_sim.core.rig.Rig` checks what the allocator is given, the environments whether engine and
+    rows exist.
     """
 
     reserve_fraction: float = bounded(RESERVE_FRACTION, 0, 1)

@@ -48,7 +48,9 @@ class Forgetting:
         self._streaks: dict[int, int] = {}
 
     def margins(self, tracks: Tracks, ego: Ego) -> tuple[Cells, NDArray[np.bool_]]:
-        """Advance the streaks by one keyframe: (n,) azimuth margins and (n,) which tracks are low-critical."""
+        """Advance the streaks by one keyframe: (n,) azimuth margins and (n,) which tracks are
+        low-critical.
+        """
         low = self._low_criticality(tracks, ego)
         ids = tracks.ids.tolist()
         self._streaks = {

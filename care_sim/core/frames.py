@@ -24,11 +24,21 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
 
 
 _LOCKED = 1 - 1e-13
-"""Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it is told as yaw."""
+"""Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it is told
+as yaw.
+"""
 
-_CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))])
+_CORNERS = np.array(
+    [
+        [x, y, z]
+        for z in (-0.5, 0.5)
+        for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
+    ]
+)
 
-BOX_EDGES = np.array([(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)])
+BOX_EDGES = np.array(
+    [(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)]
+)
 """(12, 2) the edges of a box, as pairs of `box_corners`."""
 
 
@@ -39,8 +49,9 @@ def box_corners(boxes: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Frame:
-    """Origin (world x, y, z in metres) and orientation of a frame: turned by `yaw` about z, then by `pitch` about
-    its own y, which lowers its front, then by `roll` about its own x, which lowers its right (radians; ISO 8855).
+    """Origin (world x, y, z in metres) and orientation of a frame: turned by `yaw` about z, then by
+    `pitch` about its own y, which lowers its front, then by `roll` about its own x, which lowers
+    its right (radians; ISO 8855).
     """
 
     x: float
@@ -63,7 +74,11 @@ class Frame:
         lowers = 2 * (w * j - i * k)
         if abs(lowers) > _LOCKED:
             left = rotation.as_matrix()[:, 1].tolist()
-            yaw, pitch, roll = math.atan2(-left[0], left[1]), math.copysign(math.pi / 2, lowers), 0.0
+            yaw, pitch, roll = (
+                math.atan2(-left[0], left[1]),
+                math.copysign(math.pi / 2, lowers),
+                0.0,
+            )
         else:
             yaw, pitch, roll = rotation.as_euler("ZYX").tolist()
         x, y, z = origin.tolist()
@@ -93,16 +108,22 @@ class Frame:
         return turned(vectors, -self.yaw) if self._upright else vectors @ self.rotation.as_matrix()
 
     def boxes_to_local(self, boxes: Floats) -> Floats:
-        """World boxes (n, 7) seen in this frame: exact centres, headings projected on its x, y plane."""
+        """World boxes (n, 7) seen in this frame: exact centres, headings projected on its x, y
+        plane.
+        """
         if self._upright:
             return _moved(boxes - self._offset, -self.yaw)
-        return _replaced(boxes, self.vectors_to_local(boxes[:, :3] - self.origin), self.vectors_to_local)
+        return _replaced(
+            boxes, self.vectors_to_local(boxes[:, :3] - self.origin), self.vectors_to_local
+        )
 
     def boxes_to_world(self, boxes: Floats) -> Floats:
         """Boxes (n, 7) of this frame in the world: exact centres, headings projected on the ground."""
         if self._upright:
             return _moved(boxes, self.yaw) + self._offset
-        return _replaced(boxes, self.origin + self.vectors_to_world(boxes[:, :3]), self.vectors_to_world)
+        return _replaced(
+            boxes, self.origin + self.vectors_to_world(boxes[:, :3]), self.vectors_to_world
+        )
 
     @property
     def _upright(self) -> bool:

@@ -17,6 +17,7 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
+from care_sim.core.grid_kernels import GridSpacing, rectangle_cells, silhouettes
 
 Cells = NDArray[np.int64]
 
@@ -45,7 +46,9 @@ class AngularGrid:
     def __post_init__(self) -> None:
         check_fields(self, " of the grid")
         if self.bottom >= self.top:
-            raise InvalidInput(f"bottom of the grid must lie below its top, {self.top:g}, got {self.bottom:g}")
+            raise InvalidInput(
+                f"bottom of the grid must lie below its top, {self.top:g}, got {self.bottom:g}"
+            )
 
     @property
     def size(self) -> int:
@@ -69,10 +72,14 @@ class AngularGrid:
 
     @cached_property
     def fan(self) -> tuple[Floats, Floats]:
-        """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of every row (rows, 2)."""
+        """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of
+        every row (rows, 2).
+        """
         azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
         elevations = np.linspace(self.top, self.bottom, self.rows)
-        across, down = (np.stack([np.cos(angles), np.sin(angles)], axis=1) for angles in (azimuths, elevations))
+        across, down = (
+            np.stack([np.cos(angles), np.sin(angles)], axis=1) for angles in (azimuths, elevations)
+        )
         across.flags.writeable = down.flags.writeable = False
         return across, down
 
@@ -81,7 +88,9 @@ class AngularGrid:
         """(N, 3) unit vectors of the rays, one through the centre of every cell."""
         (cos_az, sin_az), (cos_el, sin_el) = (angles.T for angles in self.fan)
         level = np.broadcast_to(sin_el[:, None], self.shape)
-        directions = np.stack([np.outer(cos_el, cos_az), np.outer(cos_el, sin_az), level], axis=-1).reshape(-1, 3)
+        directions = np.stack(
+            [np.outer(cos_el, cos_az), np.outer(cos_el, sin_az), level], axis=-1
+        ).reshape(-1, 3)
         directions.flags.writeable = False
         return directions
 
@@ -108,17 +117,16 @@ class AngularGrid:
         """The dilated angular rectangle of every box, as ascending cells.
 
         `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
-        number or one a box. A box that surrounds the sensor covers every column.
+        number, or one per box. A box that surrounds the sensor covers every column.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 7)
         if not len(boxes):
             return []
-        from care_sim.core.rectangles import silhouettes
-
         planar, upright, around = silhouettes(boxes)
         azimuths = np.arctan2(planar[..., 1], planar[..., 0])
         elevations = np.arctan2(upright[..., 0], upright[..., 1])
-        return self._sectors(azimuths, elevations, np.where(around, self.columns, azimuth_margin), elevation_margin)
+        margins = np.where(around, self.columns, azimuth_margin)
+        return self._rectangles(azimuths, elevations, margins, elevation_margin)
 
     def wedges(
         self,
@@ -134,21 +142,27 @@ class AngularGrid:
         if not len(bundles):
             return []
         x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
+        azimuths, elevations = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
         margins = np.full(len(bundles), azimuth_margin)
-        return self._sectors(np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)), margins, elevation_margin)
+        return self._rectangles(azimuths, elevations, margins, elevation_margin)
 
     def _row(self, elevation: Floats) -> Cells:
+        """The row of every elevation, as the rays' are equally far apart; any whole number."""
         return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
 
-    def _sectors(self, azimuths: Floats, elevations: Floats, margins: Cells, elevation_margin: int) -> list[Cells]:
-        from care_sim.core.rectangles import sectors
-
-        cells, ends = sectors(azimuths, elevations, margins, elevation_margin, self._lattice)
+    def _rectangles(
+        self, azimuths: Floats, elevations: Floats, margins: Cells, elevation_margin: int
+    ) -> list[Cells]:
+        """The cells of every rectangle; see `care_sim.core.grid_kernels.rectangle_cells`."""
+        cells, ends = rectangle_cells(
+            azimuths, elevations, margins, elevation_margin, self._spacing
+        )
         return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
 
     @cached_property
-    def _lattice(self) -> tuple[int, int, float, float, float]:
-        return self.columns, self.rows, self.column_width, float(self.top), float(self.row_height)
+    def _spacing(self) -> GridSpacing:
+        top, height = float(self.top), float(self.row_height)
+        return GridSpacing(self.columns, self.rows, self.column_width, top, height)
 
 
 def cell_indices(cells: Sequence[int] | Cells, name: str = "a set of cells") -> NDArray[np.integer]:

@@ -1,7 +1,8 @@
-"""What an observation can hold: the bounds of its numbers, and which rows its tables keep. Both loops ask here.
+"""What an observation can hold: the bounds of its numbers, and which rows its tables keep. Both
+loops ask here.
 
-A bound is what the sensors can tell. What goes beyond is mended before a policy or the controller reads it, column by
-column:
+A bound is what the sensors can tell. What goes beyond is mended before a policy or the controller
+reads it, column by column:
 
 | columns | bound | beyond it |
 |---|---|---|
@@ -15,9 +16,10 @@ column:
 | length, width, height | 50 m | clipped |
 | ids and counts | 2^24, the largest whole number that float32 holds beside all smaller ones | clipped |
 
-The tables have `MAX_DETECTIONS` and `MAX_TRACKS` rows. Of more detections the first stay: the camera gives the surest
-first. Of more tracks there stay, for every detection, the nearest forecast that explains it, so that Eq. 2 finds
-explained what it would with all of them, and then the nearest; nearest first, as ever.
+The tables have `MAX_DETECTIONS` and `MAX_TRACKS` rows. Of more detections the first stay: the
+camera gives the surest first. Of more tracks there stay, for every detection, the nearest forecast
+that explains it, so that Eq. 2 finds explained what it would with all of them, and then the
+nearest; nearest first, as ever.
 """
 
 from dataclasses import dataclass
@@ -27,7 +29,7 @@ import numpy as np
 
 from care_sim.core.belief import HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.frames import Floats
-from care_sim.core.residual import explainers
+from care_sim.core.residual import explaining_tracks
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
@@ -44,8 +46,8 @@ _PLACE, _YAW, _VELOCITY = slice(2, 5), 8, slice(9, 11)
 
 @dataclass(frozen=True)
 class Limits:
-    """The bounds of a rig's observations, as tables of two rows, least and most: `ego` (2, 3), `detections` (2, 9) and
-    `tracks` (2, 13), columns as in `care_sim.core.types`.
+    """The bounds of a rig's observations, as tables of two rows, least and most: `ego` (2, 3),
+    `detections` (2, 9) and `tracks` (2, 13), columns as in `care_sim.core.types`.
     """
 
     rig: Rig
@@ -70,12 +72,16 @@ class Limits:
         least = np.array([-1, 0, *[-far] * 3, *[0] * 3, *np.negative(moving), 0, 0])
         return np.stack([least, most])
 
-    def belief(self, ego: Ego, detections: ImageDetections, tracks: Tracks, ranges: np.ndarray) -> Belief:
-        """What a policy is told of a keyframe, within the limits. `tracks` come nearest first, `ranges` (E, A) lie
-        between 0 and the reach.
+    def belief(
+        self, ego: Ego, detections: ImageDetections, tracks: Tracks, ranges: np.ndarray
+    ) -> Belief:
+        """What a policy is told of a keyframe, within the limits. `tracks` come nearest first,
+        `ranges` (E, A) lie between 0 and the reach.
         """
         seen = self._seen(detections)
-        return Belief(self._own(ego), self.rig.budget, seen, self._kept(self._followed(tracks), seen), ranges)
+        return Belief(
+            self._own(ego), self.rig.budget, seen, self._kept(self._followed(tracks), seen), ranges
+        )
 
     def _own(self, ego: Ego) -> Ego:
         values = ego.speed, ego.yaw_rate, ego.acceleration
@@ -117,9 +123,12 @@ class Limits:
         """As many of the tracks as the table holds."""
         if len(tracks) <= MAX_TRACKS:
             return tracks
-        # A centre on the edge of a box may move across it in float32, so the matching is that of what will be shown.
+        # A centre on the edge of a box may move across it in float32, so the matching is that of
+        # what will be shown.
         shown = Tracks.from_rows(tracks.rows().astype(np.float32))
-        first = explainers(ImageDetections.from_rows(seen.rows().astype(np.float32)), shown, self.rig)
+        first = explaining_tracks(
+            ImageDetections.from_rows(seen.rows().astype(np.float32)), shown, self.rig
+        )
         order = np.ones(len(tracks), np.int64)
         order[first[first >= 0]] = 0
         return tracks.take(np.sort(np.argsort(order, kind="stable")[:MAX_TRACKS]))
@@ -135,6 +144,8 @@ def _unwound(angles: Floats) -> Floats:
 
 
 def _shortened(vectors: Floats, most: float) -> Floats:
-    """Vectors (n, k) whose components reach beyond `most`, in their direction; the others as they are."""
+    """Vectors (n, k) whose components reach beyond `most`, in their direction; the others as they
+    are.
+    """
     longest = np.abs(vectors).max(axis=1, initial=most)
     return np.asarray(vectors * (most / longest)[:, None])

@@ -1,60 +1,103 @@
 """Algorithm 2 of the paper: camera detections that no forecast explains, as wedges of cells."""
 
-from typing import Any
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.compiled import compiled
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats, turned
 from care_sim.core.grid import Cells
+from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
 
 
+def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
+    """(U, M) of Algorithm 2: the wedges of unexplained and of explained detections.
+
+    U is the reserve layer of CARE. Both are in the order of the detections.
+    """
+    unexplained: list[Cells] = []
+    known: list[Cells] = []
+    is_known = explained(belief.detections, belief.tracks, rig).tolist()
+    for wedge, one_is_known in zip(wedges(belief.detections, rig), is_known, strict=True):
+        (known if one_is_known else unexplained).append(wedge)
+    return unexplained, known
+
+
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[np.bool_]:
     """(n,) whether a same-class forecast centre projects into each image box (Eq. 2)."""
-    return explainers(detections, tracks, rig) >= 0
+    return explaining_tracks(detections, tracks, rig) >= 0
 
 
-def explainers(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Cells:
-    """(n,) the first forecast, by row, that explains each image box (Eq. 2), -1 without one.
+def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Cells:
+    """(n,) the row of the first forecast that explains each image box (Eq. 2), -1 without one.
 
-    Matching uses the full forecasts, never hulls that forgetting has shrunk. Centres are turned back
-    by the yaw change since the picture was taken.
+    Matching uses the full forecasts, never hulls that forgetting has shrunk. Raises IndexError for
+    a detection of a camera that the rig does not have.
     """
     if not len(detections):
         return np.zeros(0, np.int64)
-    from care_sim.core import pinhole_kernels as lenses
-
-    columns = detections.boxes, detections.classes, detections.cameras, detections.yaw_changes
-    forecasts = tracks.boxes[:, :3], tracks.classes
-    found: Cells = lenses.explainers(_contiguous(*columns), _contiguous(*forecasts), rig.camera_models)
-    return found
+    # One layout of all arrays, so that compiled code is compiled once.
+    return _first_explaining(
+        np.ascontiguousarray(detections.boxes),
+        np.ascontiguousarray(detections.classes),
+        np.ascontiguousarray(detections.cameras),
+        np.ascontiguousarray(detections.yaw_changes),
+        np.ascontiguousarray(tracks.boxes[:, :3]),
+        np.ascontiguousarray(tracks.classes),
+        rig.camera_models,
+    )
 
 
 def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:
-    """The depth-free wedge W(d) of every detection."""
-    return rig.wedges(bundles(detections, rig)) if len(detections) else []
-
-
-def bundles(detections: ImageDetections, rig: Rig) -> Floats:
-    """(n, 9, 3) the rays through the image box of every detection, as of `PinholeCamera.box_rays`, turned by the yaw
-    change since its picture.
+    """The depth-free wedge W(d) of every detection: the cells behind its image box, dilated by the
+    margins of the rig.
     """
-    rays = rig.camera_models.box_rays(detections.boxes, detections.cameras)
+    if not len(detections):
+        return []
+    rays = wedge_rays(detections, rig)
+    return rig.grid.wedges(rays, rig.azimuth_margin, rig.elevation_margin)
+
+
+def wedge_rays(detections: ImageDetections, rig: Rig) -> Floats:
+    """(n, 9, 3) the rays through the image box of every detection, in the sensor frame of now;
+    their order is that of `care_sim.core.pinhole.PinholeCamera.box_rays`.
+    """
+    boxes = np.ascontiguousarray(detections.boxes)
+    rays = box_rays(boxes, np.ascontiguousarray(detections.cameras), rig.camera_models)
+    # Since the picture was taken the car has turned, so its directions have turned the other way.
     return turned(rays, -detections.yaw_changes[:, None])
 
 
-def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
-    """(U, M): the wedges of unexplained and of explained detections, in the order observed."""
-    known = explained(belief.detections, belief.tracks, rig)
-    cells = wedges(belief.detections, rig)
-    unexplained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if not is_known]
-    explained_wedges = [wedge for wedge, is_known in zip(cells, known, strict=True) if is_known]
-    return unexplained_wedges, explained_wedges
+@compiled()
+def _first_explaining(
+    boxes: Floats,
+    classes: Cells,
+    cameras: Cells,
+    yaw_changes: Floats,
+    centres: Floats,
+    labels: Cells,
+    models: CameraModels,
+) -> Cells:
+    """(n,) the row of the first forecast that explains each detection (Eq. 2), -1 without one.
 
-
-def _contiguous(*columns: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """One layout, so that compiled code is compiled once."""
-    return tuple(map(np.ascontiguousarray, columns))
+    Detections are image `boxes` (n, 4) with their `classes`, `cameras` and `yaw_changes` since
+    their pictures. Forecasts are `centres` (m, 3) with their classes, `labels`.
+    """
+    found = np.full(len(boxes), -1)
+    for n, (left, top, right, bottom) in enumerate(boxes):
+        camera = model_of(models, cameras[n])
+        cos, sin = math.cos(yaw_changes[n]), math.sin(yaw_changes[n])
+        for m, (x, y, z) in enumerate(centres):
+            if labels[m] == classes[n]:
+                # The forecast is of now and the picture older: the centre is turned back to where
+                # the car's axes were then.
+                u, v, _ = pixel(cos * x - sin * y, sin * x + cos * y, z, camera)
+                # Behind the camera a pixel is NaN, which lies in no box.
+                if left <= u <= right and top <= v <= bottom:
+                    found[n] = m
+                    break
+    return found

@@ -6,57 +6,77 @@ from functools import cached_property
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput
 from care_sim.base.text import shown
+from care_sim.core.allocation import RESERVE_FRACTION, budget_cells
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.frames import Floats
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS, AngularGrid, Cells
-from care_sim.core.pinhole import CameraModels, PinholeCamera
+from care_sim.core.grid import (
+    AZIMUTH_MARGIN,
+    ELEVATION_MARGIN,
+    MOST_COLUMNS,
+    MOST_ROWS,
+    AngularGrid,
+    Cells,
+)
+from care_sim.core.pinhole import PinholeCamera, camera_models
+from care_sim.core.pinhole_kernels import CameraModels
+
+SENSOR_HEIGHT_M = 1.84
+"""Of the LiDAR above the road: LIDAR_TOP of nuScenes."""
 
 
 @dataclass(frozen=True)
 class Rig:
     """What is fixed about the sensing task and known to a policy in advance.
 
-    `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` the time between
-    two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and `elevation_margin` rows.
-    The LiDAR stands `sensor_height_m` above the road.
+    `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` is the time
+    between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
+    `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road. Raises InvalidInput
+    for a value out of its bounds.
     """
 
     grid: AngularGrid = field(default_factory=AngularGrid)
     cameras: tuple[PinholeCamera, ...] = ()
-    budget: int = bounded(1638, 0, MOST_COLUMNS * MOST_ROWS)
-    reserve_fraction: float = bounded(0.3, 0, 1)
+    budget: int = bounded(budget_cells(0.1, AngularGrid().size), 0, MOST_COLUMNS * MOST_ROWS)
+    reserve_fraction: float = bounded(RESERVE_FRACTION, 0, 1)
     keyframe_s: float = bounded(0.1, 0.001, 60)
     azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
-    sensor_height_m: float = bounded(1.84, 0, 100)
+    sensor_height_m: float = bounded(SENSOR_HEIGHT_M, 0, 100)
 
     def __post_init__(self) -> None:
         check_fields(self)
         if not isinstance(self.grid, AngularGrid):
             raise InvalidInput(f"grid must be an AngularGrid, got {shown(self.grid)}")
-        if not (isinstance(self.cameras, tuple | list) and all(isinstance(c, PinholeCamera) for c in self.cameras)):
-            raise InvalidInput(f"cameras must be a tuple of PinholeCamera, got {shown(self.cameras)}")
-        object.__setattr__(self, "cameras", tuple(self.cameras))
+        cameras = self.cameras
+        if not (
+            isinstance(cameras, tuple | list)
+            and all(isinstance(camera, PinholeCamera) for camera in cameras)
+        ):
+            raise InvalidInput(f"cameras must be a tuple of PinholeCamera, got {shown(cameras)}")
+        object.__setattr__(self, "cameras", tuple(cameras))
 
     def read(self, observation: Observation) -> Belief:
-        """The belief of an observation. Raises InvalidInput for one of another grid or other cameras."""
+        """The belief of an observation. Raises InvalidInput for one of another grid or other
+        cameras.
+        """
         belief = Belief.from_observation(observation)
         if belief.ranges.shape != self.grid.shape:
-            raise InvalidInput(f"ranges of an observation must be {self.grid.shape}, got {belief.ranges.shape}")
-        if not all(0 <= number < len(self.cameras) for number in belief.detections.cameras.tolist()):
-            raise InvalidInput(f"detections of an observation must be of cameras 0 to {len(self.cameras) - 1}")
+            raise InvalidInput(
+                f"ranges of an observation must be {self.grid.shape}, got {belief.ranges.shape}"
+            )
+        count = len(self.cameras)
+        if not all(0 <= number < count for number in belief.detections.cameras.tolist()):
+            raise InvalidInput(f"detections of an observation must be of cameras 0 to {count - 1}")
         return belief
 
     @cached_property
     def camera_models(self) -> CameraModels:
         """The cameras as one table."""
-        return CameraModels.of(self.cameras)
+        return camera_models(self.cameras)
 
     def hulls(self, boxes: Floats, azimuth_margins: Cells | None = None) -> list[Cells]:
-        """The cells of sensor-frame boxes (n, 7), dilated by the rig's margins or by `azimuth_margins` (n,)."""
+        """The cells of sensor-frame boxes (n, 7), one ascending array per box. They are dilated by
+        the rig's margins, or by `azimuth_margins` (n,) columns and the rig's rows.
+        """
         azimuth = self.azimuth_margin if azimuth_margins is None else azimuth_margins
         return self.grid.hulls(boxes, azimuth, self.elevation_margin)
-
-    def wedges(self, bundles: Floats) -> list[Cells]:
-        """The cells of bundles of rays (n, k, 3), middle first, dilated by the rig's margins."""
-        return self.grid.wedges(bundles, self.azimuth_margin, self.elevation_margin)

@@ -27,7 +27,9 @@ Action = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Ego:
-    """The car's own motion: speed m/s along its heading (below 0 backwards), yaw rate rad/s, acceleration m/s^2."""
+    """The car's own motion: speed m/s along its heading (below 0 backwards), yaw rate rad/s,
+    acceleration m/s^2.
+    """
 
     speed: float = 0.0
     yaw_rate: float = 0.0
@@ -36,7 +38,8 @@ class Ego:
 
 @dataclass(frozen=True)
 class Detections:
-    """3D detections of one keyframe: `classes` (n,), `boxes` (n, 7), `returns` (n,) fired rays that hit.
+    """3D detections of one keyframe: `classes` (n,), `boxes` (n, 7), `returns` (n,) fired rays that
+    hit.
 
     `scores` (n,) are confidences from 0 to 1; None of a detector that has none.
     """
@@ -66,7 +69,17 @@ class ImageDetections:
     ages: Floats
     yaw_changes: Floats
 
-    COLUMNS = ("class", "confidence", "left", "top", "right", "bottom", "camera", "age", "yaw_change")
+    COLUMNS = (
+        "class",
+        "confidence",
+        "left",
+        "top",
+        "right",
+        "bottom",
+        "camera",
+        "age",
+        "yaw_change",
+    )
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -75,10 +88,17 @@ class ImageDetections:
     def from_rows(cls, rows: NDArray[np.floating]) -> "ImageDetections":
         """Read rows in the order of `COLUMNS`; rows of class -1 are padding.
 
-        Raises InvalidInput for a class or a camera that is no number, or too large to be held exactly.
+        Raises InvalidInput for a class or a camera that is no number, or too large to be held
+        exactly.
         """
         table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        classes, cameras = _whole("classes and cameras", table[:, [0, 6]]).T
+        _check_whole_columns("classes and cameras", table[:, [0, 6]])
+        return cls.from_table(table)
+
+    @classmethod
+    def from_table(cls, table: Floats) -> "ImageDetections":
+        """The columns of rows (n, 9) without padding, whose numbers are known to be in order."""
+        classes, cameras = table[:, 0].astype(np.int64), table[:, 6].astype(np.int64)
         return cls(classes, table[:, 1], table[:, 2:6], cameras, table[:, 7], table[:, 8])
 
     def rows(self) -> Floats:
@@ -87,16 +107,18 @@ class ImageDetections:
 
     @cached_property
     def _rows(self) -> Floats:
-        return _table(self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes)
+        return _table(
+            self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes
+        )
 
 
 @dataclass(frozen=True)
 class Tracks:
     """Tracked objects as columns of one table; `len()` is their number n.
 
-    Nearest first. `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n, 2) over ground,
-    `misses` (n,) keyframes since the object was last detected, `hits` (n,) keyframes at which it was; with
-    fewer than two the velocity is not known and reads 0.
+    Nearest first. `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n,
+    2) over ground, `misses` (n,) keyframes since the object was last detected, `hits` (n,)
+    keyframes at which it was; with fewer than two the velocity is not known and reads 0.
     """
 
     ids: Cells
@@ -106,7 +128,21 @@ class Tracks:
     misses: Cells
     hits: Cells
 
-    COLUMNS = ("id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses", "hits")
+    COLUMNS = (
+        "id",
+        "class",
+        "x",
+        "y",
+        "z",
+        "length",
+        "width",
+        "height",
+        "yaw",
+        "vx",
+        "vy",
+        "misses",
+        "hits",
+    )
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -120,10 +156,18 @@ class Tracks:
     def from_rows(cls, rows: NDArray[np.floating]) -> "Tracks":
         """Read rows in the order of `COLUMNS`; rows of id -1 are padding.
 
-        Raises InvalidInput for ids, classes, misses or hits that are no numbers, or too large to be held exactly.
+        Raises InvalidInput for ids, classes, misses or hits that are no numbers, or too large to be
+        held exactly.
         """
         table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        ids, classes, misses, hits = _whole("ids, classes, misses and hits", table[:, [0, 1, 11, 12]]).T
+        _check_whole_columns("ids, classes, misses and hits", table[:, [0, 1, 11, 12]])
+        return cls.from_table(table)
+
+    @classmethod
+    def from_table(cls, table: Floats) -> "Tracks":
+        """The columns of rows (n, 13) without padding, whose numbers are known to be in order."""
+        ids, classes = table[:, :2].astype(np.int64).T
+        misses, hits = table[:, 11:].astype(np.int64).T
         return cls(ids, classes, table[:, 2:9], table[:, 9:11], misses, hits)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
@@ -139,11 +183,10 @@ class Tracks:
         return _table(self.ids, self.classes, self.boxes, self.velocities, self.misses, self.hits)
 
 
-def _whole(what: str, numbers: Floats) -> Cells:
-    """The numbers as integers. Raises InvalidInput for what none is."""
+def _check_whole_columns(what: str, numbers: Floats) -> None:
+    """Raise InvalidInput for what no integer can be made of."""
     if not (numbers.min(initial=0) >= -_EXACT and numbers.max(initial=0) <= _EXACT):
         raise InvalidInput(f"{what} must be numbers up to {_EXACT:g}, none of them NaN")
-    return numbers.astype(np.int64)
 
 
 def _table(*columns: NDArray[np.generic]) -> Floats:
@@ -166,7 +209,9 @@ class Demand:
 
 @dataclass(frozen=True)
 class Scan:
-    """Returns of the fired cells: `cells` (n,) ascending and `ranges` (n,) in metres, inf without return."""
+    """Returns of the fired cells: `cells` (n,) ascending and `ranges` (n,) in metres, inf without
+    return.
+    """
 
     cells: Cells
     ranges: Floats

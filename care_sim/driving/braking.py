@@ -1,14 +1,15 @@
 """The fixed braking controller: the same for every policy, and stated here in full.
 
 A track counts when its box, widened by `side_margin_m` on both sides, overlaps the strip the ego
-sweeps straight ahead, now or at any time within `horizon_s` if it keeps its velocity; only what lies
-ahead of the front bumper counts. A track seen once has no velocity and counts only where it is.
+sweeps straight ahead, now or at any time within `horizon_s` if it keeps its velocity; only what
+lies ahead of the front bumper counts. A track seen once has no velocity and counts only where it
+is.
 
-The brake goes on when the gap to a counting track is at most the ego's stopping distance
-v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself,
-v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with `b` at the first keyframe at least
-`reaction_s` later. It stays on while any counting track is not faster than the ego, and for `release_s`
-after the last one; then the ego gains speed at `comfort` up to its cruising speed.
+The brake goes on when the gap to a counting track is at most the ego's stopping distance v *
+t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself, v_x^2 / (2
+b) (Shalev-Shwartz et al. 2017, RSS). It acts with `b` at the first keyframe at least `reaction_s`
+later. It stays on while any counting track is not faster than the ego, and for `release_s` after
+the last one; then the ego gains speed at `comfort` up to its cruising speed.
 """
 
 from dataclasses import dataclass
@@ -29,9 +30,13 @@ class BrakingRules:
     reaction_s: float = 0.3
     """From decision to full braking: build-up of brake pressure."""
     standstill_m: float = 2.0
-    """s_0, jam distance of the intelligent driver model (Treiber et al. 2000), as in the guard of SBF."""
+    """s_0, jam distance of the intelligent driver model (Treiber et al. 2000), as in the guard of
+    SBF.
+    """
     horizon_s: float = 2.0
-    """How far ahead an entry is predicted: the two-second rule (Vogel 2003), as in the guard of SBF."""
+    """How far ahead an entry is predicted: the two-second rule (Vogel 2003), as in the guard of
+    SBF.
+    """
     side_margin_m: float = 0.3
     """Room kept on either side of the ego."""
     release_s: float = 0.5
@@ -78,7 +83,9 @@ class BrakingController:
     def _act(self, speed: float) -> Command:
         if self._braking_s is None:
             wanted = (self._cruise_mps - speed) / self._keyframe_s
-            return Command(float(min(max(wanted, -self._rules.comfort), self._rules.comfort)), False)
+            return Command(
+                float(min(max(wanted, -self._rules.comfort), self._rules.comfort)), False
+            )
         acting = self._braking_s >= self._rules.reaction_s - 1e-9
         return Command(-self._rules.deceleration if acting else 0.0, True)
 
@@ -86,7 +93,10 @@ class BrakingController:
         rules = self._rules
         ahead = tracks.boxes[:, 0] + half_x > self._front_m
         reach = self._half_width_m + rules.side_margin_m + half_y
-        now, then = tracks.boxes[:, 1], tracks.boxes[:, 1] + tracks.velocities[:, 1] * rules.horizon_s
+        now, then = (
+            tracks.boxes[:, 1],
+            tracks.boxes[:, 1] + tracks.velocities[:, 1] * rules.horizon_s,
+        )
         return ahead & (np.minimum(now, then) <= reach) & (np.maximum(now, then) >= -reach)
 
     def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:

@@ -17,8 +17,8 @@ from care_sim.loops.other_drive import seen_on_a_drive
 from care_sim.loops.records import Keyframe
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.sensors.engines.engine import check_engine
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.engines import check_engine
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import WORLD_STEP_S, whole_steps
 
@@ -169,12 +169,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             self._running.world.close()
             self._running = None
 
-    def _pool(self, entropy: int) -> Pool:
+    def _pool(self, entropy: int) -> BoxPool:
         """Of false boxes, if there are any: another world of this scenario, of a stream of its own, so that nothing of
         it tells of this episode's.
         """
         if not self.conditions.false_positive_rate:
-            return NOTHING_TO_HAUNT
+            return EMPTY_POOL
         _, camera, lidar, _, odometry, another = self.streams(entropy, count=6)
         world = self.scenario.build(np.random.default_rng(another))
         return seen_on_a_drive(world, self.scenario.duration_s, self.rig, self.conditions, (camera, lidar, odometry))

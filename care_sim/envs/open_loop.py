@@ -18,10 +18,10 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
 from care_sim.evaluation import matching
-from care_sim.evaluation.recall import Score
+from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import Exposure, OpenLoop
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.perception.listing import PROXY, check_detector, make_detector
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -103,13 +103,13 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
         self.render_mode = render_mode
         self.presence = presence
-        self.exposures: list[Exposure] = []
+        self.keyframes: list[OpenLoopKeyframe] = []
         self._masks: list[matching.Mask] = []
 
     @property
-    def score(self) -> Score:
+    def score(self) -> SceneScore:
         """What was found of the scene; complete once the episode is over."""
-        return Score.of(self._sightings, self._masks)
+        return SceneScore.of(self._sightings, self._masks)
 
     def start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode over a film. Camera faults, noise and floor have independent streams, which the scene's
@@ -117,7 +117,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """
         camera, lidar, floor, odometry = self.streams(seed, crc32(film.name.encode()), count=4)
         self._sightings = _sightings(film, self.presence)
-        self.exposures, self._masks = [], []
+        self.keyframes, self._masks = [], []
         loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._detector)
         return self.begin(loop, floor), self.told({}, {"seed": seed, "scene": film.name})
 
@@ -125,11 +125,11 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
         loop = self.loop
         fired, shot = self.chosen(action), loop.shot
-        exposure = loop.keyframe(fired)
-        found = matching.found(shot.annotations, exposure.detections)
-        self.exposures.append(exposure)
+        record = loop.keyframe(fired)
+        found = matching.found_objects(shot.annotations, record.detections)
+        self.keyframes.append(record)
         self._masks.append(found)
-        scored = found[self._sightings.scored(exposure.index)]
+        scored = found[self._sightings.scored(record.index)]
         self._over = loop.over
         own = {"fired": self.reported(fired), "time_s": shot.time_s}
         info = self.told(own, {"objects": len(scored), "found": int(scored.sum())})
@@ -144,11 +144,11 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             return None
         from care_sim.viewer.pictures.scene_from_above import draw_plan
 
-        exposure = self.exposures[-1] if self.exposures else None
-        index = exposure.index if exposure else self.loop.index
+        record = self.keyframes[-1] if self.keyframes else None
+        index = record.index if record else self.loop.index
         found = self._masks[-1] if self._masks else np.zeros(len(self.loop.shot.annotations), bool)
         seen = self._sightings
-        return draw_plan(self.loop, index, exposure, found, seen.scored(index), seen.appearing(index))
+        return draw_plan(self.loop, index, record, found, seen.scored(index), seen.appearing(index))
 
 
 class FilmEnv(OpenLoopEnv):

@@ -21,8 +21,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
-from care_sim.loops.episode_truth import EpisodeTruth, Loop
-from care_sim.loops.truth import Truth
+from care_sim.loops.truth import EpisodeTruth, Loop, Truth
 from care_sim.sensors.lidar import dead_cells
 
 Observed = dict[str, NDArray[np.float32]]

@@ -11,7 +11,9 @@ from care_sim.core.grid import Cells
 
 @dataclass(frozen=True)
 class AllocationDifference:
-    """Sums over keyframes; they add. `differing` of the `keyframes` have allocations that differ, by `cells` in all."""
+    """Sums over keyframes; they add. `differing` of the `keyframes` have allocations that differ,
+    by `cells` in all.
+    """
 
     keyframes: int = 0
     differing: int = 0
@@ -28,18 +30,23 @@ class AllocationDifference:
 
     @property
     def cells_where_differing(self) -> float:
-        """Mean number of cells at the keyframes at which the allocation differs; 0 where it never does."""
+        """Mean number of cells at the keyframes at which the allocation differs; 0 where it never
+        does.
+        """
         return self.cells / self.differing if self.differing else 0.0
 
 
 def allocation_difference(ours: Sequence[Cells], theirs: Sequence[Cells]) -> AllocationDifference:
     """Compare the cells fired at every keyframe, each once: the order of selection does not count.
 
-    Allocations differ by the cells that one fires and the other does not, the larger side where the sizes differ: of
-    two that spend the same budget, the cells that were fired elsewhere. Raises InvalidInput for unequal lengths.
+    Allocations differ by the cells that one fires and the other does not, the larger side where the
+    sizes differ: of two that spend the same budget, the cells that were fired elsewhere. Raises
+    InvalidInput for unequal lengths.
     """
     if len(ours) != len(theirs):
-        raise InvalidInput(f"allocations must be of the same keyframes, got {len(ours)} and {len(theirs)}")
+        raise InvalidInput(
+            f"allocations must be of the same keyframes, got {len(ours)} and {len(theirs)}"
+        )
     moved = [_moved(a, b) for a, b in zip(ours, theirs, strict=True)]
     return AllocationDifference(len(moved), sum(cells > 0 for cells in moved), sum(moved))
 

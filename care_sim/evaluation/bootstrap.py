@@ -29,13 +29,18 @@ class Interval(NamedTuple):
 
 
 def paired_difference(
-    ours: ArrayLike, theirs: ArrayLike, *, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
+    ours: ArrayLike,
+    theirs: ArrayLike,
+    *,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
 ) -> Interval:
     """Mean of `ours - theirs` with a percentile bootstrap interval (Efron and Tibshirani 1994).
 
     Both are (n,) and paired: entry i of each comes from the same episode. The resampling is seeded.
-    Differences that are all equal have that value for both ends. Raises InvalidInput for samples that
-    are empty, of unequal length, or not finite.
+    Differences that are all equal have that value for both ends. Raises InvalidInput for samples
+    that are empty, of unequal length, or not finite.
     """
     a, b = np.atleast_1d(np.asarray(ours, float)), np.atleast_1d(np.asarray(theirs, float))
     differences = _differences(a, b)
@@ -46,15 +51,22 @@ def paired_difference(
 
 
 def ratio_of_sums(
-    group: Sums, *, less: Sums | None = None, confidence: float = CONFIDENCE, resamples: int = RESAMPLES, seed: int = 0
+    group: Sums,
+    *,
+    less: Sums | None = None,
+    confidence: float = CONFIDENCE,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
 ) -> Interval:
-    """Ratio of the sums of a group of scenes with a percentile bootstrap interval; scenes are drawn with replacement.
+    """Ratio of the sums of a group of scenes with a percentile bootstrap interval; scenes are drawn
+    with replacement.
 
-    With `ours - theirs` as numerators and the events as denominators it is the difference of two policies in which
-    every event weighs alike, paired by scene. With a second group, `less`, its ratio is taken off; scenes are then
-    drawn within each group. Groups whose scenes all have one ratio give the value for both ends. Raises InvalidInput
-    for sums that are empty, of unequal length or not finite, for a denominator that is not positive, and for one
-    scene beside a second group.
+    With `ours - theirs` as numerators and the events as denominators it is the difference of two
+    policies in which every event weighs alike, paired by scene. With a second group, `less`, its
+    ratio is taken off; scenes are then drawn within each group. Groups whose scenes all have one
+    ratio give the value for both ends. Raises InvalidInput for sums that are empty, of unequal
+    length or not finite, for a denominator that is not positive, and for one scene beside a second
+    group.
     """
     groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
     value = _difference_of_ratios(groups, [np.arange(len(numerators)) for numerators, _ in groups])
@@ -75,7 +87,9 @@ def ratio_of_sums(
     return Interval(float(value), float(low), float(high))
 
 
-def _difference_of_ratios(groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Rows], axis: int = -1) -> Floats:
+def _difference_of_ratios(
+    groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Rows], axis: int = -1
+) -> Floats:
     """Ratio of the drawn scenes of the first group, less that of the second where there is one."""
     first, *second = (
         numerators[rows].sum(axis) / denominators[rows].sum(axis)
@@ -90,15 +104,22 @@ def _constant(numerators: Floats, denominators: Floats) -> bool:
 
 
 def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Floats]:
-    a, b = np.atleast_1d(np.asarray(numerators, float)), np.atleast_1d(np.asarray(denominators, float))
+    a, b = (
+        np.atleast_1d(np.asarray(numerators, float)),
+        np.atleast_1d(np.asarray(denominators, float)),
+    )
     _check_pairs(a, b)
     if np.any(b <= 0):
-        raise InvalidInput("the denominators of a ratio must be positive: leave out scenes without an event")
+        raise InvalidInput(
+            "the denominators of a ratio must be positive: leave out scenes without an event"
+        )
     return a, b
 
 
 @lru_cache(maxsize=10_000)
-def _resampled(differences: tuple[float, ...], confidence: float, resamples: int, seed: int) -> Interval:
+def _resampled(
+    differences: tuple[float, ...], confidence: float, resamples: int, seed: int
+) -> Interval:
     result = stats.bootstrap(
         (np.array(differences),),
         np.mean,

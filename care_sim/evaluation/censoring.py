@@ -1,10 +1,10 @@
 """Detection distances of actors that were never detected: censored, no zeros, and not dropped.
 
-All that is known of such a distance is that it is at most that of the nearest scan that passed the actor by, and
-not below 0. In medians and quartiles it ranks below every detection, and nothing is interpolated with it. In a
-paired difference it enters at that most, the reading that favours the policy that missed; the difference is then
-a bound on the true one, and says so. A difference is claimed only when it holds wherever in its range each
-censored distance lies.
+All that is known of such a distance is that it is at most that of the nearest scan that passed the
+actor by, and not below 0. In medians and quartiles it ranks below every detection, and nothing is
+interpolated with it. In a paired difference it enters at that most, the reading that favours the
+policy that missed; the difference is then a bound on the true one, and says so. A difference is
+claimed only when it holds wherever in its range each censored distance lies.
 """
 
 from collections.abc import Sequence
@@ -17,11 +17,15 @@ import numpy as np
 from care_sim.evaluation.bootstrap import Interval, paired_difference
 
 FEWEST_PAIRS = 5
-"""Fewer pairs carry no claim: by chance alone, one set of four pairs in eight has differences of one sign."""
+"""Fewer pairs carry no claim: by chance alone, one set of four pairs in eight has differences of
+one sign.
+"""
 
 
 class Reading(NamedTuple):
-    """A value measured in an episode; of a `censored` one is known that the truth lies between 0 and this."""
+    """A value measured in an episode; of a `censored` one is known that the truth lies between 0
+    and this.
+    """
 
     value: float
     censored: bool = False
@@ -50,7 +54,8 @@ class Bound(StrEnum):
 class Difference:
     """A mean paired difference with its interval; the true one lies as `bound` says.
 
-    `cautious` is the same with every censored value at the end of its range that speaks most against the difference.
+    `cautious` is the same with every censored value at the end of its range that speaks most
+    against the difference.
     """
 
     interval: Interval
@@ -60,7 +65,9 @@ class Difference:
 
     @property
     def excludes_zero(self) -> bool:
-        """Whether the interval excludes zero, whatever the censored values were; never of fewer than 5 pairs."""
+        """Whether the interval excludes zero, whatever the censored values were; never of fewer
+        than 5 pairs.
+        """
         away = self.cautious.low > 0 if self.interval.mean > 0 else self.cautious.high < 0
         return away and self.pairs >= FEWEST_PAIRS
 
@@ -70,7 +77,9 @@ def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
     if not readings:
         return None
     censored = sum(reading.censored for reading in readings)
-    ranked = [-1.0] * censored + sorted(reading.value for reading in readings if not reading.censored)
+    ranked = [-1.0] * censored + sorted(
+        reading.value for reading in readings if not reading.censored
+    )
     shares = (0.25, 0.5, 0.75)
     values = np.quantile(ranked, shares).tolist()
     low, median, high = (
@@ -86,7 +95,9 @@ def difference(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Difference
     against = (_least(ours), _most(theirs)) if interval.mean > 0 else (_most(ours), _least(theirs))
     missed = any(reading.censored for reading in ours), any(reading.censored for reading in theirs)
     bounds = {(True, False): Bound.AT_MOST, (False, True): Bound.AT_LEAST, (True, True): Bound.OPEN}
-    return Difference(interval, bounds.get(missed, Bound.EXACT), len(ours), paired_difference(*against))
+    return Difference(
+        interval, bounds.get(missed, Bound.EXACT), len(ours), paired_difference(*against)
+    )
 
 
 def _most(readings: Sequence[Reading]) -> list[float]:

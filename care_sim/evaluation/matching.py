@@ -1,4 +1,6 @@
-"""Which annotated objects a detector found: the class-consistent 2 m centre match (paper, Remark 1)."""
+"""Which annotated objects a detector found: the class-consistent 2 m centre match (paper, Remark
+1).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +13,22 @@ from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations
 
 MATCH_M = 2.0
-"""Greatest planar distance between the centres of an object and of its detection, this value included."""
+"""Greatest planar distance between the centres of an object and of its detection, this value
+included.
+"""
 
 Mask = NDArray[np.bool_]
 
 
-def found(annotations: Annotations, detections: Detections) -> Mask:
+def found_objects(annotations: Annotations, detections: Detections) -> Mask:
     """(n,) whether each annotated object has a detection of its class within 2 m, in the plane.
 
-    A detection serves one object. Detections without scores are assigned so that they serve the most objects and,
-    among such assignments, with the least sum of distances. Detections with scores choose in descending order of
-    score, each the nearest object still free, which is the rule of the official nuScenes evaluation. Objects of all
-    ranges take part, so that a detection of one beyond the scored range is not counted for a neighbour within it.
-    Raises InvalidInput for detections whose columns do not fit together or are not finite.
+    A detection serves one object. Detections without scores are assigned so that they serve the
+    most objects and, among such assignments, with the least sum of distances. Detections with
+    scores choose in descending order of score, each the nearest object still free, which is the
+    rule of the official nuScenes evaluation. Objects of all ranges take part, so that a detection
+    of one beyond the scored range is not counted for a neighbour within it. Raises InvalidInput for
+    detections whose columns do not fit together or are not finite.
     """
     _check(detections)
     scores = detections.scores
@@ -64,7 +69,13 @@ def _by_score(distances: Floats, scores: Floats) -> list[int]:
 def _check(detections: Detections) -> None:
     count, scores = len(detections), detections.scores
     if detections.boxes.shape != (count, 7) or (scores is not None and scores.shape != (count,)):
-        shapes = f"boxes {detections.boxes.shape}" + ("" if scores is None else f", scores {scores.shape}")
-        raise InvalidInput(f"{count} detections must have boxes ({count}, 7) and a score each, if any; got {shapes}")
-    if not (np.all(np.isfinite(detections.boxes)) and (scores is None or np.all(np.isfinite(scores)))):
+        shapes = f"boxes {detections.boxes.shape}" + (
+            "" if scores is None else f", scores {scores.shape}"
+        )
+        raise InvalidInput(
+            f"{count} detections must have boxes ({count}, 7) and a score each, if any; got {shapes}"
+        )
+    if not (
+        np.all(np.isfinite(detections.boxes)) and (scores is None or np.all(np.isfinite(scores)))
+    ):
         raise InvalidInput("the boxes and scores of detections must be finite")

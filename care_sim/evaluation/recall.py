@@ -1,12 +1,14 @@
-"""First-sighting recall, overall recall and time to first detection, as numerators and denominators of a scene.
+"""First-sighting recall, overall recall and time to first detection, as numerators and denominators
+of a scene.
 
-Time to first detection (TTFD) of an event is the number of keyframes from its first sighting to the first keyframe at
-which the object is found: 0 where it is found at once, and K where it is not found at the first sighting or at the
-K - 1 keyframes that follow it. Every event counts, also one nearer than K to the end of the scene or whose object
-leaves before: not found, it counts K. The paper names one censoring time, K = 6 keyframes, for all events (Remark 1),
-and a mean over the events that recall is taken over; a shorter time would make a miss cheaper where the scene happens
-to end or the object drives off. `Score.chances` says at how many of the K keyframes the object was in range, for
-whoever wants only the events that had them all.
+Time to first detection (TTFD) of an event is the number of keyframes from its first sighting to the
+first keyframe at which the object is found: 0 where it is found at once, and K where it is not
+found at the first sighting or at the K - 1 keyframes that follow it. Every event counts, also one
+nearer than K to the end of the scene or whose object leaves before: not found, it counts K. The
+paper names one censoring time, K = 6 keyframes, for all events (Remark 1), and a mean over the
+events that recall is taken over; a shorter time would make a miss cheaper where the scene happens
+to end or the object drives off. `SceneScore.chances` says at how many of the K keyframes the object
+was in range, for whoever wants only the events that had them all.
 """
 
 from collections.abc import Sequence
@@ -33,9 +35,9 @@ Mask = NDArray[np.bool_]
 class Tally:
     """Sums over a scene, or over several: they add.
 
-    `events`, of which `sighted` were found at their first keyframe; `delay` is the sum of their TTFD in keyframes.
-    `frames` are the object frames in range, of which `found` were found. An average over floor seeds is no whole
-    number.
+    `events`, of which `sighted` were found at their first keyframe; `delay` is the sum of their
+    TTFD in keyframes. `frames` are the object frames in range, of which `found` were found. An
+    average over floor seeds is no whole number.
     """
 
     events: float = 0.0
@@ -45,15 +47,18 @@ class Tally:
     found: float = 0.0
 
     def __add__(self, other: "Tally") -> "Tally":
-        return Tally(*(getattr(self, column.name) + getattr(other, column.name) for column in fields(self)))
+        return Tally(
+            *(getattr(self, column.name) + getattr(other, column.name) for column in fields(self))
+        )
 
 
 @dataclass(frozen=True)
-class Score:
+class SceneScore:
     """What a policy found of a scene.
 
-    `found` (r,) by row of `sightings.frames`; of the events (e,) `delays` are the TTFD in keyframes, `censored_at`
-    where not found, and `chances` the keyframes among the first `censored_at` at which the object was in range.
+    `found` (r,) by row of `sightings.frames`; of the events (e,) `delays` are the TTFD in
+    keyframes, `censored_at` where not found, and `chances` the keyframes among the first
+    `censored_at` at which the object was in range.
     """
 
     sightings: Sightings
@@ -62,12 +67,14 @@ class Score:
     chances: Cells
 
     @classmethod
-    def of(cls, sightings: Sightings, masks: Sequence[Mask], censored_at: int = CENSORED_AT) -> "Score":
+    def of(
+        cls, sightings: Sightings, masks: Sequence[Mask], censored_at: int = CENSORED_AT
+    ) -> "SceneScore":
         """The score of a scene whose keyframes were matched one by one.
 
-        `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found (`matching.found`).
-        Raises InvalidInput where they are not one a keyframe and one value an annotation, and for a `censored_at` that
-        is no whole number of 1 or more.
+        `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found
+        (`matching.found_objects`). Raises InvalidInput where they are not one a keyframe and one
+        value an annotation, and for a `censored_at` that is no whole number of 1 or more.
         """
         check_whole("censored_at", censored_at, 1)
         _check_one_a_keyframe(sightings, len(masks), "masks")
@@ -81,7 +88,8 @@ class Score:
     def tally(self, within: Mask | None = None) -> Tally:
         """The sums, of all or of the rows (r,) of `sightings.frames` that lie `within` a stratum.
 
-        An event belongs to the stratum of its first sighting, wherever the object is when it is found.
+        An event belongs to the stratum of its first sighting, wherever the object is when it is
+        found.
         """
         events = self.sightings.events
         rows = np.ones(len(self.found), bool) if within is None else within
@@ -90,7 +98,9 @@ class Score:
         return Tally(*map(float, (*sums, rows.sum(), self.found[rows].sum())))
 
     def event_rows(self) -> list[dict[str, Any]]:
-        """One row an event: where and what it was, whether it was found at once, its TTFD and its chances."""
+        """One row an event: where and what it was, whether it was found at once, its TTFD and its
+        chances.
+        """
         events = self.sightings.frames.take(self.sightings.events)
         columns = {
             "keyframe": events.keyframes,
@@ -103,21 +113,32 @@ class Score:
             "chances": self.chances,
         }
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
-        return [{"scene": self.sightings.scene, **dict(zip(columns, row, strict=True))} for row in values]
+        return [
+            {"scene": self.sightings.scene, **dict(zip(columns, row, strict=True))}
+            for row in values
+        ]
 
 
-def score(sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT) -> Score:
+def score_scene(
+    sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT
+) -> SceneScore:
     """Score what a policy's detector reported, one entry a keyframe.
 
-    Raises InvalidInput where the reports are not one a keyframe, and as `matching.found` does.
+    Raises InvalidInput where the reports are not one a keyframe, and as `matching.found_objects`
+    does.
     """
     _check_one_a_keyframe(sightings, len(reports), "reports")
-    masks = [matching.found(shown, report) for shown, report in zip(sightings.keyframes, reports, strict=True)]
-    return Score.of(sightings, masks, censored_at)
+    masks = [
+        matching.found_objects(shown, report)
+        for shown, report in zip(sightings.keyframes, reports, strict=True)
+    ]
+    return SceneScore.of(sightings, masks, censored_at)
 
 
 def _ages(sightings: Sightings, censored_at: int) -> Cells:
-    """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of other objects."""
+    """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of
+    other objects.
+    """
     rows, events = sightings.frames, sightings.frames.take(sightings.events)
     late = rows.keyframes - events.keyframes[:, None]
     return np.where(rows.objects == events.objects[:, None], late, censored_at)
@@ -126,7 +147,9 @@ def _ages(sightings: Sightings, censored_at: int) -> Cells:
 def _check_one_a_keyframe(sightings: Sightings, count: int, what: str) -> None:
     keyframes = len(sightings.keyframes)
     if count != keyframes:
-        raise InvalidInput(f"scene {sightings.scene}: {keyframes} keyframes need as many {what}, got {count}")
+        raise InvalidInput(
+            f"scene {sightings.scene}: {keyframes} keyframes need as many {what}, got {count}"
+        )
 
 
 def _check_one_an_annotation(scene: str, keyframe: int, annotations: int, mask: Mask) -> None:

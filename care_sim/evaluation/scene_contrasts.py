@@ -1,7 +1,9 @@
-"""Two policies on the same scenes: how much more one found, and how sure that is (paper, Sec. 3 and Table 1).
+"""Two policies on the same scenes: how much more one found, and how sure that is (paper, Sec. 3 and
+Table 1).
 
-Policies are paired by scene and whole scenes are resampled, for the events of a scene are not independent. Scenes
-without an event, or without an object frame, hold nothing of the measure and are left out of it.
+Policies are paired by scene and whole scenes are resampled, for the events of a scene are not
+independent. Scenes without an event, or without an object frame, hold nothing of the measure and
+are left out of it.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -31,17 +33,25 @@ class Ratio:
 
     def of(self, tally: Tally) -> float | None:
         """Its value, None where there is nothing to find."""
-        return self.scale * self.numerator(tally) / self.denominator(tally) if self.denominator(tally) else None
+        return (
+            self.scale * self.numerator(tally) / self.denominator(tally)
+            if self.denominator(tally)
+            else None
+        )
 
 
-FIRST_SIGHTING = Ratio("first-sighting recall", "points", 100.0, lambda t: t.sighted, lambda t: t.events)
+FIRST_SIGHTING = Ratio(
+    "first-sighting recall", "points", 100.0, lambda t: t.sighted, lambda t: t.events
+)
 OVERALL = Ratio("overall recall", "points", 100.0, lambda t: t.found, lambda t: t.frames)
 TTFD = Ratio("censored TTFD", "keyframes", 1.0, lambda t: t.delay, lambda t: t.events)
 
 
 @dataclass(frozen=True)
-class Level:
-    """A measure of one policy: over all events alike, and with equal weight to every scene; None without any."""
+class RatioLevel:
+    """A measure of one policy: over all events alike, and with equal weight to every scene; None
+    without any.
+    """
 
     by_event: float | None
     by_scene: float | None
@@ -49,7 +59,8 @@ class Level:
 
 @dataclass(frozen=True)
 class SceneContrast:
-    """One policy less another in the unit of `ratio`, over `scenes` with `weight` events (or object frames) in all.
+    """One policy less another in the unit of `ratio`, over `scenes` with `weight` events (or object
+    frames) in all.
 
     `by_event`: every event weighs alike; `by_scene`: every scene does.
     """
@@ -75,13 +86,17 @@ def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
     return {scene: _mean(scene, [seed[scene] for seed in seeds]) for scene in scenes}
 
 
-def level(ratio: Ratio, tallies: Tallies) -> Level:
+def ratio_level(ratio: Ratio, tallies: Tallies) -> RatioLevel:
     """The measure of one policy over its scenes."""
     values = [value for value in map(ratio.of, tallies.values()) if value is not None]
-    return Level(ratio.of(sum(tallies.values(), Tally())), float(np.mean(values)) if values else None)
+    return RatioLevel(
+        ratio.of(sum(tallies.values(), Tally())), float(np.mean(values)) if values else None
+    )
 
 
-def contrast(ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0) -> SceneContrast | None:
+def scene_contrast(
+    ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0
+) -> SceneContrast | None:
     """`ours` less `theirs` on the scenes that both have; None where nothing is to be found in them.
 
     Raises InvalidInput where the two do not count the same events or object frames of a scene.
@@ -96,16 +111,28 @@ def contrast(ratio: Ratio, ours: Tallies, theirs: Tallies, *, seed: int = 0) -> 
 
 
 def contrast_gap(
-    ratio: Ratio, ours: Tallies, theirs: Tallies, first: Collection[str], second: Collection[str], *, seed: int = 0
+    ratio: Ratio,
+    ours: Tallies,
+    theirs: Tallies,
+    first: Collection[str],
+    second: Collection[str],
+    *,
+    seed: int = 0,
 ) -> Interval | None:
-    """How much larger the contrast is in the `first` scenes (the dense third) than in the `second`, events alike.
+    """How much larger the contrast is in the `first` scenes (the dense third) than in the `second`,
+    events alike.
 
-    None where either has fewer than two scenes with something to find. Raises InvalidInput for groups that share a
-    scene.
+    None where either has fewer than two scenes with something to find. Raises InvalidInput for
+    groups that share a scene.
     """
     if shared := sorted(set(first) & set(second)):
-        raise InvalidInput(f"groups of scenes to be compared must share none, got {shared[0]} in both")
-    groups = [_columns(ratio, _pairs(ratio, _among(ours, some), _among(theirs, some))) for some in (first, second)]
+        raise InvalidInput(
+            f"groups of scenes to be compared must share none, got {shared[0]} in both"
+        )
+    groups = [
+        _columns(ratio, _pairs(ratio, _among(ours, some), _among(theirs, some)))
+        for some in (first, second)
+    ]
     if min(len(group.T) for group in groups) < 2:
         return None
     (a, b, weights), (c, d, others) = groups
@@ -139,5 +166,9 @@ def _mean(scene: str, tallies: Sequence[Tally]) -> Tally:
 def _check_same(scene: str, tallies: Sequence[Tally]) -> None:
     counts = {(tally.events, tally.frames) for tally in tallies}
     if len(counts) > 1:
-        listed = " and ".join(f"{events:g} events in {frames:g} object frames" for events, frames in sorted(counts))
-        raise InvalidInput(f"scene {scene}: the tallies to be compared must be of one film, got {listed}")
+        listed = " and ".join(
+            f"{events:g} events in {frames:g} object frames" for events, frames in sorted(counts)
+        )
+        raise InvalidInput(
+            f"scene {scene}: the tallies to be compared must be of one film, got {listed}"
+        )

@@ -1,8 +1,9 @@
-"""First-sighting events of a scene (paper, Sec. 3 and Remark 1). They depend on the film alone, on no policy.
+"""First-sighting events of a scene (paper, Sec. 3 and Remark 1). They depend on the film alone, on
+no policy.
 
-"A first sighting is the first keyframe at which an annotated object within range R appears in the scene, excluding
-objects present at scene start." Only objects within range are in the scene that is scored, so this one sentence
-settles every case:
+"A first sighting is the first keyframe at which an annotated object within range R appears in the
+scene, excluding objects present at scene start." Only objects within range are in the scene that is
+scored, so this one sentence settles every case:
 
 - not annotated at the first keyframe, and later scored within range (it drove in round a corner): an event where it
   is first scored, that is where a return or a pixel first tells of it;
@@ -13,14 +14,16 @@ settles every case:
   separately", so an object has one event at most;
 - never within R: no event.
 
-The sentence says nothing of who could be seen. So an object that its source annotates within R at the first keyframe
-is present there though neither a return nor a pixel tells of it (`care_sim.loops.film.Film.hidden`), and is no event when it
-shows itself: `presence="annotated"`, the rule. That takes out the very case after which the closed loop is made: the
-person who stands behind a parked van from the first keyframe on and then walks out. How much it takes out depends on
-who annotates. People drew the boxes of recordings, and seldom drew one where they saw nothing; the generator of a
-street knows everybody, also those whom nobody could have annotated. `presence="visible"` counts as present only what a
-sensor tells of at the first keyframe, so that the one behind the van is an event; `Sightings.emerging` are those by
-which the two counts differ. What is scored at a keyframe is the same in both.
+The sentence says nothing of who could be seen. So an object that its source annotates within R at
+the first keyframe is present there though neither a return nor a pixel tells of it
+(`care_sim.loops.film.Film.hidden`), and is no event when it shows itself: `presence="annotated"`,
+the rule. That takes out the very case after which the closed loop is made: the person who stands
+behind a parked van from the first keyframe on and then walks out. How much it takes out depends on
+who annotates. People drew the boxes of recordings, and seldom drew one where they saw nothing; the
+generator of a street knows everybody, also those whom nobody could have annotated.
+`presence="visible"` counts as present only what a sensor tells of at the first keyframe, so that
+the one behind the van is an event; `Sightings.emerging` are those by which the two counts differ.
+What is scored at a keyframe is the same in both.
 """
 
 from collections.abc import Sequence
@@ -37,17 +40,21 @@ from care_sim.core.grid import Cells
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 
 RANGE_M = 50.0
-"""R: planar distance from the sensor to the centre of the box, this value included (paper, Remark 1)."""
+"""R: planar distance from the sensor to the centre of the box, this value included (paper, Remark
+1).
+"""
 ANNOTATED, VISIBLE = PRESENCES = ("annotated", "visible")
 """Who is present at scene start: whoever is annotated there, or only who shows a return or a pixel."""
 
 
 @dataclass(frozen=True)
 class ObjectFrames:
-    """Every annotated object at every keyframe at which it is in range, in order of keyframe, as columns of one table.
+    """Every annotated object at every keyframe at which it is in range, in order of keyframe, as
+    columns of one table.
 
-    `keyframes` (r,) from 0, `objects` (r,) numbers of the film, `classes` (r,) into `care_sim.core.types.CLASSES`,
-    `ranges` (r,) planar metres and `azimuths` (r,) radians from straight ahead towards the left, in the sensor frame.
+    `keyframes` (r,) from 0, `objects` (r,) numbers of the film, `classes` (r,) into
+    `care_sim.core.types.CLASSES`, `ranges` (r,) planar metres and `azimuths` (r,) radians from
+    straight ahead towards the left, in the sensor frame.
     """
 
     keyframes: Cells
@@ -68,10 +75,11 @@ class ObjectFrames:
 class Sightings:
     """What there is to find in a scene, the same for every policy.
 
-    `keyframes` are the annotations it was made from and `in_range` (n,) marks which of their objects, one keyframe
-    after the other, are scored: these are the rows of `frames`. `events` (e,) are the rows of `frames` that are first
-    sightings, ascending. `emerging` (m,) are the rows at which an object that was hidden within range at the first
-    keyframe first shows itself, ascending: events by the presence "visible", none by "annotated".
+    `keyframes` are the annotations it was made from and `in_range` (n,) marks which of their
+    objects, one keyframe after the other, are scored: these are the rows of `frames`. `events` (e,)
+    are the rows of `frames` that are first sightings, ascending. `emerging` (m,) are the rows at
+    which an object that was hidden within range at the first keyframe first shows itself,
+    ascending: events by the presence "visible", none by "annotated".
     """
 
     scene: str
@@ -90,10 +98,12 @@ class Sightings:
         hidden: Annotations = NO_ANNOTATIONS,
         presence: str = ANNOTATED,
     ) -> "Sightings":
-        """The sightings of the scene's annotations, one entry a keyframe; `hidden` are those of `Film.hidden`.
+        """The sightings of the scene's annotations, one entry a keyframe; `hidden` are those of
+        `Film.hidden`.
 
-        Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one keyframe or without a
-        finite centre, for a range below 0, and for a presence that is none of `PRESENCES`.
+        Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one
+        keyframe or without a finite centre, for a range below 0, and for a presence that is none of
+        `PRESENCES`.
         """
         if not keyframes:
             raise InvalidInput(f"scene {scene}: a scene must have at least one keyframe")
@@ -124,7 +134,9 @@ class Sightings:
 def check_presence(presence: object) -> None:
     """Raise InvalidInput for what is none of `PRESENCES`."""
     if not isinstance(presence, str) or presence not in PRESENCES:
-        raise InvalidInput(f"presence must be {' or '.join(map(repr, PRESENCES))}, got {shown(presence)}")
+        raise InvalidInput(
+            f"presence must be {' or '.join(map(repr, PRESENCES))}, got {shown(presence)}"
+        )
 
 
 def _appearing(frames: ObjectFrames) -> Cells:
@@ -134,7 +146,10 @@ def _appearing(frames: ObjectFrames) -> Cells:
 
 
 def _together(seen: Annotations, hidden: Annotations) -> Annotations:
-    columns = (np.concatenate([getattr(part, column.name) for part in (seen, hidden)]) for column in fields(seen))
+    columns = (
+        np.concatenate([getattr(part, column.name) for part in (seen, hidden)])
+        for column in fields(seen)
+    )
     return Annotations(*columns)
 
 

@@ -9,20 +9,23 @@ from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import ObjectFrames
 
 NEAR_M, FAR_M = 20.0, 35.0
-"""Bounds of the range strata. 20 m is the paper's near field (Sec. 5.4); 35 m halves what is left of the 50 m."""
+"""Bounds of the range strata. 20 m is the paper's near field (Sec. 5.4); 35 m halves what is left
+of the 50 m.
+"""
 FRONT, REAR = np.pi / 4, 3 * np.pi / 4
-"""Bounds of the sectors, radians off straight ahead to either side: a quarter of the turn ahead, one behind and one on
-each side, whatever the mounting of the cameras."""
-THIRDS = ("sparse", "middle", "dense")
+"""Bounds of the sectors, radians off straight ahead to either side: a quarter of the turn ahead,
+one behind and one on each side, whatever the mounting of the cameras."""
+SCENE_THIRDS = ("sparse", "middle", "dense")
 
 Mask = NDArray[np.bool_]
 
 
 def strata(frames: ObjectFrames) -> dict[str, dict[str, Mask]]:
-    """By `range`, `azimuth` and `class`: the label of every stratum and the rows (r,) that lie in it.
+    """By `range`, `azimuth` and `class`: the label of every stratum and the rows (r,) that lie in
+    it.
 
-    The strata of one kind share no row and leave none out. A bound belongs to the farther stratum, and to the one
-    farther from straight ahead.
+    The strata of one kind share no row and leave none out. A bound belongs to the farther stratum,
+    and to the one farther from straight ahead.
     """
     near, far = frames.ranges < NEAR_M, frames.ranges >= FAR_M
     off = np.abs(frames.azimuths)
@@ -39,10 +42,16 @@ def strata(frames: ObjectFrames) -> dict[str, dict[str, Mask]]:
 
 
 def thirds(counts: Mapping[str, float]) -> dict[str, list[str]]:
-    """Scenes ranked by a number each (tracked objects, explained detections) and cut in three, sparse first.
+    """Scenes ranked by a number each (tracked objects, explained detections) and cut in three,
+    sparse first.
 
     The parts differ by a scene at most; scenes of equal number stand in the order of their names.
     """
     ranked = sorted(counts, key=lambda scene: (counts[scene], scene))
-    bounds = [round(part * len(ranked) / len(THIRDS)) for part in range(len(THIRDS) + 1)]
-    return {name: ranked[start:end] for name, start, end in zip(THIRDS, bounds, bounds[1:], strict=False)}
+    bounds = [
+        round(part * len(ranked) / len(SCENE_THIRDS)) for part in range(len(SCENE_THIRDS) + 1)
+    ]
+    return {
+        name: ranked[start:end]
+        for name, start, end in zip(SCENE_THIRDS, bounds, bounds[1:], strict=False)
+    }

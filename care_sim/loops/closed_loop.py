@@ -15,12 +15,12 @@ from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
+from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import ReturnsDetector
-from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.camera import CameraDetector, Picture, sights_of, window_on
-from care_sim.sensors.engines.engine import ENGINES
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
+from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
 from care_sim.world.world import World
 
@@ -34,7 +34,7 @@ class ClosedLoop:
         rig: Rig,
         sensing: Sensing,
         seeds: Sequence[np.random.SeedSequence],
-        pool: Pool = NOTHING_TO_HAUNT,
+        pool: BoxPool = EMPTY_POOL,
     ):
         self.world, self.rig = world, rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
@@ -43,13 +43,15 @@ class ClosedLoop:
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
         self._labels = labels
-        self._camera = CameraDetector(list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool)
+        self._camera = CameraDetector(
+            list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool
+        )
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
-        self._identities = Identities()
+        self._track_objects = TrackObjects()
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
             world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
@@ -65,7 +67,7 @@ class ClosedLoop:
         scan, bodies = self._lidar.fire(fired, sensor)
         detections, detected = self._detector.detect(bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
-        self._identities.note(tracks, detected)
+        self._track_objects.note(tracks, detected)
         command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
 
         distance = self._distance_to_first_sighting(sensor)
@@ -90,19 +92,26 @@ class ClosedLoop:
         )
 
     def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object
-        keeps its forecast. Truth: for the privileged alone.
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without
+        an object keeps its forecast. Truth: for the privileged alone.
         """
-        return self._identities.boxes(
-            tracks, lambda bodies: dict(zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True))
+        return self._track_objects.boxes(
+            tracks,
+            lambda bodies: dict(
+                zip(bodies, self._local_boxes(np.array(bodies, np.int64)), strict=True)
+            ),
         )
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
+        """What every cell would return now, before noise and dropout. Truth: for the privileged
+        alone.
+        """
         return self._lidar.peek(self.sensor)
 
     def detectable(self) -> bool:
-        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the reward alone."""
+        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the
+        reward alone.
+        """
         target = self.world.first_sighting
         if target is None or target.label is None:
             return False
@@ -117,11 +126,15 @@ class ClosedLoop:
         (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
-        self.sights = sights_of([taken], self._labels)
-        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for people and scoring."""
+        self.seen = faultless_detections([taken], self._labels)
+        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for
+        people and scoring.
+        """
         self.belief = self._limits.belief(
             self._odometry.reading(self.world.ego_motion),
-            self._camera.detect(self.sights, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time),
+            self._camera.detect(
+                self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time
+            ),
             self._memory.tracks(sensor),
             ranges,
         )

@@ -1,7 +1,8 @@
 """What the open loop replays: the keyframes of a scene, the same for every policy.
 
-A film is made once, from a generated street, a recorded drive whose boxes become bodies, or recorded clouds. Nothing
-in it depends on a policy. It holds truth; policies see of it what `care_sim.core.belief.Belief` carries.
+A film is made once, from a generated street, a recorded drive whose boxes become bodies, or
+recorded clouds. Nothing in it depends on a policy. It holds truth; policies see of it what
+`care_sim.core.belief.Belief` carries.
 """
 
 from dataclasses import dataclass
@@ -9,13 +10,13 @@ from dataclasses import dataclass
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Ego
-from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, Sights
+from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One keyframe: `time_s` from the start, `token` by which its source names it, the LiDAR's `sensor` frame, the
-    car's own motion, and everything that could be seen.
+    """One keyframe: `time_s` from the start, `token` by which its source names it, the LiDAR's
+    `sensor` frame, the car's own motion, and everything that could be seen.
     """
 
     time_s: float
@@ -23,16 +24,18 @@ class Shot:
     sensor: Frame
     ego: Ego
     annotations: Annotations
-    sights: Sights
+    seen: IdentifiedDetections
     cloud: Cloud
 
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between keyframes.
+    """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
+    keyframes.
 
-    `hidden` are the objects that its source annotates at the first keyframe though no sensor tells of them there:
-    neither a return nor a pixel. No shot annotates them, so nobody has to find them; they were present all the same.
+    `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
+    of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
+    they were present all the same.
     """
 
     name: str

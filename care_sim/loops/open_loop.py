@@ -1,4 +1,6 @@
-"""One keyframe of the open loop: fire, detect, track, look. The world is a film, which does not react."""
+"""One keyframe of the open loop: fire, detect, track, look. The world is a film, which does not
+react.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,25 +17,27 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import Detector
-from care_sim.perception.track_objects import Identities
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Pool
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.recorded_lidar import RecordedLidar
 
 ANOTHER_TIME_S = 3.0
-"""A film's own boxes are made into false ones this long before and after they were true: at 30 km/h what stands is 25 m
-nearer by then, and what was 20 m away is passed.
+"""A film's own boxes are made into false ones this long before and after they were true: at 30 km/h
+what stands is 25 m nearer by then, and what was 20 m away is passed.
 """
 
 
 @dataclass(frozen=True)
-class Exposure:
-    """The record of one keyframe of the open loop: what was fired, and what the detector made of the returns.
+class OpenLoopKeyframe:
+    """The record of one keyframe of the open loop: what was fired, and what the detector made of
+    the returns.
 
-    `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 at a first sight.
+    `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 at a
+    first sight.
     """
 
     index: int
@@ -46,20 +50,29 @@ class OpenLoop:
     """A film, the sensors and the car's software over its keyframes."""
 
     def __init__(
-        self, film: Film, rig: Rig, sensing: Sensing, seeds: Sequence[np.random.SeedSequence], detector: Detector
+        self,
+        film: Film,
+        rig: Rig,
+        sensing: Sensing,
+        seeds: Sequence[np.random.SeedSequence],
+        detector: Detector,
     ):
         self.film, self.rig = film, rig
         camera_seed, lidar_seed, odometry_seed = seeds
-        objects = sorted({number for shot in film.shots for number in shot.annotations.objects.tolist()})
+        objects = sorted(
+            {number for shot in film.shots for number in shot.annotations.objects.tolist()}
+        )
         self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, lidar_seed)
-        pool = _seen_another_time(film) if sensing.false_positive_rate else NOTHING_TO_HAUNT
-        self._camera = CameraDetector(objects, sensing, film.keyframe_s, camera_seed, film.cameras, pool)
+        pool = _seen_another_time(film) if sensing.false_positive_rate else EMPTY_POOL
+        self._camera = CameraDetector(
+            objects, sensing, film.keyframe_s, camera_seed, film.cameras, pool
+        )
         self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
         self._detector = detector
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
-        self._identities = Identities()
+        self._track_objects = TrackObjects()
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -73,44 +86,52 @@ class OpenLoop:
         """The keyframe for which cells are chosen now."""
         return self.film.shots[self.index]
 
-    def keyframe(self, fired: Cells) -> Exposure:
+    def keyframe(self, fired: Cells) -> OpenLoopKeyframe:
         """Fire `fired`, detect on what came back, and go on to the next keyframe."""
         index, shot = self.index, self.shot
         cloud = self._lidar.fire(fired, shot.cloud)
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
-        self._identities.note(tracks, objects)
+        self._track_objects.note(tracks, objects)
         velocities = self._memory.velocities(tracks, shot.sensor)
         self.index += 1
         self._memory.predict()
         if not self.over:
             self._look(self._picture_of(fired, cloud))
-        return Exposure(index, fired, detections, velocities)
+        return OpenLoopKeyframe(index, fired, detections, velocities)
 
     def true_boxes(self, tracks: Tracks) -> Floats:
-        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without an object, or
-        whose object is not annotated now, keeps its forecast. Truth: for the privileged alone.
+        """(n, 7) where the objects behind forecasts are now, in the sensor frame; a track without
+        an object, or whose object is not annotated now, keeps its forecast. Truth: for the
+        privileged alone.
         """
         annotations = self.shot.annotations
         present = dict(zip(annotations.objects.tolist(), annotations.boxes, strict=True))
-        return self._identities.boxes(tracks, lambda numbers: {n: present[n] for n in numbers if n in present})
+        return self._track_objects.boxes(
+            tracks, lambda numbers: {n: present[n] for n in numbers if n in present}
+        )
 
     def full_scan(self) -> Scan:
-        """What every cell would return now, before noise and dropout. Truth: for the privileged alone."""
-        return Scan(np.arange(self.rig.grid.size), self._lidar.ranges(self._lidar.peek(self.shot.cloud)))
+        """What every cell would return now, before noise and dropout. Truth: for the privileged
+        alone.
+        """
+        return Scan(
+            np.arange(self.rig.grid.size), self._lidar.ranges(self._lidar.peek(self.shot.cloud))
+        )
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
         self.belief = self._limits.belief(
             self._odometry.reading(shot.ego),
-            self._camera.detect(shot.sights, shot.sensor.yaw, self._distances(shot), shot.time_s),
+            self._camera.detect(shot.seen, shot.sensor.yaw, self._distances(shot), shot.time_s),
             self._memory.tracks(shot.sensor),
             ranges,
         )
 
     def _distances(self, shot: Shot) -> Floats:
-        """(n,) metres to every object of the film, 0 for those that are not annotated now: else distance would begin a
-        burst of misses while they are away, and their appearance would fall into it.
+        """(n,) metres to every object of the film, 0 for those that are not annotated now: else
+        distance would begin a burst of misses while they are away, and their appearance would fall
+        into it.
         """
         distances = np.zeros(len(self._rows))
         rows = [self._rows[number] for number in shot.annotations.objects.tolist()]
@@ -124,8 +145,10 @@ class OpenLoop:
 
 
 @lru_cache(maxsize=1)
-def _seen_another_time(film: Film) -> Pool:
-    """All boxes of a film. In a short one those serve that are half of it away, so that every keyframe has some."""
+def _seen_another_time(film: Film) -> BoxPool:
+    """All boxes of a film. In a short one those serve that are half of it away, so that every
+    keyframe has some.
+    """
     times = [shot.time_s for shot in film.shots]
     apart = min(ANOTHER_TIME_S, (times[-1] - times[0]) / 2)
-    return Pool.of([shot.sights.detections for shot in film.shots], times, film.cameras, apart)
+    return BoxPool.of([shot.seen.detections for shot in film.shots], times, film.cameras, apart)

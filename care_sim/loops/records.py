@@ -7,12 +7,14 @@ from care_sim.core.grid import Cells
 
 @dataclass(frozen=True)
 class Keyframe:
-    """The record of one keyframe, from which every metric is computed. Scoring only: it holds truth.
+    """The record of one keyframe, from which every metric is computed. Scoring only: it holds
+    truth.
 
-    `in_view`: the unimpaired camera shows the first-sighting actor; `detected`: the detector reported
-    it. `distance_m`: planar, sensor to its centre, at the scan. The rest holds for the time until the
-    next keyframe: `nearest_m` (centre to centre) and `clearance_m` (hull to hull) at their smallest,
-    `impact_speed_mps` the car's speed at its first contact with any body, else None.
+    `in_view`: the unimpaired camera shows the first-sighting actor; `detected`: the detector
+    reported it. `distance_m`: planar, sensor to its centre, at the scan. The rest holds for the
+    time until the next keyframe: `nearest_m` (centre to centre) and `clearance_m` (hull to hull) at
+    their smallest, `impact_speed_mps` the car's speed at its first contact with any body, else
+    None.
     """
 
     index: int

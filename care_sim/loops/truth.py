@@ -1,15 +1,21 @@
-"""What is true about the coming keyframe: for privileged policies and the scoring alone."""
+"""What is true about the coming keyframe: for privileged policies and the scoring alone.
 
+Truth is asked of the running loop and never enters a `Belief`. `EpisodeTruth` is the one door to it.
+"""
+
+from collections.abc import Callable
 from typing import Protocol
 
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
 from care_sim.core.types import Scan, Tracks
 
 
 class Truth(Protocol):
-    """The truth at the coming keyframe, as a privileged policy may ask for it.
+    """The truth about the coming keyframe, as a privileged policy may ask for it.
 
-    It never enters a `Belief`: `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else.
+    `make_policy` hands it to subclasses of `PrivilegedPolicy` and to nobody else.
     """
 
     def boxes(self, tracks: Tracks) -> Floats:
@@ -20,5 +26,65 @@ class Truth(Protocol):
         ...
 
     def full_scan(self) -> Scan:
-        """What a scan of every cell would return, before noise and dropout: `cells` are all cells, ascending."""
+        """What a scan of every cell would return, before noise and dropout.
+
+        `cells` are all cells, ascending.
+        """
         ...
+
+
+class Loop(Protocol):
+    """What the environments ask of a loop, besides its keyframes."""
+
+    belief: Belief
+
+    def true_boxes(self, tracks: Tracks) -> Floats:
+        """(n, 7) true boxes, in the sensor frame, of the objects behind forecasts."""
+        ...
+
+    def full_scan(self) -> Scan:
+        """What every cell would return now, before noise and dropout."""
+        ...
+
+
+class EpisodeTruth:
+    """A `Truth` that follows an environment from episode to episode."""
+
+    def __init__(self, running: Callable[[], Loop]):
+        self._running = running
+
+    def boxes(self, tracks: Tracks) -> Floats:
+        """(n, 7) true boxes; see `Truth.boxes`."""
+        return self._running().true_boxes(tracks)
+
+    def full_scan(self) -> Scan:
+        """What a scan of every cell would return; see `Truth.full_scan`."""
+        return self._running().full_scan()
+
+
+class TrackObjects:
+    """Which object is behind each track: the one that it was last detected on."""
+
+    def __init__(self) -> None:
+        self._objects: dict[int, int] = {}
+
+    def note(self, tracks: Cells, objects: Cells) -> None:
+        """The tracks with the ids `tracks` (n,) were detected on `objects` (n,)."""
+        self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
+
+    def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
+        """(n, 7) where the objects behind forecasts are now; a track without one keeps its forecast.
+
+        `boxes_of` gives the present sensor-frame boxes of objects, and leaves out those that are
+        nowhere.
+        """
+        boxes = tracks.boxes.copy()
+        known = [
+            (row, self._objects[track])
+            for row, track in enumerate(tracks.ids.tolist())
+            if track in self._objects
+        ]
+        present = boxes_of([number for _, number in known])
+        for row, number in known:
+            boxes[row] = present.get(number, boxes[row])
+        return boxes

@@ -1,4 +1,6 @@
-"""Keyframes of the closed loop as told by somebody who sees all; gathered only while somebody watches."""
+"""Keyframes of the closed loop as told by somebody who sees all; gathered only while somebody
+watches.
+"""
 
 from dataclasses import dataclass
 
@@ -13,19 +15,20 @@ from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.annotated import NOBODY, Sights
-from care_sim.sensors.camera import sights_of
+from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
+from care_sim.sensors.camera import faultless_detections
 
 
 @dataclass(frozen=True)
-class Stance:
-    """What is there when the cells of a keyframe are chosen. Truth: for people and scoring, never for a policy.
+class Situation:
+    """What is there when the cells of a keyframe are chosen. Truth: for people and scoring, never
+    for a policy.
 
-    `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n, 7) of all actors,
-    with `names` and `labels` (n), an index into `CLASSES` or None; `target` is the row of the first-sighting actor,
-    None without one. `belief` is all that the policy was shown. Of its detections, `known` (k,) says which a forecast
-    explains and `false` (k,) which show nothing; `missed` are those that the camera without its faults would have
-    given besides.
+    `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n,
+    7) of all actors, with `names` and `labels` (n), an index into `CLASSES` or None; `target` is
+    the row of the first-sighting actor, None without one. `belief` is all that the policy was
+    shown. Of its detections, `known` (k,) says which a forecast explains and `false` (k,) which
+    show nothing; `missed` are those that the camera without its faults would have given besides.
     """
 
     time_s: float
@@ -42,12 +45,13 @@ class Stance:
 
 
 @dataclass(frozen=True)
-class Moment:
-    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see `care_sim.core.actions`), what the scan returned
-    as `ranges` (E, A) in metres (0 not fired, maximum range no return), and the record for the scoring.
+class WatchedKeyframe:
+    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see
+    `care_sim.core.actions`), what the scan returned as `ranges` (E, A) in metres (0 not fired,
+    maximum range no return), and the record for the scoring.
     """
 
-    stance: Stance
+    situation: Situation
     shares: NDArray[np.uint8]
     ranges: NDArray[np.float32]
     frame: Keyframe
@@ -59,24 +63,27 @@ class Moment:
         return cells, grid.directions[cells] * ranges[cells, None]
 
 
-class Witness:
-    """Follows the running episode of a loop from its start: one `stance` before every keyframe, one `moment` after.
+class EpisodeWatcher:
+    """Follows the running episode of a loop from its start: one `situation` before every keyframe,
+    one `watched` after.
 
     `confidence` is the threshold of the camera's detector.
     """
 
     def __init__(self, loop: ClosedLoop, confidence: float):
         self._loop, self._confidence = loop, confidence
-        self._labels = {actor.body: actor.label for actor in loop.world.actors if actor.label is not None}
-        self._sights: list[Sights] = []
+        self._labels = {
+            actor.body: actor.label for actor in loop.world.actors if actor.label is not None
+        }
+        self._seen: list[IdentifiedDetections] = []
 
-    def stance(self) -> Stance:
+    def situation(self) -> Situation:
         """How things stand before the next keyframe."""
         loop, world = self._loop, self._loop.world
-        self._sights[loop.index :] = [loop.sights]
+        self._seen[loop.index :] = [loop.seen]
         shown = loop.belief.detections
         objects = self._objects(shown)
-        return Stance(
+        return Situation(
             time_s=world.time,
             sensor=loop.sensor,
             ego=world.boxes_of(np.array([world.ego_body]))[0],
@@ -90,24 +97,32 @@ class Witness:
             missed=self._missed(objects),
         )
 
-    def moment(self, stance: Stance, action: Action, demand: Demand | None, frame: Keyframe) -> Moment:
+    def watched(
+        self, situation: Situation, action: Action, demand: Demand | None, frame: Keyframe
+    ) -> WatchedKeyframe:
         """What became of it: the loop has played the keyframe."""
         loop = self._loop
-        return Moment(stance, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame)
+        return WatchedKeyframe(
+            situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame
+        )
 
     def _objects(self, shown: ImageDetections) -> Cells:
-        """(n,) the bodies behind detections, NOBODY behind false ones: a box is that of its picture, unchanged."""
+        """(n,) the bodies behind detections, NOBODY behind false ones: a box is that of its
+        picture, unchanged.
+        """
         if not len(shown):
             return np.empty(0, np.int64)
-        taken = self._sights[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
+        taken = self._seen[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
         drawn = slice(ImageDetections.COLUMNS.index("age"))
         same = (shown.rows()[:, None, drawn] == taken.detections.rows()[None, :, drawn]).all(axis=2)
         bodies = np.append(taken.objects, NOBODY)
-        return bodies[np.where(same.any(axis=1), same.argmax(axis=1) if same.size else NOBODY, NOBODY)]
+        return bodies[
+            np.where(same.any(axis=1), same.argmax(axis=1) if same.size else NOBODY, NOBODY)
+        ]
 
     def _missed(self, given: Cells) -> ImageDetections:
         """What a camera without faults shows now, less the objects that were given."""
-        clear = sights_of([self._loop.picture], self._labels)
+        clear = faultless_detections([self._loop.picture], self._labels)
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence
         return ImageDetections.from_rows(rows[sure & ~np.isin(clear.objects, given)])

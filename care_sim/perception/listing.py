@@ -1,7 +1,8 @@
 """Detectors by name: the proxy, the built-in real ones, and those that installed packages add.
 
-An entry of the group `care_sim.detectors` names a `PointDetector` class, or another callable that makes one from the
-user's parameters. Of two entries with one name the first on the path counts, and a built-in name is taken.
+An entry of the group `care_sim.detectors` names a `PointDetector` class, or another callable that
+makes one from the user's parameters. Of two entries with one name the first on the path counts, and
+a built-in name is taken.
 """
 
 import inspect
@@ -26,7 +27,9 @@ BUILT_IN = (PROXY, *_REAL)
 
 
 def detector_names() -> list[str]:
-    """Names that `make_detector` knows: the proxy, the built-in real ones, then those of installed packages."""
+    """Names that `make_detector` knows: the proxy, the built-in real ones, then those of installed
+    packages.
+    """
     return [*BUILT_IN, *sorted(set(entries()) - set(BUILT_IN))]
 
 
@@ -38,9 +41,9 @@ def check_detector(name: object) -> None:
 def make_detector(name: str, sensor_height_m: float, /, **parameters: object) -> Detector:
     """The detector for a film whose LiDAR stands `sensor_height_m` above the road.
 
-    All but the proxy are handed points alone, whoever wrote them. Raises InvalidInput for an unknown name or
-    parameter, or a value that is not allowed; BrokenDetector for one that cannot be loaded or made; MissingExtra for
-    one whose library is not installed.
+    All but the proxy are handed points alone, whoever wrote them. Raises InvalidInput for an
+    unknown name or parameter, or a value that is not allowed; BrokenDetector for one that cannot be
+    loaded or made; MissingExtra for one whose library is not installed.
     """
     check_detector(name)
     if name == PROXY:
@@ -53,9 +56,13 @@ def make_detector(name: str, sensor_height_m: float, /, **parameters: object) ->
     except (InvalidInput, MissingExtra):
         raise
     except (Exception, SystemExit) as error:
-        raise BrokenDetector(f"detector {name} refuses {shown(parameters)}: {_in_a_line(error)}") from error
+        raise BrokenDetector(
+            f"detector {name} refuses {shown(parameters)}: {_in_a_line(error)}"
+        ) from error
     if not callable(getattr(detector, "detect", None)):
-        raise BrokenDetector(f"detector {name} is no PointDetector: {type(detector).__name__} has no method detect")
+        raise BrokenDetector(
+            f"detector {name} is no PointDetector: {type(detector).__name__} has no method detect"
+        )
     return PointsOnly(name, detector, sensor_height_m)
 
 
@@ -94,7 +101,9 @@ def entries() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in reversed(tuple(entry_points(group=ENTRY_POINTS)))}
 
 
-def _check_parameters(name: str, make: Callable[..., object], parameters: dict[str, object]) -> None:
+def _check_parameters(
+    name: str, make: Callable[..., object], parameters: dict[str, object]
+) -> None:
     try:
         signature = inspect.signature(make)
     except (TypeError, ValueError) as error:
@@ -105,7 +114,9 @@ def _check_parameters(name: str, make: Callable[..., object], parameters: dict[s
     for given in parameters:
         check_known(f"parameter of detector {name}", given, signature.parameters)
     for parameter in accepted:
-        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_POSITIONAL
+        needed = (
+            parameter.default is parameter.empty and parameter.kind is not parameter.VAR_POSITIONAL
+        )
         if needed and parameter.name not in parameters:
             raise InvalidInput(f"detector {name} needs the parameter {parameter.name}")
 

@@ -1,6 +1,7 @@
 """Real detectors: they are handed points, and no truth.
 
-`PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded goes through it.
+`PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded
+goes through it.
 """
 
 from typing import Any, Protocol
@@ -23,14 +24,18 @@ class BrokenDetector(InvalidInput):
 
 
 class PointDetector(Protocol):
-    """What a real detector is: sees the points of one keyframe, remembers nothing of the one before."""
+    """What a real detector is: sees the points of one keyframe, remembers nothing of the one
+    before.
+    """
 
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
-        """Detections in the sensor frame from points (P, 3) in the sensor frame, metres; P may be 0.
+        """Detections in the sensor frame from points (P, 3) in the sensor frame, metres; P may be
+        0.
 
-        The sensor is `sensor_height_m` above the road. The points are the detector's own to change. `returns` are
-        the points on each object, `scores` confidences from 0 to 1, or None. Whatever is returned becomes a track, so
-        what is too unsure to act on is left out here; at most MOST_DETECTIONS.
+        The sensor is `sensor_height_m` above the road. The points are the detector's own to change.
+        `returns` are the points on each object, `scores` confidences from 0 to 1, or None. Whatever
+        is returned becomes a track, so what is too unsure to act on is left out here; at most
+        MOST_DETECTIONS.
         """
         ...
 
@@ -38,8 +43,8 @@ class PointDetector(Protocol):
 class PointsOnly:
     """Makes a `PointDetector` a `care_sim.perception.proxy.Detector`.
 
-    The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be reached from it. What
-    it returns is copied and checked; only then the objects are named.
+    The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be
+    reached from it. What it returns is copied and checked; only then the objects are named.
     """
 
     def __init__(self, name: str, detector: PointDetector, sensor_height_m: float):
@@ -56,32 +61,45 @@ class PointsOnly:
             raise
         except (Exception, SystemExit) as error:
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            raise BrokenDetector(f"detector {self._name} fails on {len(cloud)} points: {reason}") from error
+            raise BrokenDetector(
+                f"detector {self._name} fails on {len(cloud)} points: {reason}"
+            ) from error
         detections = checked(self._name, found, len(cloud))
         return detections, _objects_behind(detections.boxes, cloud)
 
 
 def inside(points: Floats, boxes: Floats) -> NDArray[np.bool_]:
-    """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7). Raises InvalidInput for other boxes."""
+    """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7). Raises InvalidInput for
+    other boxes.
+    """
     if boxes.ndim != 2 or boxes.shape[1] != 7:
         raise InvalidInput(f"boxes must have the shape (n, 7), got {boxes.shape}")
-    rows = [np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1) for box in boxes]
+    rows = [
+        np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1) for box in boxes
+    ]
     return np.array(rows, np.bool_).reshape(len(boxes), len(points))
 
 
 def checked(name: str, found: Any, points: int) -> Detections:
-    """`found` among so many `points`, with arrays of the contract's types; without detections they may be empty lists.
+    """`found` among so many `points`, with arrays of the contract's types; without detections they
+    may be empty lists.
 
     Raises BrokenDetector with the detector's `name` and the fault.
     """
     if not isinstance(found, Detections):
         raise BrokenDetector(f"detector {name} must return Detections, got {type(found).__name__}")
-    columns = ("classes", "boxes", "returns") if found.scores is None else ("classes", "boxes", "returns", "scores")
+    columns = (
+        ("classes", "boxes", "returns")
+        if found.scores is None
+        else ("classes", "boxes", "returns", "scores")
+    )
     table = {column: _numbers(name, column, getattr(found, column)) for column in columns}
     for column, values in table.items():
         shape = (len(table["classes"]), 7) if column == "boxes" else (len(table["classes"]),)
         if values.shape != shape:
-            raise BrokenDetector(f"detector {name}: {column} must have the shape {shape}, got {values.shape}")
+            raise BrokenDetector(
+                f"detector {name}: {column} must have the shape {shape}, got {values.shape}"
+            )
     for fault in _faults(points, **table):
         raise BrokenDetector(f"detector {name}: {fault}")
     classes, returns = table["classes"].astype(np.int64), table["returns"].astype(np.int64)
@@ -92,26 +110,37 @@ def _objects_behind(boxes: Floats, cloud: Cloud) -> Cells:
     """(n,) the object that most of the returns within each box lie on, or NOBODY."""
     named = cloud.objects != NOBODY
     objects = cloud.objects[named]
-    counts = [np.unique(objects[row], return_counts=True) for row in inside(cloud.points[named], boxes)]
-    return np.array([numbers[many.argmax()] if len(numbers) else NOBODY for numbers, many in counts], np.int64)
+    counts = [
+        np.unique(objects[row], return_counts=True) for row in inside(cloud.points[named], boxes)
+    ]
+    return np.array(
+        [numbers[many.argmax()] if len(numbers) else NOBODY for numbers, many in counts], np.int64
+    )
 
 
 def _numbers(name: str, column: str, values: Any) -> Floats:
     try:
         numbers = np.array(values, dtype=np.float64, ndmin=1)
     except (TypeError, ValueError) as error:
-        raise BrokenDetector(f"detector {name}: {column} must be an array of numbers, got {values!r:.80}") from error
+        raise BrokenDetector(
+            f"detector {name}: {column} must be an array of numbers, got {values!r:.80}"
+        ) from error
     if not (np.abs(numbers) <= np.finfo(np.float32).max).all():
         raise BrokenDetector(f"detector {name}: {column} must be finite, in single precision")
     return numbers if numbers.size else numbers.reshape((0, 7) if column == "boxes" else 0)
 
 
-def _faults(points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None) -> list[str]:
+def _faults(
+    points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None
+) -> list[str]:
     rules: dict[str, NDArray[np.bool_] | bool] = {
-        f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes) <= MOST_DETECTIONS,
-        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": _is_count(classes) & (classes < len(CLASSES)),
+        f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes)
+        <= MOST_DETECTIONS,
+        f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": _is_count(classes)
+        & (classes < len(CLASSES)),
         "lengths, widths and heights of boxes must be above 0": boxes[:, 3:6] > 0,
-        f"returns must be whole numbers from 0 to the {points} points": _is_count(returns) & (returns <= points),
+        f"returns must be whole numbers from 0 to the {points} points": _is_count(returns)
+        & (returns <= points),
         "scores must lie in [0, 1]": True if scores is None else (scores >= 0) & (scores <= 1),
     }
     return [rule for rule, kept in rules.items() if not np.all(kept)]

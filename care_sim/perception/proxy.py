@@ -1,7 +1,9 @@
-"""Detectors as the open loop calls them, and the paper's proxy: an object is detected when enough fired rays hit it.
+"""Detectors as the open loop calls them, and the paper's proxy: an object is detected when enough
+fired rays hit it.
 
-The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is made a `Detector`
-by `care_sim.perception.points_only.PointsOnly`; `care_sim.perception.listing.make_detector` gives either by name.
+The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is
+made a `Detector` by `care_sim.perception.points_only.PointsOnly`;
+`care_sim.perception.listing.make_detector` gives either by name.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,8 +23,8 @@ class Detector(Protocol):
     """What the open loop calls at every keyframe."""
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
-        """Detections in the sensor frame from the returns of the fired cells, and (n,) the annotated object behind
-        each, or NOBODY, for privileged policies and the scoring.
+        """Detections in the sensor frame from the returns of the fired cells, and (n,) the
+        annotated object behind each, or NOBODY, for privileged policies and the scoring.
         """
         ...
 
@@ -39,7 +41,9 @@ class ReturnsDetector:
         self._labels = np.array([labels[body] for body in sorted(labels)], np.int64)
         self._min_returns = min_returns
 
-    def detect(self, hits: Integers, boxes_of: Callable[[Integers], Floats]) -> tuple[Detections, Integers]:
+    def detect(
+        self, hits: Integers, boxes_of: Callable[[Integers], Floats]
+    ) -> tuple[Detections, Integers]:
         """Detections from the body id behind every fired ray, and the detected ids for the scoring.
 
         `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
@@ -52,8 +56,9 @@ class ReturnsDetector:
 
 
 class ReturnsProxy:
-    """`ReturnsDetector` over a film: every annotated object with `min_returns` of the cloud's returns on it is
-    detected with its true box. Raises InvalidInput unless `min_returns` is a whole number of 1 or more.
+    """`ReturnsDetector` over a film: every annotated object with `min_returns` of the cloud's
+    returns on it is detected with its true box. Raises InvalidInput unless `min_returns` is a whole
+    number of 1 or more.
     """
 
     def __init__(self, min_returns: int = MIN_RETURNS):

@@ -1,7 +1,7 @@
 """A learned detector from a TorchScript file, and the example to follow for one's own.
 
-A detector is any class with `detect(points, sensor_height_m)`; see `care_sim.perception.points_only.PointDetector`.
-One around an ONNX file, in a package of its own:
+A detector is any class with `detect(points, sensor_height_m)`; see
+`care_sim.perception.points_only.PointDetector`. One around an ONNX file, in a package of its own:
 
     class OnnxDetector:
         def __init__(self, file: str):
@@ -33,17 +33,19 @@ from care_sim.perception.points_only import inside
 class TorchScriptDetector:
     """Runs the module in `file`: `forward(points, sensor_height_m) -> (classes, boxes, scores)`.
 
-    `points` is a float32 tensor (P, 3) in the sensor frame, `sensor_height_m` a float; `classes` (n,) index
-    `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw in the sensor frame, `scores`
-    (n,) lie in [0, 1]. Runs on the CPU. Needs torch. Raises MissingExtra without it, InvalidInput for a file that is
-    no TorchScript module.
+    `points` is a float32 tensor (P, 3) in the sensor frame, `sensor_height_m` a float; `classes`
+    (n,) index `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw
+    in the sensor frame, `scores` (n,) lie in [0, 1]. Runs on the CPU. Needs torch. Raises
+    MissingExtra without it, InvalidInput for a file that is no TorchScript module.
     """
 
     def __init__(self, file: str | PathLike[str]):
         self._torch = import_torch()
         self._file = fspath(file)
         if not Path(file).is_file():
-            raise InvalidInput(f"{self._file}: no such file; allowed is a TorchScript module (torch.jit.save)")
+            raise InvalidInput(
+                f"{self._file}: no such file; allowed is a TorchScript module (torch.jit.save)"
+            )
         try:
             self._module = self._torch.jit.load(self._file, map_location="cpu").eval()
         except RuntimeError as error:
@@ -52,6 +54,8 @@ class TorchScriptDetector:
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
         """See `care_sim.perception.points_only.PointDetector`."""
         with self._torch.inference_mode():
-            outputs = self._module(self._torch.from_numpy(points.astype(np.float32)), float(sensor_height_m))
+            outputs = self._module(
+                self._torch.from_numpy(points.astype(np.float32)), float(sensor_height_m)
+            )
         classes, boxes, scores = (output.numpy() for output in outputs)
         return Detections(classes, boxes, inside(points, boxes).sum(axis=1), scores)

@@ -21,7 +21,9 @@ class MemoryRules:
     first_speed_mps: float = 15.0
     """A track seen once has no velocity: its gate grows by this much a second (54 km/h)."""
     coast_s: float = 1.5
-    """An undetected track is forecast this long, then dropped (CenterPoint's tracker: 3 frames at 2 Hz)."""
+    """An undetected track is forecast this long, then dropped (CenterPoint's tracker: 3 frames at 2
+    Hz).
+    """
 
 
 class TrackMemory:
@@ -36,7 +38,8 @@ class TrackMemory:
     def tracks(self, sensor: Frame) -> Tracks:
         """Current tracks in the sensor frame at `sensor`, nearest first.
 
-        After `predict` they are the forecasts for the coming keyframe, after `update` its estimates.
+        After `predict` they are the forecasts for the coming keyframe, after `update` its
+        estimates.
         """
         tracks = self._tracks
         boxes = sensor.boxes_to_local(tracks.boxes)
@@ -55,7 +58,9 @@ class TrackMemory:
         tracks = self._tracks
         boxes = tracks.boxes.copy()
         boxes[:, :2] += tracks.velocities * self._keyframe_s
-        self._tracks = Tracks(tracks.ids, tracks.classes, boxes, tracks.velocities, tracks.misses, tracks.hits)
+        self._tracks = Tracks(
+            tracks.ids, tracks.classes, boxes, tracks.velocities, tracks.misses, tracks.hits
+        )
 
     def update(self, detections: Detections, sensor: Frame) -> Cells:
         """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
@@ -75,7 +80,9 @@ class TrackMemory:
         return ids
 
     def velocities(self, ids: Cells, sensor: Frame) -> Floats:
-        """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0 of a new one."""
+        """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0
+        of a new one.
+        """
         rows = np.searchsorted(self._tracks.ids, ids)
         return turned(self._tracks.velocities[rows], -sensor.yaw)
 

@@ -10,8 +10,10 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
 Range = tuple[float, float]
-LONGEST_S = 60.0
-"""Of an episode: a car at 60 km/h comes to the end of the road, and a picture is as old as an observation can say."""
+LONGEST_EPISODE_S = 60.0
+"""Of an episode: a car at 60 km/h comes to the end of the road, and a picture is as old as an
+observation can say.
+"""
 EGO_SPEEDS_MPS = (0.5, 60.0)
 """From a walk to far beyond any street's traffic: what the ego's speed may be."""
 
@@ -35,7 +37,7 @@ LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
 class Scenario(ABC):
     """The physics of a scenario; a seeded generator places and times what its ranges leave open."""
 
-    duration_s: float = bounded(6.0, 0.05, LONGEST_S)
+    duration_s: float = bounded(6.0, 0.05, LONGEST_EPISODE_S)
 
     def __post_init__(self) -> None:
         check_fields(self, f" of {type(self).__name__.lower()}")
@@ -51,7 +53,9 @@ def draw(rng: np.random.Generator, values: Range) -> float:
 
 
 def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
-    """Closed house fronts at y = `right_y` and y = `left_y`, from behind the ego to beyond its view."""
+    """Closed house fronts at y = `right_y` and y = `left_y`, from behind the ego to beyond its
+    view.
+    """
     length, depth, _ = CATALOGUE["terrace"].size
     middle = length / 2 - 30.0
     world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0), backdrop=True)

@@ -37,45 +37,50 @@ class CrossingScenario(Scenario):
     """A two-way street with a parking lane on each side. The occluder stands in the right one; the
     person waits hidden behind its far end, then runs straight across to the far kerb.
 
-    Perception does not report the occluder: a trailer or a hoarding is none of the five classes. With
-    `occluder="truck"` (or "van") and `occluder_reported=True` it does, and the person emerges inside that
-    track's dilated hull: the second reading of the scene. Ranges are drawn uniformly by the seed.
+    Perception does not report the occluder: a trailer or a hoarding is none of the five classes.
+    With `occluder="truck"` (or "van") and `occluder_reported=True` it does, and the person emerges
+    inside that track's dilated hull: the second reading of the scene. Ranges are drawn uniformly by
+    the seed.
     """
 
     occluder: str = "trailer"
     occluder_reported: bool = False
     ego_speed_mps: Range = bounded(EGO_SPEED_MPS, *EGO_SPEEDS_MPS)
     crossing_m: Range = bounded((37.0, 41.0), 5, 200)
-    """From the ego's first position to the person's line: four to five seconds of approach, so that every
-    track has settled."""
+    """From the ego's first position to the person's line: four to five seconds of approach, so that
+    every track has settled."""
     gap_m: Range = bounded((0.8, 1.2), 0.05, 20)
     """From the end of the occluder to the person's line: about a step."""
     run_mps: Range = bounded((2.6, 2.8), 0.1, 12.5)
-    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050); no sprinter exceeds
-    12.5."""
+    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050); no
+    sprinter exceeds 12.5."""
     run_up_mps2: float = bounded(5.0, 0.1, 20)
     """Full speed after half a second and 0.7 m, all of it in the occluder's shade."""
     kerb_offset_m: Range = bounded((-0.2, 0.2), -1, 1)
     """How far the occluder stands off the middle of the parking lane."""
     encroachment_s: Range = bounded((0.3, 0.6), -10, 10)
-    """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes: a near miss. Above 0
-    nobody is hit by a car that does nothing, so a collision can only come from the braking; below 0 is a
-    collision course. Both bounds were picked, from geometry alone, so that a full scan sees the person at
-    about the distance of the paper's, 15 m.
+    """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes: a near
+    miss. Above 0 nobody is hit by a car that does nothing, so a collision can only come from the
+    braking; below 0 is a collision course. Both bounds were picked, from geometry alone, so that a
+    full scan sees the person at about the distance of the paper's, 15 m.
     """
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_known("occluder", self.occluder, OCCLUDERS)
         if self.occluder_reported and CATALOGUE[self.occluder].label is None:
-            raise InvalidInput(f"occluder_reported needs occluder='truck' or 'van', a {self.occluder} has no class")
+            raise InvalidInput(
+                f"occluder_reported needs occluder='truck' or 'van', a {self.occluder} has no class"
+            )
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
         ego_speed, crossing_x = draw(rng, self.ego_speed_mps), draw(rng, self.crossing_m)
         traffic = Traffic((1, -1), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, ego_speed)
-        self._add_person(world, self._add_occluder(world, crossing_x, rng), crossing_x, ego_speed, rng)
+        self._add_person(
+            world, self._add_occluder(world, crossing_x, rng), crossing_x, ego_speed, rng
+        )
         self.furnish(world, crossing_x, rng)
         front = LEFT_PARKING_Y + PARKING_WIDTH_M / 2 + PAVEMENT_WIDTH_M
         line_with_terraces(world, LANE_WIDTH_M - front, front)
@@ -94,7 +99,12 @@ class CrossingScenario(Scenario):
         return y - width / 2 + SHADE_M
 
     def _add_person(
-        self, world: World, start_y: float, crossing_x: float, ego_speed: float, rng: np.random.Generator
+        self,
+        world: World,
+        start_y: float,
+        crossing_x: float,
+        ego_speed: float,
+        rng: np.random.Generator,
     ) -> None:
         speed, encroachment = draw(rng, self.run_mps), draw(rng, self.encroachment_s)
         ego_length, ego_width, _ = world.ego_kind.size

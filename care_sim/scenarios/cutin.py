@@ -22,17 +22,20 @@ from care_sim.world.world import World
 
 @dataclass(frozen=True)
 class CutIn(Scenario):
-    """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the right
-    lane; a car standing hidden before it pulls out (highway-env lane change, IDM) ahead of the ego.
+    """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the
+    right lane; a car standing hidden before it pulls out (highway-env lane change, IDM) ahead of
+    the ego.
 
-    The bus is one of the five classes; `occluder_reported=False` keeps perception silent about it. Ranges
-    are drawn uniformly by the seed.
+    The bus is one of the five classes; `occluder_reported=False` keeps perception silent about it.
+    Ranges are drawn uniformly by the seed.
     """
 
     occluder_reported: bool = True
     ego_speed_mps: Range = bounded(EGO_SPEED_MPS, *EGO_SPEEDS_MPS)
     stop_m: Range = bounded((42.0, 46.0), 5, 200)
-    """From the ego's first position to the front of the bus: far enough for the bus to hide the car."""
+    """From the ego's first position to the front of the bus: far enough for the bus to hide the
+    car.
+    """
     gap_m: Range = bounded((2.0, 3.0), 0.05, 50)
     """Between bus and car, as behind a bus that has closed up at its stop."""
     pull_out_s: Range = bounded((2.0, 2.5), -10, 20)

@@ -1,4 +1,5 @@
-"""What sensors measure of a scene that somebody annotated, with the object behind each return and each box.
+"""What sensors measure of a scene that somebody annotated, with the object behind each return and
+each box.
 
 The objects are truth: for the scoring and privileged policies.
 """
@@ -18,8 +19,9 @@ NOBODY = -1
 
 @dataclass(frozen=True)
 class Annotations:
-    """The annotated objects of a keyframe: `objects` (n,) numbers that hold for the whole film, `classes` (n,) into
-    `care_sim.core.types.CLASSES`, `boxes` (n, 7) in the sensor frame. All ranges; the scoring chooses.
+    """The annotated objects of a keyframe: `objects` (n,) numbers that hold for the whole film,
+    `classes` (n,) into `care_sim.core.types.CLASSES`, `boxes` (n, 7) in the sensor frame. All
+    ranges; the scoring chooses.
     """
 
     objects: Cells
@@ -35,8 +37,8 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 
 @dataclass(frozen=True)
 class Cloud:
-    """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points` (P, 3) in the
-    sensor frame, `objects` (P,) the annotated object that each lies on or NOBODY.
+    """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
+    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NOBODY.
     """
 
     cells: Cells
@@ -53,9 +55,9 @@ class Cloud:
 
 
 @dataclass(frozen=True)
-class Sights:
-    """What the unimpaired cameras see: `detections`, age 0, and `objects` (n,) the annotated object behind each box or
-    NOBODY.
+class IdentifiedDetections:
+    """What the unimpaired cameras see: `detections`, age 0, and `objects` (n,) the annotated object
+    behind each box or NOBODY.
     """
 
     detections: ImageDetections

@@ -10,11 +10,11 @@ from care_sim.core.frames import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.annotated import Sights
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.picture_kernels import tally
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, Ghosts, Pool
+from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool, FalseBoxes
 from care_sim.world.bullet import PixelWindow
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
@@ -26,14 +26,18 @@ FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAME
 
 
 def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
-    """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in view."""
+    """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in
+    view.
+    """
     held: PixelWindow = window_around(camera.project_boxes(boxes), camera.width, camera.height)
     return held
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What the unimpaired camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,) visible."""
+    """What the unimpaired camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,)
+    visible.
+    """
 
     bodies: Integers
     boxes: Floats
@@ -41,19 +45,25 @@ class Picture:
 
     @classmethod
     def of(cls, ids: Integers, window: PixelWindow | None = None) -> "Picture":
-        """Read the box of every body off a picture of ids (height, width), all of it or that of a window."""
+        """Read the box of every body off a picture of ids (height, width), all of it or that of a
+        window.
+        """
         table = tally(ids)
         left, top = window[:2] if window is not None else (0, 0)
-        return cls(table[:, 0], table[:, 1:5] + np.array([left, top, left, top], float), table[:, 5])
+        return cls(
+            table[:, 0], table[:, 1:5] + np.array([left, top, left, top], float), table[:, 5]
+        )
 
     def shows(self, body: int) -> bool:
         """Whether enough of a body is visible for a box."""
         return bool(((self.bodies == body) & (self.pixels >= MIN_PIXELS)).any())
 
 
-def sights_of(pictures: Sequence[Picture], labels: Mapping[int, int]) -> Sights:
-    """What the unimpaired camera detector reports of pictures, one a camera of the rig: a box for every body that
-    `labels` maps to a class and that shows enough pixels.
+def faultless_detections(
+    pictures: Sequence[Picture], labels: Mapping[int, int]
+) -> IdentifiedDetections:
+    """What the unimpaired camera detector reports of pictures, one a camera of the rig: a box for
+    every body that `labels` maps to a class and that shows enough pixels.
     """
     rows, bodies = [], []
     for camera, picture in enumerate(pictures):
@@ -63,14 +73,14 @@ def sights_of(pictures: Sequence[Picture], labels: Mapping[int, int]) -> Sights:
                 rows.append((labels[body], confidence_of(pixels), *box, camera, 0.0, 0.0))
                 bodies.append(body)
     table = np.array(rows, float).reshape(-1, len(ImageDetections.COLUMNS))
-    return Sights(ImageDetections.from_rows(table), np.array(bodies, np.int64))
+    return IdentifiedDetections(ImageDetections.from_rows(table), np.array(bodies, np.int64))
 
 
 class CameraDetector:
-    """Detections as they arrive: sights that err and lag as `sensing` says.
+    """Detections as they arrive: they err and lag as `sensing` says.
 
-    `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows. False boxes are made
-    from `pool`.
+    `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows.
+    False boxes are made from `pool`.
     """
 
     def __init__(
@@ -80,33 +90,40 @@ class CameraDetector:
         keyframe_s: float,
         seed: np.random.SeedSequence,
         cameras: Sequence[PinholeCamera],
-        pool: Pool = NOTHING_TO_HAUNT,
+        pool: BoxPool = EMPTY_POOL,
     ):
         ghosts, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
         self._objects, self._sensing = np.asarray(objects, np.int64), sensing
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
-        self._ghosts = Ghosts(pool, sensing.false_positive_rate, len(cameras), ghosts)
+        self._ghosts = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), ghosts)
         self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
 
-    def detect(self, sights: Sights, heading: float, ranges: Floats, time_s: float) -> ImageDetections:
-        """The newest detections that are due, the surest first; `sights` are the latest, taken at `heading`.
+    def detect(
+        self, identified: IdentifiedDetections, heading: float, ranges: Floats, time_s: float
+    ) -> ImageDetections:
+        """The newest detections that are due, the surest first; `identified` are the latest, taken
+        at `heading`.
 
         `ranges` (n,) are the distances of the objects in metres, in their order.
         """
-        rows = sights.detections.rows()
+        rows = identified.detections.rows()
         missed, ghosts = self._misses.draw(ranges), self._ghosts.draw(rows, time_s)
         if missed.any():
-            rows = rows[~np.isin(sights.objects, self._objects[missed])]
+            rows = rows[~np.isin(identified.objects, self._objects[missed])]
         if len(ghosts):
             rows = _mingled(rows, ghosts)
-        kept = rows[(rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))]
+        kept = rows[
+            (rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))
+        ]
         surest_first = kept[np.lexsort((kept[:, 2], -kept[:, 1]))]
         return self._delay.newest(ImageDetections.from_rows(surest_first), heading)
 
 
 def _mingled(rows: Floats, others: Floats) -> Floats:
-    """Both tables in an order of their numbers, so that of boxes that sort alike none says where it came from."""
+    """Both tables in an order of their numbers, so that of boxes that sort alike none says where it
+    came from.
+    """
     together = np.concatenate([rows, others])
     return together[np.lexsort(together.T)]

@@ -7,8 +7,8 @@ import numpy as np
 from care_sim.core.frames import Floats
 
 MIN_PIXELS = 12
-"""Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360, and
-an unoccluded adult at about 40 m."""
+"""Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360,
+and an unoccluded adult at about 40 m."""
 FULL_CONFIDENCE = 3 * MIN_PIXELS
 """Visible pixels at which n / (n + FULL_CONFIDENCE) is one half; the least box then has confidence
 0.25, the detector threshold of the paper."""

@@ -9,12 +9,15 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.rig import SENSOR_HEIGHT_M
 from care_sim.core.types import Scan
-from care_sim.sensors.engines.engine import RayEngine
+from care_sim.sensors.engines import RayEngine
 from care_sim.world.bullet import NO_BODY
 
-LIDAR_POSITION = (-0.445, 0.0, 1.84)
-"""Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault Zoe."""
+LIDAR_POSITION = (-0.445, 0.0, SENSOR_HEIGHT_M)
+"""Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault
+Zoe.
+"""
 NEAREST_M = 0.01
 """A noisy return stays this far from 0 m (not fired) and from the reach (no return)."""
 
@@ -24,12 +27,21 @@ class Lidar:
     every policy meets the same noise (common random numbers).
     """
 
-    def __init__(self, grid: AngularGrid, engine: RayEngine, faults: LidarFaults, seed: np.random.SeedSequence):
+    def __init__(
+        self,
+        grid: AngularGrid,
+        engine: RayEngine,
+        faults: LidarFaults,
+        seed: np.random.SeedSequence,
+    ):
         self.grid = grid
         self._engine = engine
         self._faults = faults
         self._dead = dead_cells(grid, faults.lidar_dead_rows)
-        self._noise, self._dropout = np.random.default_rng(seed), np.random.default_rng(seed.spawn(1)[0])
+        self._noise, self._dropout = (
+            np.random.default_rng(seed),
+            np.random.default_rng(seed.spawn(1)[0]),
+        )
 
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
@@ -49,7 +61,9 @@ class Lidar:
         """
         ranges, ids = self._engine.cast(sensor, cells)
         if self._faults.lidar_range_sigma > 0:
-            errors = self._faults.lidar_range_sigma * self._noise.standard_normal(self.grid.size)[cells]
+            errors = (
+                self._faults.lidar_range_sigma * self._noise.standard_normal(self.grid.size)[cells]
+            )
             (hit,) = np.isfinite(ranges).nonzero()
             ranges = ranges.copy()
             ranges[hit] = noisy(ranges[hit], errors[hit], self.grid.range_m)
@@ -60,8 +74,8 @@ class Lidar:
 
 
 def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
-    """(n,) `ranges` with `errors`, metres. What would come within NEAREST_M of 0 or of the reach, or beyond, is folded
-    back: cut, it would heap up at one number, which tells that it was cut.
+    """(n,) `ranges` with `errors`, metres. What would come within NEAREST_M of 0 or of the reach,
+    or beyond, is folded back: cut, it would heap up at one number, which tells that it was cut.
     """
     erring = ranges + errors
     span = reach - 2 * NEAREST_M
@@ -71,7 +85,9 @@ def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
 
 
 def dead_cells(grid: AngularGrid, rows: Sequence[int]) -> NDArray[np.bool_]:
-    """(N,) mask of the cells of dead rows. Raises InvalidInput for a row that the grid does not have."""
+    """(N,) mask of the cells of dead rows. Raises InvalidInput for a row that the grid does not
+    have.
+    """
     for row in rows:
         if row >= grid.rows:
             raise InvalidInput(f"lidar_dead_rows must lie in 0..{grid.rows - 1}, got {row}")

@@ -10,15 +10,18 @@ from care_sim.sensors.lidar import dead_cells, noisy
 
 
 class RecordedLidar:
-    """Hands out the returns of fired cells. Noise and dropout are drawn one a cell, fired or not, so that every
-    policy meets the same (common random numbers).
+    """Hands out the returns of fired cells. Noise and dropout are drawn one a cell, fired or not,
+    so that every policy meets the same (common random numbers).
     """
 
     def __init__(self, grid: AngularGrid, faults: LidarFaults, seed: np.random.SeedSequence):
         self.grid = grid
         self._faults = faults
         self._live = ~dead_cells(grid, faults.lidar_dead_rows)
-        self._noise, self._dropout = np.random.default_rng(seed), np.random.default_rng(seed.spawn(1)[0])
+        self._noise, self._dropout = (
+            np.random.default_rng(seed),
+            np.random.default_rng(seed.spawn(1)[0]),
+        )
 
     def fire(self, cells: Cells, cloud: Cloud) -> Cloud:
         """The returns of `cells` (k,) in the recorded `cloud`, after the faults."""
@@ -44,7 +47,10 @@ class RecordedLidar:
         return nearest
 
     def _noisy(self, cloud: Cloud) -> Cloud:
-        errors = self._faults.lidar_range_sigma * self._noise.standard_normal(self.grid.size)[cloud.cells]
+        errors = (
+            self._faults.lidar_range_sigma
+            * self._noise.standard_normal(self.grid.size)[cloud.cells]
+        )
         ranges = np.linalg.norm(cloud.points, axis=1)
         moved = noisy(ranges, errors, self.grid.range_m) / ranges
         return Cloud(cloud.cells, cloud.points * moved[:, None], cloud.objects)

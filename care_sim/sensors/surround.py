@@ -1,7 +1,8 @@
 """Six cameras and a LiDAR around the car: everything that a world shows of itself at one moment.
 
-The ring is that of nuScenes (Caesar et al. 2020, Fig. 4): front and sides 70 degrees wide and 55 degrees apart, the
-back 110 degrees wide, at the places of one of its calibrations, seen from LIDAR_TOP.
+The ring is that of nuScenes (Caesar et al. 2020, Fig. 4): front and sides 70 degrees wide and 55
+degrees apart, the back 110 degrees wide, at the places of one of its calibrations, seen from
+LIDAR_TOP.
 """
 
 from collections.abc import Mapping
@@ -11,8 +12,15 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.annotated import NOBODY, Cloud, Sights
-from care_sim.sensors.camera import CAMERA_FROM_LIDAR, CAMERA_HEIGHT, CAMERA_WIDTH, Picture, sights_of, window_on
+from care_sim.sensors.annotated import NOBODY, Cloud, IdentifiedDetections
+from care_sim.sensors.camera import (
+    CAMERA_FROM_LIDAR,
+    CAMERA_HEIGHT,
+    CAMERA_WIDTH,
+    Picture,
+    faultless_detections,
+    window_on,
+)
 from care_sim.world.bullet import NO_BODY, BulletWorld
 
 
@@ -31,29 +39,35 @@ SURROUND_CAMERAS = (
 """Front, front left, front right, back left, back right, back."""
 
 
-def look_around(
+def surround_detections(
     world: BulletWorld,
     cameras: tuple[PinholeCamera, ...],
     sensor: Frame,
     labels: Mapping[int, int],
     boxes: Floats,
-) -> Sights:
-    """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes, by body id.
+) -> IdentifiedDetections:
+    """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes,
+    by body id.
 
     `boxes` (n, 7) are those of the bodies in the sensor frame; nothing outside them is rendered.
     """
     windows = [window_on(camera, boxes) for camera in cameras]
     views = zip(cameras, windows, strict=True)
-    return sights_of([Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views], labels)
+    return faultless_detections(
+        [Picture.of(world.body_ids(camera, sensor, window), window) for camera, window in views],
+        labels,
+    )
 
 
-def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float) -> Cloud:
-    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids, of the road NO_BODY or
-    the world's ground.
+def full_sweep(
+    world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float
+) -> Cloud:
+    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids, of the road
+    NO_BODY or the world's ground.
 
-    `boxes` (n, 7) in the sensor frame hold all bodies. Rays are cast where these are; all others can only meet the
-    road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world without ground it hides
-    nothing.
+    `boxes` (n, 7) in the sensor frame hold all bodies. Rays are cast where these are; all others
+    can only meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a
+    world without ground it hides nothing.
     """
     covered = np.zeros(grid.size, dtype=bool)
     for hull in grid.hulls(boxes):
@@ -68,7 +82,9 @@ def full_sweep(world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floa
 
 
 def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
-    """(N,) the distance along every ray to a plane `height_m` below the sensor, inf beyond the reach of a ray."""
+    """(N,) the distance along every ray to a plane `height_m` below the sensor, inf beyond the
+    reach of a ray.
+    """
     fall = -grid.directions[:, 2]
     ranges = np.divide(height_m, fall, out=np.full(grid.size, np.inf), where=fall > 0)
     return np.where(ranges <= grid.range_m, ranges, np.inf)

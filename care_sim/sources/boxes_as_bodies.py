@@ -9,8 +9,8 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
-from care_sim.sensors.annotated import Annotations, Cloud, Sights
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
+from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.world.bodies import sized
 from care_sim.world.bullet import BulletWorld
 
@@ -45,7 +45,7 @@ class Prop:
 
 def shoot(
     props: Sequence[Prop], sensor: Frame, height_m: float, grid: AngularGrid
-) -> tuple[Annotations, Sights, Cloud]:
+) -> tuple[Annotations, IdentifiedDetections, Cloud]:
     """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell fired.
 
     The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing: real roads undulate, and a
@@ -57,10 +57,10 @@ def shoot(
         bodies = {id(prop): _add(world, prop, sensor) for prop in props}
         numbers = {bodies[id(prop)]: prop.number for prop in reported}
         labels = {bodies[id(prop)]: CLASSES.index(str(prop.label)) for prop in reported}
-        seen = look_around(world, SURROUND_CAMERAS, sensor, labels, annotations.boxes)
+        seen = surround_detections(world, SURROUND_CAMERAS, sensor, labels, annotations.boxes)
         swept = full_sweep(world, grid, sensor, _table([prop.bounds for prop in props]), height_m)
-    sights = Sights(seen.detections, numbers_of(seen.objects, numbers))
-    return annotations, sights, Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
+    identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
+    return annotations, identified, Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
 
 
 def annotations_of(props: Sequence[Prop]) -> Annotations:

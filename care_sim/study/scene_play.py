@@ -13,10 +13,10 @@ from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
-from care_sim.evaluation.recall import Score, Tally
+from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
-from care_sim.loops.open_loop import Exposure
+from care_sim.loops.open_loop import OpenLoopKeyframe
 from care_sim.study.episode_play import answer, peak_rss_mb
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.task import FULL, REFERENCE, Row
@@ -42,8 +42,8 @@ class Playback:
     that a forecast explains.
     """
 
-    score: Score
-    exposures: list[Exposure]
+    score: SceneScore
+    keyframes: list[OpenLoopKeyframe]
     tracks: float
     explained: float
     wall_s: float
@@ -51,7 +51,7 @@ class Playback:
     @property
     def fired(self) -> list[Cells]:
         """The cells of every keyframe."""
-        return [exposure.fired for exposure in self.exposures]
+        return [record.fired for record in self.keyframes]
 
 
 class PlayedScene:
@@ -84,8 +84,8 @@ class PlayedScene:
             "version": care_sim.__version__,
             "digest": config.digest(),
             "film_hash": self._film_hash,
-            "episode_hash": _episode_hash(playback.exposures),
-            "keyframes": len(playback.exposures),
+            "episode_hash": _episode_hash(playback.keyframes),
+            "keyframes": len(playback.keyframes),
             **asdict(score.tally()),
             **_strata(score),
             "ttfds": tuple(score.delays.tolist()),
@@ -126,9 +126,9 @@ def play(config: PlayConfig, film: Film) -> Playback:
             belief = loop.belief
             counts.append((len(belief.tracks), int(explained(belief.detections, belief.tracks, loop.rig).sum())))
             observation, *_ = env.step(policy(observation))
-        score, exposures = env.score, env.exposures
+        score, keyframes = env.score, env.keyframes
     tracks, explanations = np.mean(counts, axis=0).tolist()
-    return Playback(score, exposures, tracks, explanations, time.perf_counter() - started)
+    return Playback(score, keyframes, tracks, explanations, time.perf_counter() - started)
 
 
 def without_events(row: Row) -> Row:
@@ -154,9 +154,11 @@ def film_hash(film: Film) -> str:
     cameras = tuple(astuple(camera) for camera in film.cameras)
     content = hashlib.sha256(portable_bytes(film.name, cameras, film.sensor_height_m, film.keyframe_s))
     for shot in film.shots:
-        seen, sights, cloud = shot.annotations, shot.sights, shot.cloud
+        seen, identified, cloud = shot.annotations, shot.seen, shot.cloud
         content.update(portable_bytes(shot.time_s, shot.token, astuple(shot.ego)))
-        content.update(portable_bytes(seen.objects, seen.classes, seen.boxes, sights.detections.rows(), sights.objects))
+        content.update(
+            portable_bytes(seen.objects, seen.classes, seen.boxes, identified.detections.rows(), identified.objects)
+        )
         content.update(portable_bytes(cloud.cells, cloud.objects))
     hidden = film.hidden
     content.update(portable_bytes(hidden.objects, hidden.classes, hidden.boxes))
@@ -168,7 +170,7 @@ def _reference(config: PlayConfig) -> PlayConfig:
     return config.changed(policy=REFERENCE, policy_parameters=())
 
 
-def _strata(score: Score) -> Row:
+def _strata(score: SceneScore) -> Row:
     return {
         f"{kind}/{label}/{name}": value
         for kind, masks in strata(score.sightings.frames).items()
@@ -177,15 +179,15 @@ def _strata(score: Score) -> Row:
     }
 
 
-def _sightings(score: Score) -> dict[str, list[Any]]:
+def _sightings(score: SceneScore) -> dict[str, list[Any]]:
     """What is known of the events, as columns; metres and radians to three decimals."""
     rows = score.event_rows()
     columns = {name: [row[name] for row in rows] for name in EVENT_COLUMNS}
     return {name: [round(v, 3) if isinstance(v, float) else v for v in column] for name, column in columns.items()}
 
 
-def _episode_hash(exposures: Sequence[Exposure]) -> str:
+def _episode_hash(keyframes: Sequence[OpenLoopKeyframe]) -> str:
     content = hashlib.sha256()
-    for exposure in exposures:
-        content.update(portable_bytes(exposure.fired, exposure.detections.classes, exposure.detections.boxes))
+    for record in keyframes:
+        content.update(portable_bytes(record.fired, record.detections.classes, record.detections.boxes))
     return content.hexdigest()[:16]

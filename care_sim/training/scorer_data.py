@@ -104,11 +104,11 @@ def _keyframe(loop: OpenLoop, belief: Belief, cues: Cues, rng: np.random.Generat
 
 
 def _first_camera(shot: Shot) -> Shot:
-    sights = shot.sights
-    seen = np.flatnonzero(sights.detections.cameras == 0)
-    columns = {field.name: getattr(sights.detections, field.name)[seen] for field in fields(sights.detections)}
-    front = replace(sights, detections=replace(sights.detections, **columns), objects=sights.objects[seen])
-    return replace(shot, sights=front)
+    identified = shot.seen
+    seen = np.flatnonzero(identified.detections.cameras == 0)
+    columns = {field.name: getattr(identified.detections, field.name)[seen] for field in fields(identified.detections)}
+    front = replace(identified, detections=replace(identified.detections, **columns), objects=identified.objects[seen])
+    return replace(shot, seen=front)
 
 
 def _joined(parts: list[Examples]) -> Examples:

@@ -1,8 +1,8 @@
 """The catalogue of bodies: what each looks like, how large it is, and where the size comes from.
 
 Body frame: x forward, y left, z up, origin on the ground under the centre. Sizes are length, width,
-height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as in the
-anchors of MMDetection3D's configurations for it.
+height in metres. Unless a line says otherwise they are the mean annotated sizes of nuScenes, as in
+the anchors of MMDetection3D's configurations for it.
 """
 
 from dataclasses import dataclass, replace
@@ -35,23 +35,31 @@ class BodyKind:
 TYRE, GLASS = (0.08, 0.08, 0.09), (0.25, 0.32, 0.38)
 
 
-def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], colour: Triple) -> Part:
+def _box(
+    x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], colour: Triple
+) -> Part:
     extents = (x, y, z)
     size = tuple(high - low for low, high in extents)
     centre = tuple((high + low) / 2 for low, high in extents)
     return Part("box", size, centre, colour)  # type: ignore[arg-type]
 
 
-def _two_box(name: str, label: str, size: Triple, waist: float, cabin: tuple[float, float], colour: Triple) -> BodyKind:
+def _two_box(
+    name: str, label: str, size: Triple, waist: float, cabin: tuple[float, float], colour: Triple
+) -> BodyKind:
     """A passenger vehicle: full-length body up to `waist`, cabin between two shares of the length."""
     length, width, height = size
     half, side = length / 2, width / 2
     body = _box((-half, half), (-side, side), (0.0, waist), colour)
     ends = (-half + cabin[0] * length, -half + cabin[1] * length)
-    return BodyKind(name, label, size, (body, _box(ends, (0.1 - side, side - 0.1), (waist, height), GLASS)))
+    return BodyKind(
+        name, label, size, (body, _box(ends, (0.1 - side, side - 0.1), (waist, height), GLASS))
+    )
 
 
-def _lorry(name: str, label: str | None, size: Triple, cab: float, cab_height: float, colour: Triple) -> BodyKind:
+def _lorry(
+    name: str, label: str | None, size: Triple, cab: float, cab_height: float, colour: Triple
+) -> BodyKind:
     """Cab in front (length `cab`) and a box behind it, both down to the ground (side skirts)."""
     length, width, height = size
     half, side = length / 2, width / 2
@@ -67,14 +75,19 @@ def _block(name: str, label: str | None, size: Triple, colour: Triple) -> BodyKi
 
 
 def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
-    """Two legs one stride apart up to 0.47 of the height (an inseam), torso, and head above the chin at 0.87 of
-    it (Drillis and Contini 1966, body segment parameters).
+    """Two legs one stride apart up to 0.47 of the height (an inseam), torso, and head above the
+    chin at 0.87 of it (Drillis and Contini 1966, body segment parameters).
     """
     length, width, height = size
     hip, chin = 0.47 * height, 0.87 * height
     leg = 0.16
     legs = [
-        Part("cylinder", (leg, leg, hip), (sign * (length - leg) / 2, -sign * width / 5, hip / 2), (0.15, 0.17, 0.3))
+        Part(
+            "cylinder",
+            (leg, leg, hip),
+            (sign * (length - leg) / 2, -sign * width / 5, hip / 2),
+            (0.15, 0.17, 0.3),
+        )
         for sign in (1, -1)
     ]
     torso = Part("box", (0.6 * length, width, chin - hip), (0.0, 0.0, (hip + chin) / 2), colour)
@@ -97,27 +110,29 @@ CATALOGUE = {
     kind.name: kind
     for kind in (
         _two_box("car", "car", (4.61, 1.95, 1.72), 0.95, (0.18, 0.72), (0.15, 0.3, 0.65)),
-        # A panel van, reported as a truck: length and width of a Volkswagen Transporter with long wheelbase,
-        # and a raised roof.
+        # A panel van, reported as a truck: length and width of a Volkswagen Transporter with long
+        # wheelbase, and a raised roof.
         _two_box("van", "truck", (5.30, 1.90, 2.40), 2.00, (0.0, 0.85), (0.85, 0.85, 0.88)),
         _lorry("truck", "truck", (6.74, 2.46, 2.73), 1.7, 2.3, (0.75, 0.2, 0.15)),
         _block("bus", "bus", (11.19, 2.94, 3.47), (0.9, 0.75, 0.1)),
         _cyclist("bicycle", (1.68, 0.60, 1.27)),
         _person("pedestrian", (0.73, 0.66, 1.76), (0.85, 0.15, 0.2)),
-        # Bodies that the five reported classes do not hold.
-        # A box trailer on its legs, side skirts down: length and height of nuScenes, the width that European
-        # roads allow (Directive 96/53/EC: 2.55 m).
+        # Bodies that the five reported classes do not hold. A box trailer on its legs, side skirts
+        # down: length and height of nuScenes, the width that European roads allow (Directive
+        # 96/53/EC: 2.55 m).
         _block("trailer", None, (12.01, 2.55, 3.82), (0.55, 0.57, 0.6)),
         # Site hoarding of 2.4 m panels.
         _block("hoarding", None, (12.0, 0.10, 2.40), (0.2, 0.4, 0.3)),
-        # A piece of garden hedge as high as a person: below the 2 m that German neighbour law allows near a boundary.
+        # A piece of garden hedge as high as a person: below the 2 m that German neighbour law
+        # allows near a boundary.
         _block("hedge", None, (6.0, 0.8, 1.8), (0.2, 0.42, 0.2)),
         # A detached house of two storeys.
         _block("house", None, (11.0, 9.0, 6.5), (0.72, 0.6, 0.5)),
         _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
         # A closed row of eight such buildings.
         _block("terrace", None, (144.0, 8.0, 9.0), (0.66, 0.6, 0.54)),
-        # The recording car of nuScenes, a Renault Zoe: 4.08 x 1.73 x 1.56 (manufacturer's data sheet).
+        # The recording car of nuScenes, a Renault Zoe: 4.08 x 1.73 x 1.56 (manufacturer's data
+        # sheet).
         BodyKind(
             "ego",
             None,
@@ -132,7 +147,8 @@ CATALOGUE = {
 
 
 def sized(name: str, label: str | None, size: Triple) -> BodyKind:
-    """A body of any size: the parts of the catalogue's kind for `label`, scaled to it, and a block without label.
+    """A body of any size: the parts of the catalogue's kind for `label`, scaled to it, and a block
+    without label.
 
     Round parts stay round and within the box.
     """
@@ -143,7 +159,11 @@ def sized(name: str, label: str | None, size: Triple) -> BodyKind:
     turn = min(x, y)
     scales = {"box": (x, y, z), "cylinder": (turn, turn, z), "sphere": (min(turn, z),) * 3}
     parts = tuple(
-        replace(part, size=_scaled(part.size, scales[part.shape]), centre=_scaled(part.centre, (x, y, z)))
+        replace(
+            part,
+            size=_scaled(part.size, scales[part.shape]),
+            centre=_scaled(part.centre, (x, y, z)),
+        )
         for part in kind.parts
     )
     return BodyKind(name, label, size, parts)

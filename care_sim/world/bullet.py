@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from care_sim.core.frames import Floats, Frame, Integers, Pose
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
-from care_sim.world.bullet_clients import borrow, give_back, leave
-from care_sim.world.bullet_shapes import Polyhedra
-from care_sim.world.primitives import Primitives
-from care_sim.world.quiet_pybullet import pybullet
+from care_sim.world.body_tables import Primitives
+from care_sim.world.bullet_clients import borrow, give_back, leave, pybullet
+from care_sim.world.polyhedra import Polyhedra
 
 PixelWindow = tuple[int, int, int, int]
 """Left, top, right, bottom in whole pixels."""
@@ -22,18 +21,22 @@ NO_BODY = -1
 RAYS_A_CALL = 8192
 """`rayTestBatch` returns nothing, silently, for a batch of 16,384 rays or more."""
 
-_SHAPES = {"box": pybullet.GEOM_BOX, "cylinder": pybullet.GEOM_CYLINDER, "sphere": pybullet.GEOM_SPHERE}
+_SHAPES = {
+    "box": pybullet.GEOM_BOX,
+    "cylinder": pybullet.GEOM_CYLINDER,
+    "sphere": pybullet.GEOM_SPHERE,
+}
 _OPAQUE, _TRANSPARENT = 1, 2
 FAR_M = 120.0
 """Nothing further from the image plane is seen."""
 
 
 class BulletWorld:
-    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False. Not to be shared between
-    processes. Whoever forgets to close it leaves the client with the last reference.
+    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False. Not to be
+    shared between processes. Whoever forgets to close it leaves the client with the last reference.
 
-    The ground, transparent bodies and backdrops have no look: no camera needs their ids, and rendering them
-    costs more than everything else in the picture.
+    The ground, transparent bodies and backdrops have no look: no camera needs their ids, and
+    rendering them costs more than everything else in the picture.
 
     `primitives` know every pose at once. PyBullet learns of it when it is asked about the body.
     """
@@ -59,15 +62,25 @@ class BulletWorld:
             give_back(self._client)
             self._client = -1
 
-    def add(self, kind: BodyKind, pose: Pose | Frame, *, transparent: bool = False, backdrop: bool = False) -> int:
+    def add(
+        self,
+        kind: BodyKind,
+        pose: Pose | Frame,
+        *,
+        transparent: bool = False,
+        backdrop: bool = False,
+    ) -> int:
         """Place a body and return its id. A `transparent` one is neither hit by rays nor seen.
 
-        A `backdrop` stands behind all that perception reports: rays hit it, cameras need not render it.
+        A `backdrop` stands behind all that perception reports: rays hit it, cameras need not render
+        it.
         """
         seen = () if transparent or backdrop else kind.parts
         body = pybullet.createMultiBody(
             0,
-            pybullet.createCollisionShapeArray(physicsClientId=self._client, **_collision(kind.parts)),
+            pybullet.createCollisionShapeArray(
+                physicsClientId=self._client, **_collision(kind.parts)
+            ),
             self._look(seen) if seen else self._no_look(),
             physicsClientId=self._client,
         )
@@ -94,7 +107,8 @@ class BulletWorld:
     def cast(self, origin: Floats, directions: Floats, reach: float) -> tuple[Floats, Integers]:
         """Cast rays (n, 3 unit vectors, world frame) from `origin`.
 
-        Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NO_BODY there.
+        Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NO_BODY
+        there.
         """
         self._tell(self._moved)
         targets = origin + directions * reach
@@ -102,19 +116,25 @@ class BulletWorld:
         for start in range(0, len(targets), RAYS_A_CALL):
             batch = targets[start : start + RAYS_A_CALL]
             sources = np.broadcast_to(origin, batch.shape)
-            hits += pybullet.rayTestBatch(sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client)
+            hits += pybullet.rayTestBatch(
+                sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client
+            )
         if len(hits) != len(targets):
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
         ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
         shares = np.fromiter((hit[2] for hit in hits), np.float64, len(hits))
         return np.where(ids == NO_BODY, np.inf, shares * reach), ids
 
-    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow | None = None) -> Integers:
+    def body_ids(
+        self, camera: PinholeCamera, sensor: Frame, window: PixelWindow | None = None
+    ) -> Integers:
         """(height, width) id of the body each pixel of `camera` shows, NO_BODY where there is none.
 
         The camera is mounted in the frame `sensor`. Of a `window` only its own rows and columns.
         """
-        left, top, right, bottom = window if window is not None else (0, 0, camera.width, camera.height)
+        left, top, right, bottom = (
+            window if window is not None else (0, 0, camera.width, camera.height)
+        )
         if left >= right or top >= bottom:
             return np.empty((0, 0), np.int64)
         rendered = self._render(camera, sensor, (left, top, right, bottom))[4]
@@ -126,7 +146,9 @@ class BulletWorld:
         return np.asarray(picture[2], np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
 
     def clearance(self, body: int, other: int, within: float = 100.0) -> float:
-        """Smallest distance between two hulls, metres; negative when they overlap, inf beyond `within`."""
+        """Smallest distance between two hulls, metres; negative when they overlap, inf beyond
+        `within`.
+        """
         self._tell({body, other} & self._moved)
         points = pybullet.getClosestPoints(body, other, within, physicsClientId=self._client)
         return float(min((point[8] for point in points), default=np.inf))
@@ -135,7 +157,9 @@ class BulletWorld:
         """Let PyBullet know where bodies are by now."""
         for body in tuple(moved):
             pose = self.primitives.poses[body].tolist()
-            pybullet.resetBasePositionAndOrientation(body, pose[:3], pose[3:], physicsClientId=self._client)
+            pybullet.resetBasePositionAndOrientation(
+                body, pose[:3], pose[3:], physicsClientId=self._client
+            )
             self._moved.discard(body)
 
     def _render(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> tuple[Any, ...]:

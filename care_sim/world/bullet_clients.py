@@ -1,6 +1,14 @@
-"""PyBullet's clients within this process, used again and again: to connect costs more than to empty one."""
+"""PyBullet and its clients within this process, which are used again and again.
 
-from care_sim.world.quiet_pybullet import pybullet
+To connect a client costs more than to empty one.
+"""
+
+from care_sim.base.quiet_output import STANDARD_ERROR, silenced
+
+with silenced(STANDARD_ERROR):  # where it prints its build time
+    import pybullet
+
+__all__ = ["borrow", "give_back", "leave", "pybullet"]
 
 MOST_FREE = 4
 """Clients kept for whoever borrows next. Each holds 28 MB, and another one takes 14 ms."""
@@ -26,7 +34,9 @@ def give_back(client: int) -> None:
 
 
 def leave(client: int) -> None:
-    """Give a client back where PyBullet may not be called: garbage is collected in the middle of its calls, too."""
+    """Give a client back where PyBullet may not be called, as in a finaliser: garbage is collected
+    in the middle of its calls, too.
+    """
     _free.append(client)
 
 

@@ -1,29 +1,28 @@
 """Road, ego kinematics and traffic of highway-env, seen in a z-up world.
 
 highway-env's y axis points down in its pictures; here y points left, so y and headings change sign
-at this border and nowhere else. Lane 0 is the ego's; lanes are numbered to the left, negative to the
-right.
+at this border and nowhere else. Lane 0 is the ego's; lanes are numbered to the left, negative to
+the right.
 """
 
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from highway_env.road.lane import StraightLane
+from highway_env.road.road import Road, RoadNetwork
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+from highway_env.vehicle.objects import Obstacle
 
 from care_sim.core.frames import Pose
-from care_sim.world.bare import bare
 from care_sim.world.bodies import BodyKind
-
-with bare("highway_env"):  # its environments load pandas, Matplotlib and pygame
-    from highway_env.road.lane import StraightLane
-    from highway_env.road.road import Road, RoadNetwork
-    from highway_env.vehicle.behavior import IDMVehicle
-    from highway_env.vehicle.kinematics import Vehicle
-    from highway_env.vehicle.objects import Obstacle
 
 _ROAD_LENGTH_M = 1000.0
 MAX_STEERING = np.deg2rad(35.0)
-"""Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out sideways."""
+"""Lock of a passenger car's front wheels. highway-env allows 60 degrees, at which a car slides out
+sideways.
+"""
 STANDING_GAP_M = float(IDMVehicle.DISTANCE_WANTED)
 """From centre to centre, what an IDM driver leaves before what stands ahead."""
 
@@ -32,8 +31,8 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
     """A lane from (-x, y) to (x, y) or back."""
 
     def local_coordinates(self, position: Sequence[float]) -> tuple[float, float]:
-        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without its dot products
-        of axes that are 0 and 1 or -1.
+        """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without
+        its dot products of axes that are 0 and 1 or -1.
         """
         x, y = position
         start_x, start_y, sign = self._origin
@@ -45,7 +44,9 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
 
 
 class LaneDriver(IDMVehicle):  # type: ignore[misc]
-    """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the middle of one."""
+    """An IDM driver, to the last bit, who neither steers nor looks for the nearest lane in the
+    middle of one.
+    """
 
     def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
         """Angle of the front wheels, radians."""
@@ -58,7 +59,9 @@ class LaneDriver(IDMVehicle):  # type: ignore[misc]
             super().on_state_update()
 
     def _follows(self, lane: LaneAlongX) -> bool:
-        return bool(self.heading == lane.heading and lane.local_coordinates(self.position)[1] == 0.0)
+        return bool(
+            self.heading == lane.heading and lane.local_coordinates(self.position)[1] == 0.0
+        )
 
 
 class Traffic:
@@ -68,7 +71,9 @@ class Traffic:
     `ego_lane` is the index of the ego's lane in it.
     """
 
-    def __init__(self, directions: Sequence[int], ego_lane: int, lane_width: float, speed_limit: float):
+    def __init__(
+        self, directions: Sequence[int], ego_lane: int, lane_width: float, speed_limit: float
+    ):
         network = RoadNetwork()
         self._lanes: list[tuple[str, str, int]] = []
         counts = {1: 0, -1: 0}
@@ -77,7 +82,9 @@ class Traffic:
             ends = ([-_ROAD_LENGTH_M, y], [_ROAD_LENGTH_M, y])
             start, end = ends if direction > 0 else ends[::-1]
             nodes = ("a", "b") if direction > 0 else ("b", "a")
-            network.add_lane(*nodes, LaneAlongX(start, end, width=lane_width, speed_limit=speed_limit))
+            network.add_lane(
+                *nodes, LaneAlongX(start, end, width=lane_width, speed_limit=speed_limit)
+            )
             self._lanes.append((*nodes, counts[direction]))
             counts[direction] += 1
         self._ego_lane = ego_lane
@@ -96,8 +103,12 @@ class Traffic:
         vehicle.enter()
         return vehicle
 
-    def add_parked_driver(self, x: float, lane: int, kind: BodyKind, target_speed: float) -> "RoadVehicle":
-        """An IDM driver who stands in `lane` until told to `pull_out`, and then wants `target_speed`."""
+    def add_parked_driver(
+        self, x: float, lane: int, kind: BodyKind, target_speed: float
+    ) -> "RoadVehicle":
+        """An IDM driver who stands in `lane` until told to `pull_out`, and then wants
+        `target_speed`.
+        """
         vehicle = self._make(LaneDriver, x, lane, target_speed, kind)
         vehicle.stand()
         return vehicle
@@ -124,7 +135,9 @@ class Traffic:
         self._road.act()
         self._road.step(dt)
 
-    def _make(self, model: type[Vehicle], x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
+    def _make(
+        self, model: type[Vehicle], x: float, lane: int, speed: float, kind: BodyKind
+    ) -> "RoadVehicle":
         key = self.lane_key(lane)
         road_lane = self._road.network.get_lane(key)
         along = float(road_lane.local_coordinates(np.array([x, road_lane.start[1]]))[0])
@@ -167,7 +180,9 @@ class RoadVehicle:
         self._vehicle.speed = 0.0
 
     def accelerate(self, acceleration: float, dt: float) -> None:
-        """Hold an acceleration (m/s^2) for the next step of `dt` seconds; a car at rest does not reverse."""
+        """Hold an acceleration (m/s^2) for the next step of `dt` seconds; a car at rest does not
+        reverse.
+        """
         held = max(acceleration, -self.speed / dt)
         self._vehicle.act({"acceleration": held, "steering": 0.0})
 

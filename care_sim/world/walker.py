@@ -9,7 +9,8 @@ from care_sim.core.frames import Pose
 
 @dataclass(frozen=True)
 class Walk:
-    """A straight walk: from `start` (x, y) along `heading` for `length_m`, setting off at `starts_s`.
+    """A straight walk: from `start` (x, y) along `heading` for `length_m`, setting off at
+    `starts_s`.
 
     The person gains speed at `acceleration` until `speed`. Metres, seconds, world frame.
     """

@@ -10,14 +10,16 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats, Integers, Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
+from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.footprints import Footprints
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
 """World step. Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
 CONTACT_REACH_M = 0.5
-"""Contact is looked for among bodies this close: far more than the centimetres by which hulls are padded."""
+"""Contact is looked for among bodies this close: far more than the centimetres by which hulls are
+padded.
+"""
 
 Motion = Callable[[float], Pose]
 """The pose of a body at a time in seconds."""
@@ -43,8 +45,8 @@ class Actor:
 class Passage:
     """How close the ego came to the first-sighting actor while the world advanced.
 
-    `nearest_m` centre to centre and `clearance_m` hull to hull; `impact_speed_mps` is the ego's speed
-    at its first contact with any body, else None.
+    `nearest_m` centre to centre and `clearance_m` hull to hull; `impact_speed_mps` is the ego's
+    speed at its first contact with any body, else None.
     """
 
     nearest_m: float
@@ -85,8 +87,9 @@ class World:
     ) -> Actor:
         """Add a body that stands at a pose, follows a function of time, or drives in the traffic.
 
-        `reported=False` keeps perception silent about it, whatever its kind. A `backdrop` stands behind all
-        that perception reports, so that the camera need not render it. Raises InvalidInput for an unknown kind.
+        `reported=False` keeps perception silent about it, whatever its kind. A `backdrop` stands
+        behind all that perception reports, so that the camera need not render it. Raises
+        InvalidInput for an unknown kind.
         """
         pose_at = _motion(pose)
         place = pose_at(self.time)
@@ -120,7 +123,11 @@ class World:
         """Move everything by `duration` seconds, a whole number of world steps."""
         passages = [self._step(acceleration) for _ in range(whole_steps(duration))]
         impacts = (p.impact_speed_mps for p in passages if p.impact_speed_mps is not None)
-        return Passage(min(p.nearest_m for p in passages), min(p.clearance_m for p in passages), next(impacts, None))
+        return Passage(
+            min(p.nearest_m for p in passages),
+            min(p.clearance_m for p in passages),
+            next(impacts, None),
+        )
 
     def close(self) -> None:
         """Free the simulator."""
@@ -144,7 +151,9 @@ class World:
 
     def _passage(self) -> Passage:
         near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
-        touched = any(self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0 for body in near)
+        touched = any(
+            self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0 for body in near
+        )
         nearest, clearance = np.inf, np.inf
         if self.first_sighting is not None:
             x, y, _ = self.first_sighting.pose_at(self.time)
@@ -163,8 +172,12 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 
 
 def whole_steps(duration: float) -> int:
-    """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide it."""
+    """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide
+    it.
+    """
     steps = round(duration / WORLD_STEP_S)
     if steps < 1 or abs(steps * WORLD_STEP_S - duration) > 1e-9:
-        raise InvalidInput(f"keyframe_s must be a multiple of the world step {WORLD_STEP_S} s, got {duration!r}")
+        raise InvalidInput(
+            f"keyframe_s must be a multiple of the world step {WORLD_STEP_S} s, got {duration!r}"
+        )
     return steps

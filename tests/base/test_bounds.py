@@ -1,4 +1,6 @@
-"""What no argument may be: every number, name and array from outside is refused in one line, where it enters."""
+"""What no argument may be: every number, name and array from outside is refused in one line, where
+it enters.
+"""
 
 from dataclasses import dataclass, fields
 from decimal import Decimal
@@ -31,7 +33,21 @@ from care_sim.study.executors import cluster
 from care_sim.study.parameters import parameters
 from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
 
-NO_NUMBERS = (float("nan"), float("inf"), 10**400, 10**5000, -1e300, 1e300, Decimal(1), 1j, True, "1", None, [1], {1})
+NO_NUMBERS = (
+    float("nan"),
+    float("inf"),
+    10**400,
+    10**5000,
+    -1e300,
+    1e300,
+    Decimal(1),
+    1j,
+    True,
+    "1",
+    None,
+    [1],
+    {1},
+)
 
 
 def named(value):
@@ -97,8 +113,12 @@ def test_every_bounded_number_keeps_its_bounds(kind, name):
 def test_every_number_of_conditions_and_scenarios_has_bounds():
     for kind in (Conditions, *SCENARIOS.values()):
         for field in fields(kind):
-            is_number = isinstance(field.default, int | float) and not isinstance(field.default, bool)
-            assert bool(allowed(field)) == (is_number or (isinstance(field.default, tuple) and bool(field.default)))
+            is_number = isinstance(field.default, int | float) and not isinstance(
+                field.default, bool
+            )
+            assert bool(allowed(field)) == (
+                is_number or (isinstance(field.default, tuple) and bool(field.default))
+            )
 
 
 @pytest.mark.parametrize("extreme", ["least", "most"])
@@ -127,13 +147,17 @@ def test_an_episode_at_the_bounds_of_any_range_stays_in_its_space(name, extreme)
 
 @pytest.mark.parametrize("sigma", [10.0, 3])
 def test_the_noisiest_odometry_stays_in_its_space(sigma):
-    with gymnasium.make("CARE-Dartout-v0", ego_speed_sigma=sigma, duration_s=1.0, disable_env_checker=True) as env:
+    with gymnasium.make(
+        "CARE-Dartout-v0", ego_speed_sigma=sigma, duration_s=1.0, disable_env_checker=True
+    ) as env:
         for seed in range(5):
             seen, _ = env.reset(seed=seed)
             assert env.observation_space.contains(seen)
 
 
-@pytest.mark.parametrize("rate", [Fraction(1, 3), np.float32(0.25), np.float64(0.5), 1, np.int64(0)])
+@pytest.mark.parametrize(
+    "rate", [Fraction(1, 3), np.float32(0.25), np.float64(0.5), 1, np.int64(0)]
+)
 def test_a_number_of_any_type_becomes_pythons_own(rate):
     config = EpisodeConfig("dense", "care", 0.1, false_negative_rate=rate, min_returns=np.int64(4))
     assert type(config.false_negative_rate) is float
@@ -155,7 +179,14 @@ def test_a_dataclass_is_settled_by_kind():
             check_fields(self, " of it")
 
     assert Thing(span=[1, 2], share=1) == Thing(span=(1.0, 2.0), share=1.0)
-    for name, value in (("flag", 1), ("name", 2), ("count", 6), ("share", "x"), ("span", (2, 1)), ("span", (0, 1, 2))):
+    for name, value in (
+        ("flag", 1),
+        ("name", 2),
+        ("count", 6),
+        ("share", "x"),
+        ("span", (2, 1)),
+        ("span", (0, 1, 2)),
+    ):
         refused(f"{name} of it", Thing, **{name: value})
 
 
@@ -178,12 +209,16 @@ def test_a_long_value_is_quoted_by_its_ends():
     assert one_line("a \x07\n b") == r"a \x07 b"
 
 
-@pytest.mark.parametrize("path", ["", "\0", "a" * 300, "a/" * 4000, 5, None, "\ud800", object()], ids=named)
+@pytest.mark.parametrize(
+    "path", ["", "\0", "a" * 300, "a/" * 4000, 5, None, "\ud800", object()], ids=named
+)
 def test_what_no_file_can_be_called_is_no_path(path):
     refused("file must be a path", check_path, "file", path)
 
 
-@pytest.mark.parametrize("seed", [-1, 2**63, 10**30, 1.0, True, "1", [1], np.array([1, 2]), float("nan")], ids=named)
+@pytest.mark.parametrize(
+    "seed", [-1, 2**63, 10**30, 1.0, True, "1", [1], np.array([1, 2]), float("nan")], ids=named
+)
 def test_a_seed_that_no_column_holds_begins_no_episode(seed, dense):
     refused("seed must be a whole number", dense.unwrapped.reset, seed=seed)
 
@@ -249,7 +284,9 @@ def test_an_action_of_other_things_than_numbers_is_refused(action, dense):
     refused("action must", dense.step, action)
 
 
-@pytest.mark.parametrize("number", [(n for n in [32]), memoryview(b"1"), [32], 10**30, 2.0, True], ids=named)
+@pytest.mark.parametrize(
+    "number", [(n for n in [32]), memoryview(b"1"), [32], 10**30, 2.0, True], ids=named
+)
 @pytest.mark.parametrize(
     ("wrapper", "name"),
     [
@@ -264,7 +301,9 @@ def test_a_wrapper_takes_whole_numbers(wrapper, name, number, dense):
 
 
 @pytest.mark.parametrize("env", [None, 5, gymnasium.spaces.Discrete(2)])
-@pytest.mark.parametrize("wrapper", [SectorReserve, GridObservation, lambda env: ExportScans(env, "scans")])
+@pytest.mark.parametrize(
+    "wrapper", [SectorReserve, GridObservation, lambda env: ExportScans(env, "scans")]
+)
 def test_a_wrapper_takes_environments(wrapper, env):
     refused("of CARE-Sim", wrapper, env)
 
@@ -330,7 +369,9 @@ def test_what_is_no_observation_is_not_acted_on(damage, observation, dense):
 
 def test_an_observation_of_other_numbers_is_read_alike(observation):
     plain = {key: array.tolist() for key, array in observation.items()}
-    before, after = (Belief.from_observation(seen).to_observation() for seen in (observation, plain))
+    before, after = (
+        Belief.from_observation(seen).to_observation() for seen in (observation, plain)
+    )
     assert all(np.array_equal(before[key], after[key]) for key in before)
 
 
@@ -376,19 +417,27 @@ def test_a_policy_is_made_for_an_environment(env):
     ids=range(12),
 )  # fmt: skip
 def test_a_parameter_that_no_file_holds_is_refused(value):
-    refused("k_safe must", EpisodeConfig, "dense", "care-sbf", policy_parameters=(("k_safe", value),))
+    refused(
+        "k_safe must", EpisodeConfig, "dense", "care-sbf", policy_parameters=(("k_safe", value),)
+    )
 
 
 @pytest.mark.parametrize("pairs", [5, "ab", [1], (("a",),)])
 def test_parameters_are_pairs(pairs):
-    refused("policy_parameters must be pairs", EpisodeConfig, "dense", "care", policy_parameters=pairs)
+    refused(
+        "policy_parameters must be pairs", EpisodeConfig, "dense", "care", policy_parameters=pairs
+    )
 
 
 def test_a_parameter_has_a_name():
-    refused("name of a policy parameter", EpisodeConfig, "dense", "care", policy_parameters=((1, 2),))
+    refused(
+        "name of a policy parameter", EpisodeConfig, "dense", "care", policy_parameters=((1, 2),)
+    )
 
 
-@pytest.mark.parametrize("field", ["scenario", "policy", "budget", "seed", "floor_seed", "azimuth_margin", "engine"])
+@pytest.mark.parametrize(
+    "field", ["scenario", "policy", "budget", "seed", "floor_seed", "azimuth_margin", "engine"]
+)
 @pytest.mark.parametrize("value", [[1], {}, 10**30, float("nan"), np.zeros(2), None], ids=named)
 def test_an_episode_is_made_of_names_and_numbers(field, value):
     refused("", EpisodeConfig, **{"scenario": "dense", "policy": "care", field: value})
@@ -423,7 +472,8 @@ def test_a_number_of_seeds_fits_into_memory(number):
 
 
 @pytest.mark.parametrize(
-    "address", ["ucx://x", "tls://127.0.0.1:1", "garbage://x", "inproc://x", "garbage", "tcp://[::1"]
+    "address",
+    ["ucx://x", "tls://127.0.0.1:1", "garbage://x", "inproc://x", "garbage", "tcp://[::1"],
 )
 def test_an_address_that_dask_cannot_reach_is_named(address):
     pytest.importorskip("dask.distributed")

@@ -12,15 +12,17 @@ import pytest
 NOWHERE = """
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
-from care_sim.core.allocation_kernels import survey
+from care_sim.core.pinhole_kernels import window_around
 import numpy as np
-print(survey(np.array([3, 1]), np.array([2])))
+print(window_around(np.array([[2.5, 3.5, 4.5, 5.5]]), 9, 9))
 """
 
 
 def test_without_a_folder_for_the_code_it_is_compiled_anew():
-    done = subprocess.run([sys.executable, "-c", NOWHERE], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "(0, 3, False)"
+    done = subprocess.run(
+        [sys.executable, "-c", NOWHERE], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "(1, 2, 6, 7)"
 
 
 TWO_FILES = """
@@ -71,20 +73,85 @@ def test_a_change_in_a_file_whose_kernel_is_called_is_noticed(outer):
     assert [outer(added=1), outer(added=5)] == ["2 0", "6 0"]
 
 
-def test_the_package_alone_compiles_nothing():
-    code = "import sys, care_sim; print('numba' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
+KERNEL = """
+    from care_sim.base.compiled import compiled
+    from data import SHIFT, {name}
+
+    @compiled()
+    def shifted(point):
+        return point.x + SHIFT
+"""
+DATA = """
+    from typing import NamedTuple
+
+    SHIFT = {shift}
+
+    class {name}(NamedTuple):
+        x: int
+        y: int
+"""
+SHIFTED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import data
+from kernel import shifted
+print(shifted(getattr(data, sys.argv[2])(1, 2)), sum(shifted.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def shifted(tmp_path):
+    """What a kernel gives that adds an imported constant to a field of an imported named tuple, and
+    how often its kept code was used.
+    """
+
+    def run(name, shift):
+        (tmp_path / "kernel.py").write_text(dedent(KERNEL).format(name=name))
+        (tmp_path / "data.py").write_text(dedent(DATA).format(name=name, shift=shift))
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+        command = [sys.executable, "-c", SHIFTED, str(tmp_path), name]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    return run
+
+
+def test_a_constant_of_another_file_is_noticed(shifted):
+    assert [shifted("Point", 1), shifted("Point", 1), shifted("Point", 5)] == ["2 0", "2 1", "6 0"]
+
+
+def test_kept_code_of_a_class_that_is_gone_is_not_read(shifted):
+    assert [shifted("Point", 1), shifted("Place", 1)] == ["2 0", "2 0"]
+
+
+COUNT = """
+from numba.core.event import install_recorder
+with install_recorder("numba:compile") as compiled:
+    import care_sim
+    alone = len(compiled.buffer)
+    care_sim.AngularGrid().hulls([[9.0, 0, 0, 4, 2, 2, 0]])
+print(alone, len(compiled.buffer) > 0)
+"""
+
+
+def test_the_package_alone_compiles_nothing(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", COUNT]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0 True"
 
 
 def test_who_waits_at_a_terminal_for_the_first_use_is_told(tmp_path):
     terminal, other_end = pty.openpty()
     code = (
-        "import numpy as np; from care_sim.core.allocation_kernels import survey; survey(np.array([3]), np.array([1]))"
+        "import numpy as np; from care_sim.core.pinhole_kernels import window_around; "
+        "window_around(np.zeros((1, 4)), 9, 9)"
     )
     heard = []
     for _ in range(2):
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
         subprocess.run([sys.executable, "-c", code], env=environment, stderr=other_end, check=True)
-        heard.append(os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else "")
+        heard.append(
+            os.read(terminal, 1000).decode() if select.select([terminal], [], [], 0)[0] else ""
+        )
     assert heard == ["care_sim: compiling; this takes half a minute, once on a machine\r\n", ""]

@@ -9,9 +9,13 @@ from care_sim.base.extras import import_open3d
 def test_a_missing_system_library_names_the_debian_packages(tmp_path, monkeypatch):
     """An open3d that fails as the real one does where libGL is not installed."""
     monkeypatch.delitem(sys.modules, "open3d", raising=False)
-    (tmp_path / "open3d.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')\n")
+    (tmp_path / "open3d.py").write_text(
+        "raise ImportError('libGL.so.1: cannot open shared object file')\n"
+    )
     monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(MissingExtra, match=r"apt-get install libusb-1.0-0 libegl1 .*libGL\.so\.1") as error:
+    with pytest.raises(
+        MissingExtra, match=r"apt-get install libusb-1.0-0 libegl1 .*libGL\.so\.1"
+    ) as error:
         import_open3d()
     assert "\n" not in str(error.value)
 

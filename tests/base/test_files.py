@@ -49,13 +49,20 @@ def test_what_a_killed_writer_left_goes_and_what_others_write_stays(tmp_path):
     )
     file = tmp_path / "table.csv"
     with subprocess.Popen(
-        [sys.executable, "-c", program, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", program, str(file)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as writer:
         unfinished = tmp_path / writer.stdout.readline().strip()
         check_output(file)
         assert unfinished.exists()  # it is alive
         writer.communicate("x")
-    others = [unfinished.name + "x", unfinished.name.replace("table", "cable"), f".elsewhere.{writer.pid}.table.csv"]
+    others = [
+        unfinished.name + "x",
+        unfinished.name.replace("table", "cable"),
+        f".elsewhere.{writer.pid}.table.csv",
+    ]
     for name in others:
         (tmp_path / name).touch()
     check_output(file)
@@ -137,7 +144,9 @@ def test_a_file_of_another_kind_is_refused_before_anything_is_computed(old, allo
     if allowed:
         check_output(file, PNG)
     else:
-        with pytest.raises(InvalidInput, match=r"mine\.png holds something else .*: remove it first"):
+        with pytest.raises(
+            InvalidInput, match=r"mine\.png holds something else .*: remove it first"
+        ):
             replacing(file, PNG).__enter__()
     assert file.read_bytes() == old
 
@@ -151,7 +160,9 @@ def test_a_name_too_long_is_refused_at_once_and_the_longest_is_written(tmp_path)
 
 
 def test_nothing_is_written_but_through_one_door():
-    """A file of the package that is opened to be written is one that `replacing` has given; journals alone grow."""
+    """A file of the package that is opened to be written is one that `replacing` has given;
+    journals alone grow.
+    """
     package = Path(care_sim.__file__).parent
     writes = re.compile(
         r"(\w+)\.write_(?:text|bytes)\(|(\w+)\.open\(\s*\"[wax]|\bopen\((\w+), \"[wax]|savefig\((\w+)|to_parquet"
@@ -161,4 +172,7 @@ def test_nothing_is_written_but_through_one_door():
         for file in package.rglob("*.py")
         for match in writes.finditer(file.read_text())
     }
-    assert {name for name, receiver in found if receiver.lstrip("_") != "unfinished"} == {"files.py", "journal.py"}
+    assert {name for name, receiver in found if receiver.lstrip("_") != "unfinished"} == {
+        "files.py",
+        "journal.py",
+    }

@@ -1,4 +1,5 @@
-"""Every writer where a file cannot grow: an error that names the file, what was there stays, nothing torn is left.
+"""Every writer where a file cannot grow: an error that names the file, what was there stays,
+nothing torn is left.
 
 A limit on the size of files stands for the full disk: it needs no rights.
 """
@@ -43,7 +44,9 @@ def scans(path):
 
     from care_sim.wrappers import ExportScans
 
-    with ExportScans(gymnasium.make("care_sim:CARE-Dartout-v0", duration_s=0.2, budget=1.0), path.parent) as env:
+    with ExportScans(
+        gymnasium.make("care_sim:CARE-Dartout-v0", duration_s=0.2, budget=1.0), path.parent
+    ) as env:
         env.reset(seed=0)
         env.step(np.ones(env.action_space.shape, np.float32))
 

@@ -96,7 +96,10 @@ def test_a_second_interrupt_ends_an_import_that_takes_long():
 @pytest.mark.parametrize("moment", range(4))
 def test_an_interrupt_finds_all_handlers_changed_or_none(moment, monkeypatch):
     heard = []
-    kept = {number: signal.signal(number, lambda *_: heard.append(1)) for number in (signal.SIGINT, signal.SIGTERM)}
+    kept = {
+        number: signal.signal(number, lambda *_: heard.append(1))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     ours = {number: signal.getsignal(number) for number in kept}
     change, changes = signal.signal, []
 
@@ -126,7 +129,7 @@ def test_a_library_does_not_touch_the_handlers_of_its_user():
 
 def test_what_is_ignored_stays_ignored():
     """As under nohup."""
-    program = "import signal; from care_sim import interrupts; interrupts.raise_them(); print(signal.getsignal(1))"
+    program = "import signal; from care_sim.base import interrupts; interrupts.raise_them(); print(signal.getsignal(1))"
     ignoring = f"import signal; signal.signal(1, signal.SIG_IGN)\n{program}"
     with Marked([sys.executable, "-c", ignoring]) as started:
         assert started.process.communicate(timeout=60)[0].strip() == str(int(signal.SIG_IGN))

@@ -26,7 +26,9 @@ def test_what_is_not_too_deep_comes_back():
     assert parsed(wide) == json.loads(wide)
 
 
-@pytest.mark.parametrize("text", [DEEP[MOST_LEVELS + 1], DEEP[980], DEEP[100_000], "[" * 100_000, '{"a":' * 100_000])
+@pytest.mark.parametrize(
+    "text", [DEEP[MOST_LEVELS + 1], DEEP[980], DEEP[100_000], "[" * 100_000, '{"a":' * 100_000]
+)
 def test_what_is_too_deep_is_a_value_error(text):
     with pytest.raises(ValueError, match="deep"):
         parsed(text)

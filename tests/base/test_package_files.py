@@ -1,4 +1,6 @@
-"""Whatever a policy's distribution ships, or its code names, counts in the key of a row, in all forms of either."""
+"""Whatever a policy's distribution ships, or its code names, counts in the key of a row, in all
+forms of either.
+"""
 
 import json
 import sys
@@ -29,7 +31,9 @@ LAZY = MINE + "def net():\n    from my_net.deep import net\n"
 
 @pytest.fixture
 def lay(tmp_path, monkeypatch):
-    """Lays the files of a distribution below `code`, which is on the path: listed, or installed for editing."""
+    """Lays the files of a distribution below `code`, which is on the path: listed, or installed for
+    editing.
+    """
     code = tmp_path / "code"
     info = code / "mine-1.0.dist-info"
     monkeypatch.setenv("DATA", str(tmp_path / "data"))
@@ -41,7 +45,9 @@ def lay(tmp_path, monkeypatch):
         info.mkdir(parents=True)
         (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
         (info / "entry_points.txt").write_text(f"[care_sim.policies]\nmine = {value}\n")
-        (info / "RECORD").write_text("".join(f"{name},,\n" for name in listed or ["mine.pth", "__editable__.mine.pth"]))
+        (info / "RECORD").write_text(
+            "".join(f"{name},,\n" for name in listed or ["mine.pth", "__editable__.mine.pth"])
+        )
         if listed is None:
             told = {"url": tmp_path.as_uri(), "dir_info": {"editable": True}}
             (info / "direct_url.json").write_text(json.dumps(told))
@@ -49,7 +55,11 @@ def lay(tmp_path, monkeypatch):
         return tmp_path
 
     yield put
-    for name in [name for name in sys.modules if name.partition(".")[0] in ("my_policy", "my_net", "my_space")]:
+    for name in [
+        name
+        for name in sys.modules
+        if name.partition(".")[0] in ("my_policy", "my_net", "my_space")
+    ]:
         del sys.modules[name]
 
 
@@ -71,10 +81,19 @@ SHIPPED = {
     "weights that end as path files": ({INIT: MINE, f"code/{INNER}": "1"}, None),
     "the same of a wheel": ({INIT: MINE, f"code/{INNER}": "1"}, ["my_policy/__init__.py", INNER]),
     "weights named as path files": ({INIT: MINE, "code/my_policy/__editable__1": "1"}, None),
-    "data of another package": ({INIT: NET, "code/my_net/__init__.py": "", "code/my_net/data/w": "1"}, None),
-    "code of another package": ({INIT: NET, "code/my_net/__init__.py": "", "code/my_net/b.py": "B = 1"}, None),
+    "data of another package": (
+        {INIT: NET, "code/my_net/__init__.py": "", "code/my_net/data/w": "1"},
+        None,
+    ),
+    "code of another package": (
+        {INIT: NET, "code/my_net/__init__.py": "", "code/my_net/b.py": "B = 1"},
+        None,
+    ),
     "code of another module": ({INIT: NET, "code/my_net.py": "B = 1"}, None),
-    "a package imported while it plays": ({INIT: LAZY, "code/my_net/deep.py": "", "code/my_net/w": "1"}, None),
+    "a package imported while it plays": (
+        {INIT: LAZY, "code/my_net/deep.py": "", "code/my_net/w": "1"},
+        None,
+    ),
 }
 
 
@@ -86,7 +105,11 @@ def test_every_file_of_the_distribution_counts(form, lay):
 
 
 def test_path_files_and_other_distributions_do_not_count(lay):
-    others = {"code/mine.pth": "1", "code/__editable__.mine.pth": "1", "venv/site-packages/my_net/w": "1"}
+    others = {
+        "code/mine.pth": "1",
+        "code/__editable__.mine.pth": "1",
+        "venv/site-packages/my_net/w": "1",
+    }
     place = lay({INIT: NET, "venv/site-packages/my_net/__init__.py": "", **others})
     sys.path.insert(1, str(place / "venv" / "site-packages"))
     try:
@@ -127,7 +150,11 @@ NAMED = {
 @pytest.mark.parametrize("form", NAMED)
 def test_every_file_that_a_value_of_the_code_names_counts(form, lay):
     own = NAMED[form] if MAKE in NAMED[form] else NAMED[form] + MINE.removeprefix(HEAD) + MAKE
-    files = {INIT: "from my_policy.deep import make\n", "code/my_policy/deep.py": HEAD + own, "data/w.npz": "1"}
+    files = {
+        INIT: "from my_policy.deep import make\n",
+        "code/my_policy/deep.py": HEAD + own,
+        "data/w.npz": "1",
+    }
     place = lay(files, value="my_policy:make")
     assert changes(place / "data/w.npz")
 
@@ -182,7 +209,10 @@ def test_a_relative_folder_that_a_helper_writes_to_is_none_of_the_policys(lay, m
 
 def test_what_a_policy_holds_only_once_it_has_played_leaves_its_key(lay):
     """A worker asks for the key after it has played."""
-    code = MINE + f"    def reset(self):\n        super().reset()\n        SEEN.append({PATH})\nSEEN = []\n"
+    code = (
+        MINE
+        + f"    def reset(self):\n        super().reset()\n        SEEN.append({PATH})\nSEEN = []\n"
+    )
     lay({INIT: code, "data/w.npz": "1"})
     config = EpisodeConfig("dartout", "mine", scenario_parameters=(("duration_s", 0.1),))
     before = config.digest()

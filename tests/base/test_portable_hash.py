@@ -26,19 +26,30 @@ EPISODES = [("cutin", "care", 0), ("dense", "history", 3)]
 
 
 def hashes():
-    episodes = [run_episode(EpisodeConfig(*named, seed=seed))["episode_hash"] for *named, seed in EPISODES]
+    episodes = [
+        run_episode(EpisodeConfig(*named, seed=seed))["episode_hash"] for *named, seed in EPISODES
+    ]
     return [*episodes, film_hash(some_keyframes(make_street(1)))]
 
 
 def some_keyframes(street):
     part = slice(14, 17)
-    return record(replace(street, poses=street.poses[part], ego=street.ego[part], motion=street.motion[part]))
+    return record(
+        replace(street, poses=street.poses[part], ego=street.ego[part], motion=street.motion[part])
+    )
 
 
 def test_fewer_features_of_the_processor_give_the_same_hashes():
-    line = "import json; from tests.base.test_portable_hash import hashes; print(json.dumps(hashes()))"
+    line = (
+        "import json; from tests.base.test_portable_hash import hashes; print(json.dumps(hashes()))"
+    )
     child = subprocess.run(
-        [sys.executable, "-c", line], cwd=ROOT, env=reduced(), capture_output=True, text=True, check=True
+        [sys.executable, "-c", line],
+        cwd=ROOT,
+        env=reduced(),
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert json.loads(child.stdout.splitlines()[-1]) == hashes()
 
@@ -46,14 +57,21 @@ def test_fewer_features_of_the_processor_give_the_same_hashes():
 def test_the_features_that_are_left_out_change_last_bits():
     line = "import numpy as np; x = np.linspace(0.1, 9, 5000); print(np.arctan2(x, 10 - x).tobytes().hex())"
     child = subprocess.run(
-        [sys.executable, "-c", line], cwd=ROOT, env=reduced(), capture_output=True, text=True, check=True
+        [sys.executable, "-c", line],
+        cwd=ROOT,
+        env=reduced(),
+        capture_output=True,
+        text=True,
+        check=True,
     )
     x = np.linspace(0.1, 9, 5000)
     theirs, ours = np.frombuffer(bytes.fromhex(child.stdout.strip())), np.arctan2(x, 10 - x)
     assert 0 < np.abs(theirs - ours).max() < 1e-15
 
 
-@pytest.mark.parametrize("value", [0.0, 0.5, 1.5, 0.05, 0.1, 1e-4, 5e-5, 12.34565, -0.25, -3e-4, 50.0, 1e6])
+@pytest.mark.parametrize(
+    "value", [0.0, 0.5, 1.5, 0.05, 0.1, 1e-4, 5e-5, 12.34565, -0.25, -3e-4, 50.0, 1e6]
+)
 def test_round_numbers_are_not_on_a_border(value):
     near = [value * (1 - 1e-13) - 1e-13, value, value * (1 + 1e-13) + 1e-13]
     assert len({portable_bytes(one) for one in near}) == 1
@@ -72,7 +90,11 @@ def test_what_is_not_finite_is_told_apart():
     assert portable_bytes([np.inf, 1.0]) == portable_bytes([np.inf, 1.0 + 1e-12])
 
 
-@given(arrays(np.float64, 5, elements=st.floats(-1e5, 1e5)), st.integers(0, 4), st.sampled_from([0.001, -0.001, 0.01]))
+@given(
+    arrays(np.float64, 5, elements=st.floats(-1e5, 1e5)),
+    st.integers(0, 4),
+    st.sampled_from([0.001, -0.001, 0.01]),
+)
 def test_a_millimetre_is_noticed(values, place, change):
     moved = values.copy()
     moved[place] += change
@@ -96,9 +118,19 @@ def test_parts_do_not_run_into_each_other():
 
 def test_who_is_hidden_at_the_start_of_a_film_counts():
     film = some_keyframes(make_street(1))
-    behind = Annotations(np.array([900]), np.array([0]), np.array([[9.0, 2.0, 0.0, 4.0, 2.0, 1.5, 0.0]]))
+    behind = Annotations(
+        np.array([900]), np.array([0]), np.array([[9.0, 2.0, 0.0, 4.0, 2.0, 1.5, 0.0]])
+    )
     farther = replace(behind, boxes=behind.boxes + 0.01)
-    assert len({film_hash(replace(film, hidden=hidden)) for hidden in (NO_ANNOTATIONS, behind, farther)}) == 3
+    assert (
+        len(
+            {
+                film_hash(replace(film, hidden=hidden))
+                for hidden in (NO_ANNOTATIONS, behind, farther)
+            }
+        )
+        == 3
+    )
 
 
 def test_the_step_is_far_from_what_errs_and_from_what_counts():

@@ -16,7 +16,9 @@ def states(sequences):
 @given(st.integers(0, 2**63 - 1), st.integers(0, 2**32 - 1))
 def test_without_a_secret_the_streams_are_those_of_the_seed(seed, scene):
     assert states(streams((seed,), 5)) == states(np.random.SeedSequence(seed).spawn(5))
-    assert states(streams((seed, scene), 4)) == states(np.random.SeedSequence((seed, scene)).spawn(4))
+    assert states(streams((seed, scene), 4)) == states(
+        np.random.SeedSequence((seed, scene)).spawn(4)
+    )
 
 
 @given(st.integers(0, 2**63 - 1), st.text(st.characters(codec="ascii"), min_size=1))
@@ -25,7 +27,11 @@ def test_a_secret_makes_all_of_them_others_and_the_same_ones_again(seed, secret)
     assert hidden == states(streams((seed,), 5, secret))
     drawn = [*map(tuple, public), *map(tuple, hidden)]
     assert len(set(drawn)) == len(drawn)
-    for other in (streams((seed + 1,), 5, secret), streams((seed,), 5, secret + "x"), streams((seed, 0), 5, secret)):
+    for other in (
+        streams((seed + 1,), 5, secret),
+        streams((seed,), 5, secret + "x"),
+        streams((seed, 0), 5, secret),
+    ):
         assert not {*map(tuple, hidden)} & {*map(tuple, states(other))}
 
 

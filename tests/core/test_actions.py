@@ -3,7 +3,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, NOT_FIRED, RESERVE, fired_cells, scores_of, shares_of
+from care_sim.core.actions import (
+    CHOSEN,
+    EXPLOITATION,
+    FLOOR,
+    NOT_FIRED,
+    RESERVE,
+    fired_cells,
+    scores_of,
+    shares_of,
+)
 from care_sim.core.allocation import allocate
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
@@ -41,8 +50,14 @@ def test_scored_cells_beyond_the_budget_have_no_share():
     np.testing.assert_array_equal(found.ravel(), [CHOSEN] * 6 + [NOT_FIRED] * 6)
 
 
-cells = st.lists(st.integers(0, 11), max_size=6, unique=True).map(np.array).map(lambda a: a.astype(np.int64))
-demands = st.builds(Demand, st.lists(cells, max_size=3), st.lists(st.lists(cells, max_size=2), max_size=2))
+cells = (
+    st.lists(st.integers(0, 11), max_size=6, unique=True)
+    .map(np.array)
+    .map(lambda a: a.astype(np.int64))
+)
+demands = st.builds(
+    Demand, st.lists(cells, max_size=3), st.lists(st.lists(cells, max_size=2), max_size=2)
+)
 
 
 @given(demands, st.integers(1, 12), st.floats(0, 1))

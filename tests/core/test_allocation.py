@@ -55,7 +55,9 @@ def turn_by_turn(sets, limit, chosen):
 
 
 def test_worked_by_hand():
-    """Ten cells, three reserved. Overlaps cost no turn; two cells left over by exploitation go to the layers."""
+    """Ten cells, three reserved. Overlaps cost no turn; two cells left over by exploitation go to
+    the layers.
+    """
     demand = Demand(
         exploitation=[[1, 2, 3], [2, 3, 4, 5], []],
         layers=[[[5, 6], [0, 6, 7]], [[9, 8, 30]]],
@@ -77,7 +79,9 @@ def test_nearer_sets_come_first_in_every_round():
     assert allocate(demand, 4, 0.0).tolist() == [30, 10, 20, 31]
 
 
-@pytest.mark.parametrize(("budget", "rho", "share"), [(1638, 0.3, 1147), (100, 0.3, 70), (492, 0.3, 344), (11, 0.5, 6)])
+@pytest.mark.parametrize(
+    ("budget", "rho", "share"), [(1638, 0.3, 1147), (100, 0.3, 70), (492, 0.3, 344), (11, 0.5, 6)]
+)
 def test_exploitation_stops_at_its_cap(budget, rho, share):
     assert len(allocate(Demand(exploitation=[range(5000)]), budget, rho)) == share
 
@@ -103,13 +107,21 @@ def test_layers_fill_in_priority_order():
 def test_a_burst_of_reserve_cells_never_displaces_exploitation():
     hulls = [range(70)]
     quiet = allocate(Demand(hulls), 100, 0.3)
-    burst = allocate(Demand(hulls, [[range(1000 + 50 * n, 1050 + 50 * n) for n in range(60)]]), 100, 0.3)
+    burst = allocate(
+        Demand(hulls, [[range(1000 + 50 * n, 1050 + 50 * n) for n in range(60)]]), 100, 0.3
+    )
     assert quiet.tolist() == burst[:70].tolist()
 
 
 def test_sets_in_any_order_and_below_zero_are_taken_as_they_are():
     """The policies' door refuses what the grid does not have; the allocator knows no grid."""
-    assert allocate(Demand([[7, -3, 7], [-3, 12]], [[[5, 4]]]), 5, 0.0).tolist() == [-3, 12, 7, 4, 5]
+    assert allocate(Demand([[7, -3, 7], [-3, 12]], [[[5, 4]]]), 5, 0.0).tolist() == [
+        -3,
+        12,
+        7,
+        4,
+        5,
+    ]
 
 
 def test_cells_further_apart_than_any_grid_are_refused():
@@ -141,11 +153,16 @@ def test_without_floor_the_rest_is_unspent():
 
 @given(demands, budgets, fractions, floors)
 def test_agrees_with_the_algorithm_by_the_letter(demand, budget, rho, floor):
-    assert allocate(demand, budget, rho, floor).tolist() == by_the_letter(demand, budget, rho, floor)
+    assert allocate(demand, budget, rho, floor).tolist() == by_the_letter(
+        demand, budget, rho, floor
+    )
     assert allocate(demand, budget, rho).tolist() == by_the_letter(demand, budget, rho, None)
 
 
-@given(st.lists(st.lists(st.tuples(*4 * [st.integers(0, 40)]), max_size=12), min_size=1, max_size=3), st.data())
+@given(
+    st.lists(st.lists(st.tuples(*4 * [st.integers(0, 40)]), max_size=12), min_size=1, max_size=3),
+    st.data(),
+)
 def test_agrees_with_nested_loops_over_rectangles_of_the_grid(grid, rectangles, data):
     table = np.arange(grid.size).reshape(grid.shape)
     sets = [[table[r : r + h, c : c + w].ravel() for c, w, r, h in some] for some in rectangles]
@@ -214,7 +231,9 @@ def test_a_boolean_mask_within_the_budget_is_an_action():
     assert fired_cells(mask, 4, np.arange(40)).tolist() == [0, 12, 13, 14]
 
 
-@pytest.mark.parametrize(("budget", "cells", "expected"), [(0.1, 16384, 1638), (0.03, 16384, 492), (1.0, 7, 7)])
+@pytest.mark.parametrize(
+    ("budget", "cells", "expected"), [(0.1, 16384, 1638), (0.03, 16384, 492), (1.0, 7, 7)]
+)
 def test_the_budget_is_rounded(budget, cells, expected):
     assert budget_cells(budget, cells) == expected
 

@@ -33,11 +33,15 @@ def test_without_scale_there_is_no_guard(tracks_at):
 
 
 def test_static_tracks_are_forgotten_only_outside_the_guard(tracks_at):
-    tracks = tracks_at(("car", 3.99, 0, 0, 0), ("car", 4.0, 0, 0, 0), ("car", 4.01, 0, 0, 0), ("car", 0, 40, 0, 0))
+    tracks = tracks_at(
+        ("car", 3.99, 0, 0, 0), ("car", 4.0, 0, 0, 0), ("car", 4.01, 0, 0, 0), ("car", 0, 40, 0, 0)
+    )
     assert settled(tracks) == ([2, 2, 0, 0], [False, False, True, True])
 
 
-@pytest.mark.parametrize(("speed", "static"), [(0.0, True), (0.49, True), (0.5, False), (1.3, False)])
+@pytest.mark.parametrize(
+    ("speed", "static"), [(0.0, True), (0.49, True), (0.5, False), (1.3, False)]
+)
 def test_a_walking_person_is_not_static(tracks_at, speed, static):
     _, low = settled(tracks_at(("pedestrian", 30, 0, 0, speed)))
     assert low == [static]
@@ -58,7 +62,9 @@ def test_receding_is_radial_in_every_direction(tracks_at):
 
 
 def test_a_moving_ego_leaves_what_is_behind_it(tracks_at):
-    """Range rate of a follower at the ego's own speed is zero; of one that stops it is the ego's speed."""
+    """Range rate of a follower at the ego's own speed is zero; of one that stops it is the ego's
+    speed.
+    """
     tracks = tracks_at(("car", -45, 0, 8, 0), ("car", -45, 0, 1, 0))
     assert settled(tracks, Ego(8.0))[1] == [False, True]
 
@@ -89,7 +95,10 @@ def test_one_unsafe_keyframe_starts_the_streak_anew(tracks_at):
 
 def test_streaks_belong_to_ids_and_end_with_the_track(tracks_at):
     memory = forgetting()
-    first, both = tracks_at(("car", 30, 0, 0, 0), first_id=7), tracks_at(("car", 30, 5, 0, 5), ("car", 30, 0, 0, 0))
+    first, both = (
+        tracks_at(("car", 30, 0, 0, 0), first_id=7),
+        tracks_at(("car", 30, 5, 0, 5), ("car", 30, 0, 0, 0)),
+    )
     for _ in range(5):
         memory.margins(first, Ego())
     assert memory.margins(first, Ego())[0].tolist() == [0]

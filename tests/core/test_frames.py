@@ -6,7 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.core.frames import Frame, turned
 
-frames = st.builds(Frame, st.floats(-100, 100), st.floats(-100, 100), st.floats(0, 3), st.floats(-np.pi, np.pi))
+frames = st.builds(
+    Frame, st.floats(-100, 100), st.floats(-100, 100), st.floats(0, 3), st.floats(-np.pi, np.pi)
+)
 tilted = st.builds(
     Frame,
     *[st.floats(-100, 100)] * 3,
@@ -14,7 +16,9 @@ tilted = st.builds(
     roll=st.floats(-0.2, 0.2),
     pitch=st.floats(-0.2, 0.2),
 )
-tables = st.lists(st.tuples(*[st.floats(-50, 50)] * 7), max_size=4).map(lambda rows: np.array(rows).reshape(-1, 7))
+tables = st.lists(st.tuples(*[st.floats(-50, 50)] * 7), max_size=4).map(
+    lambda rows: np.array(rows).reshape(-1, 7)
+)
 
 
 def test_a_quarter_turn_takes_forward_to_left():
@@ -54,8 +58,12 @@ def test_what_points_straight_up_or_down_is_turned_the_same(sign, yaw, roll, bes
 
 def test_pitch_lowers_the_front_and_roll_the_right():
     forward, left = np.eye(3)[0], np.eye(3)[1]
-    assert Frame(0, 0, 0, 0, pitch=0.1).vectors_to_world(forward) == pytest.approx([np.cos(0.1), 0, -np.sin(0.1)])
-    assert Frame(0, 0, 0, 0, roll=0.1).vectors_to_world(left) == pytest.approx([0, np.cos(0.1), np.sin(0.1)])
+    assert Frame(0, 0, 0, 0, pitch=0.1).vectors_to_world(forward) == pytest.approx(
+        [np.cos(0.1), 0, -np.sin(0.1)]
+    )
+    assert Frame(0, 0, 0, 0, roll=0.1).vectors_to_world(left) == pytest.approx(
+        [0, np.cos(0.1), np.sin(0.1)]
+    )
     assert Frame(0, 0, 0, np.pi / 2, pitch=0.1).vectors_to_world(forward)[1:] == pytest.approx(
         [np.cos(0.1), -np.sin(0.1)]
     )

@@ -22,7 +22,9 @@ boxes = st.tuples(
 
 
 def rows_and_columns(cells):
-    return sorted(set((cells // GRID.columns).tolist())), sorted(set((cells % GRID.columns).tolist()))
+    return sorted(set((cells // GRID.columns).tolist())), sorted(
+        set((cells % GRID.columns).tolist())
+    )
 
 
 def rectangle(rows, columns):
@@ -30,7 +32,11 @@ def rectangle(rows, columns):
 
 
 def towards(azimuth, elevation=0.0):
-    return [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    return [
+        np.cos(elevation) * np.cos(azimuth),
+        np.cos(elevation) * np.sin(azimuth),
+        np.sin(elevation),
+    ]
 
 
 def points_in(box, shares):
@@ -59,7 +65,9 @@ def test_the_default_grid_is_the_papers():
     assert GRID.row_height == pytest.approx(1.3335 * DEGREE, abs=1e-4 * DEGREE)
 
 
-@pytest.mark.parametrize("tested", [GRID, AngularGrid(columns=7, rows=3), AngularGrid(columns=360, rows=64)])
+@pytest.mark.parametrize(
+    "tested", [GRID, AngularGrid(columns=7, rows=3), AngularGrid(columns=360, rows=64)]
+)
 def test_every_cell_is_the_cell_of_its_own_direction(tested):
     assert tested.cells_of(tested.directions).tolist() == list(range(tested.size))
     assert np.allclose(np.linalg.norm(tested.directions, axis=1), 1.0)
@@ -84,7 +92,9 @@ def test_a_column_holds_its_right_limit_and_not_its_left():
 
 
 def test_both_ends_of_the_seam_fall_in_a_column():
-    plus, minus, behind = GRID.cells_of([towards(np.pi - 1e-9), towards(-np.pi + 1e-9), [-1.0, -0.0, 0.0]]) % 512
+    plus, minus, behind = (
+        GRID.cells_of([towards(np.pi - 1e-9), towards(-np.pi + 1e-9), [-1.0, -0.0, 0.0]]) % 512
+    )
     assert (plus, minus, behind) == (511, 0, 0)
     assert GRID.cells_of([[-1.0, 0.0, 0.0]])[0] % 512 == 0
 
@@ -134,7 +144,10 @@ def test_a_hull_reaches_no_further_than_the_corners(box):
     assume(len(hull))
     columns = set((hull % 512).tolist())
     corners = points_in(box, np.array([[x, y, 0.0] for x in (1, -1) for y in (1, -1)]))
-    reached = set(np.floor((np.arctan2(corners[:, 1], corners[:, 0]) + np.pi) / GRID.column_width).astype(int) % 512)
+    reached = set(
+        np.floor((np.arctan2(corners[:, 1], corners[:, 0]) + np.pi) / GRID.column_width).astype(int)
+        % 512
+    )
     ends = {c for c in columns if (c - 1) % 512 not in columns or (c + 1) % 512 not in columns}
     assert ends <= reached
     assert len(ends) in (1, 2)
@@ -157,7 +170,10 @@ def test_margins_dilate_by_exactly_their_columns_and_rows(box, azimuth_margin, e
 
 
 def test_default_margins_are_two_columns_and_one_row():
-    (bare,), (hull,) = GRID.hulls([[20, 3, -1, 4, 2, 1.5, 0.3]], 0, 0), GRID.hulls([[20, 3, -1, 4, 2, 1.5, 0.3]])
+    (bare,), (hull,) = (
+        GRID.hulls([[20, 3, -1, 4, 2, 1.5, 0.3]], 0, 0),
+        GRID.hulls([[20, 3, -1, 4, 2, 1.5, 0.3]]),
+    )
     (bare_rows, bare_columns), (rows, columns) = rows_and_columns(bare), rows_and_columns(hull)
     assert (rows[0], rows[-1]) == (bare_rows[0] - 1, bare_rows[-1] + 1)
     assert (columns[0], columns[-1]) == (bare_columns[0] - 2, bare_columns[-1] + 2)
@@ -213,11 +229,14 @@ def test_no_boxes_no_hulls():
 
 
 cameras = st.builds(
-    PinholeCamera, yaw=st.floats(-np.pi, np.pi), pitch=st.floats(-0.4, 0.4), horizontal_fov=st.floats(0.6, 2.0)
+    PinholeCamera,
+    yaw=st.floats(-np.pi, np.pi),
+    pitch=st.floats(-0.4, 0.4),
+    horizontal_fov=st.floats(0.6, 2.0),
 )
-image_boxes = st.tuples(st.integers(0, 318), st.integers(0, 178), st.integers(1, 320), st.integers(1, 180)).map(
-    lambda b: (b[0], b[1], min(b[0] + b[2], 320), min(b[1] + b[3], 180))
-)
+image_boxes = st.tuples(
+    st.integers(0, 318), st.integers(0, 178), st.integers(1, 320), st.integers(1, 180)
+).map(lambda b: (b[0], b[1], min(b[0] + b[2], 320), min(b[1] + b[3], 180)))
 
 
 @given(cameras, image_boxes)
@@ -226,7 +245,9 @@ def test_a_wedge_covers_the_ray_of_every_pixel_of_its_box(camera, box):
 
 
 @pytest.mark.parametrize("yaw", np.deg2rad([0, 60, 120, 180, 240, 300]))
-@pytest.mark.parametrize("box", [(0, 0, 320, 180), (10, 20, 60, 90), (150, 80, 170, 100), (300, 100, 320, 180)])
+@pytest.mark.parametrize(
+    "box", [(0, 0, 320, 180), (10, 20, 60, 90), (150, 80, 170, 100), (300, 100, 320, 180)]
+)
 def test_wedges_of_six_cameras_around_the_car(yaw, box):
     assert_wedge_covers_box(PinholeCamera(yaw=yaw, pitch=-0.1, position=(0.5, 0.2, -0.3)), box)
 

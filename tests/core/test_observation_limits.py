@@ -17,7 +17,7 @@ from care_sim.envs.spaces import observation_space
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import Annotations, Cloud, Sights
+from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
@@ -34,11 +34,17 @@ def tracks_of(*rows):
 
 
 def detections_of(*rows):
-    return ImageDetections.from_rows(np.array(rows, dtype=float).reshape(-1, len(ImageDetections.COLUMNS)))
+    return ImageDetections.from_rows(
+        np.array(rows, dtype=float).reshape(-1, len(ImageDetections.COLUMNS))
+    )
 
 
 def track(**values):
-    row = dict.fromkeys(Tracks.COLUMNS, 0.0) | {"x": 10.0, "length": 1.0, "width": 1.0, "height": 1.0} | values
+    row = (
+        dict.fromkeys(Tracks.COLUMNS, 0.0)
+        | {"x": 10.0, "length": 1.0, "width": 1.0, "height": 1.0}
+        | values
+    )
     return [row[name] for name in Tracks.COLUMNS]
 
 
@@ -57,7 +63,9 @@ def read(belief):
 
 
 def crowd_film(count):
-    """Two keyframes of people in rings around the car, each with a box in a camera and three returns."""
+    """Two keyframes of people in rings around the car, each with a box in a camera and three
+    returns.
+    """
     rng = np.random.default_rng(count)
     azimuth, far = np.linspace(-np.pi, np.pi, count, endpoint=False), rng.uniform(5, 45, count)
     boxes = np.tile([0.0, 0.0, -1.0, 0.6, 0.6, 1.8, 0.0], (count, 1))
@@ -66,48 +74,64 @@ def crowd_film(count):
     rows = []
     for box in boxes:
         seen = [(n, c.project(box[:3])) for n, c in enumerate(SURROUND_CAMERAS)]
-        number, ((u, v), _) = next((n, p) for n, p in seen if p[1] > 0 and 2 < p[0][0] < SURROUND_CAMERAS[n].width - 2)
+        number, ((u, v), _) = next(
+            (n, p) for n, p in seen if p[1] > 0 and 2 < p[0][0] < SURROUND_CAMERAS[n].width - 2
+        )
         box = {"left": u - 2, "right": u + 2, "top": max(v - 4, 0), "bottom": v + 4}
-        rows.append(detection(**box, camera=number, confidence=rng.uniform(0.3, 0.9), **{"class": PEDESTRIAN}))
+        rows.append(
+            detection(
+                **box, camera=number, confidence=rng.uniform(0.3, 0.9), **{"class": PEDESTRIAN}
+            )
+        )
     cells = np.repeat(np.arange(count), 3)
     cloud = Cloud(cells, np.repeat(boxes[:, :3], 3, axis=0), np.repeat(people.objects, 3))
-    sights = Sights(detections_of(*rows), people.objects)
+    identified = IdentifiedDetections(detections_of(*rows), people.objects)
     sensor = Frame(0.0, 0.0, 1.84, 0.0)
-    shots = tuple(Shot(0.5 * k, f"{k}", sensor, STANDING, people, sights, cloud) for k in range(2))
+    shots = tuple(Shot(0.5 * k, f"{k}", sensor, STANDING, people, identified, cloud) for k in range(2))
     return Film("crowd", SURROUND_CAMERAS, 1.84, 0.5, shots)
 
 
 @pytest.mark.parametrize("count", [100, 400])
 def test_of_tracked_people_with_a_box_each_none_is_read_as_new(count):
     film = crowd_film(count)
-    loop = OpenLoop(film, RIG, Sensing(), [np.random.SeedSequence(n) for n in range(3)], ReturnsProxy())
-    assert len(camera_layers(read(loop.belief), RIG)[0]) == min(count, MAX_DETECTIONS), "before the first scan all are"
+    loop = OpenLoop(
+        film, RIG, Sensing(), [np.random.SeedSequence(n) for n in range(3)], ReturnsProxy()
+    )
+    assert len(camera_layers(read(loop.belief), RIG)[0]) == min(count, MAX_DETECTIONS), (
+        "before the first scan all are"
+    )
     loop.keyframe(np.arange(RIG.grid.size))
     shown = read(loop.belief)
     new, known = camera_layers(shown, RIG)
     assert (len(new), len(known)) == (0, min(count, MAX_DETECTIONS))
     assert len(shown.tracks) == min(count, MAX_TRACKS)
     assert (np.diff(shown.tracks.ranges) >= 0).all()
-    surest = np.sort(film.shots[1].sights.detections.confidences)[::-1][:MAX_DETECTIONS]
+    surest = np.sort(film.shots[1].seen.detections.confidences)[::-1][:MAX_DETECTIONS]
     assert shown.detections.confidences == pytest.approx(surest)
 
 
 def random_tables(seed):
-    """Up to 700 tracks, nearest first, of few classes, and up to 200 boxes, many where few tracks are."""
+    """Up to 700 tracks, nearest first, of few classes, and up to 200 boxes, many where few tracks
+    are.
+    """
     rng = np.random.default_rng(seed)
     count, boxes = int(rng.integers(0, 700)), int(rng.integers(0, 200))
     places = rng.uniform(-60, 60, (count, 3)) * (1, 1, 0.03)
     places = places[np.argsort(np.hypot(places[:, 0], places[:, 1]), kind="stable")]
     kinds = int(rng.integers(1, 5))
     tracks = [
-        track(**{"id": n, "class": rng.integers(kinds), "x": x, "y": y, "z": z}) for n, (x, y, z) in enumerate(places)
+        track(**{"id": n, "class": rng.integers(kinds), "x": x, "y": y, "z": z})
+        for n, (x, y, z) in enumerate(places)
     ]
     half = rng.uniform(0.2, 12)
     middles = rng.uniform((0, 0), (320, 180), (boxes, 2))
     around = np.clip(np.hstack([middles - half, middles + half]), 0, (320, 180, 320, 180))
     columns = ("left", "top", "right", "bottom")
     detections = [
-        detection(**dict(zip(columns, box, strict=True)) | {"class": rng.integers(kinds), "camera": rng.integers(6)})
+        detection(
+            **dict(zip(columns, box, strict=True))
+            | {"class": rng.integers(kinds), "camera": rng.integers(6)}
+        )
         for box in around
     ]
     return tracks, detections
@@ -121,12 +145,16 @@ def test_the_rows_left_out_never_change_what_is_explained(seed):
     every = tracks_of(*tracks)
     assert (
         explained(shown.detections, shown.tracks, RIG).tolist()
-        == explained(shown.detections, Tracks.from_rows(every.rows().astype(np.float32)), RIG).tolist()
+        == explained(
+            shown.detections, Tracks.from_rows(every.rows().astype(np.float32)), RIG
+        ).tolist()
     )
     assert len(shown.tracks) == min(len(tracks), MAX_TRACKS)
     assert len(shown.detections) == min(len(detections), MAX_DETECTIONS)
     assert (np.diff(belief.tracks.ids) > 0).all(), "nearest first"
-    assert shown.tracks.rows().tolist() == belief.tracks.rows().astype(np.float32).tolist(), "and back without loss"
+    assert shown.tracks.rows().tolist() == belief.tracks.rows().astype(np.float32).tolist(), (
+        "and back without loss"
+    )
     if len(tracks) <= MAX_TRACKS:
         assert shown.tracks.ids.tolist() == list(range(len(tracks)))
 
@@ -145,22 +173,35 @@ LARGE = st.floats(-1e12, 1e12)
 """Numbers as they come."""
 POSITIVE = st.floats(0, 1e12)
 COUNTS = st.integers(0, 2**40)
-TRACK = st.tuples(COUNTS, st.integers(0, 4), *[LARGE] * 3, *[POSITIVE] * 3, *[LARGE] * 3, COUNTS, COUNTS)
-DETECTION = st.tuples(st.integers(0, 4), st.floats(0, 1), *[LARGE] * 4, st.integers(0, 5), POSITIVE, LARGE)
+TRACK = st.tuples(
+    COUNTS, st.integers(0, 4), *[LARGE] * 3, *[POSITIVE] * 3, *[LARGE] * 3, COUNTS, COUNTS
+)
+DETECTION = st.tuples(
+    st.integers(0, 4), st.floats(0, 1), *[LARGE] * 4, st.integers(0, 5), POSITIVE, LARGE
+)
 
 
-@given(st.builds(Ego, LARGE, LARGE, LARGE), st.lists(TRACK, max_size=5), st.lists(DETECTION, max_size=5))
+@given(
+    st.builds(Ego, LARGE, LARGE, LARGE),
+    st.lists(TRACK, max_size=5),
+    st.lists(DETECTION, max_size=5),
+)
 def test_whatever_is_read_lies_in_the_observation_space(ego, tracks, detections):
     belief = told(tracks, detections, ego)
     assert SPACE.contains(belief.to_observation())
     again = LIMITS.belief(belief.ego, belief.detections, belief.tracks, NOWHERE)
-    assert again.tracks.rows().tolist() == belief.tracks.rows().tolist(), "what lies within is left as it is"
+    assert again.tracks.rows().tolist() == belief.tracks.rows().tolist(), (
+        "what lies within is left as it is"
+    )
     assert again.detections.rows().tolist() == belief.detections.rows().tolist()
     assert again.ego == belief.ego
 
 
 def test_what_lies_within_is_handed_on_untouched():
-    tracks, seen = tracks_of(track(), track(x=-100.0, vy=100.0)), detections_of(detection(right=320, bottom=180))
+    tracks, seen = (
+        tracks_of(track(), track(x=-100.0, vy=100.0)),
+        detections_of(detection(right=320, bottom=180)),
+    )
     belief = LIMITS.belief(Ego(-3.0, 0.2, -9.0), seen, tracks, NOWHERE)
     assert belief.tracks is tracks
     assert belief.detections is seen
@@ -168,7 +209,9 @@ def test_what_lies_within_is_handed_on_untouched():
 
 
 def test_a_far_or_fast_track_keeps_its_bearing_and_its_heading():
-    (far,) = told([track(x=300.0, y=-400.0, z=-20.0, vx=90.0, vy=-240.0, yaw=101 * np.pi + 0.5)]).tracks.rows()
+    (far,) = told(
+        [track(x=300.0, y=-400.0, z=-20.0, vx=90.0, vy=-240.0, yaw=101 * np.pi + 0.5)]
+    ).tracks.rows()
     row = dict(zip(Tracks.COLUMNS, far.tolist(), strict=True))
     assert (row["x"], row["y"], row["z"]) == pytest.approx((75.0, -100.0, -5.0))
     assert (row["vx"], row["vy"]) == pytest.approx((37.5, -MAX_SPEED_MPS))

@@ -32,13 +32,17 @@ def test_a_same_class_centre_inside_the_box_explains_it(tracks_at, seen):
 
 def test_another_class_explains_nothing(tracks_at, seen):
     tracks = tracks_at(("car", 20, 2, 0, 0))
-    assert explained(seen(("pedestrian", *box_around((20, 2, -1)))), tracks, RIG).tolist() == [False]
+    assert explained(seen(("pedestrian", *box_around((20, 2, -1)))), tracks, RIG).tolist() == [
+        False
+    ]
 
 
 def test_a_centre_beside_the_box_explains_nothing(tracks_at, seen):
     tracks = tracks_at(("car", 20, 2, 0, 0))
     left, top, right, bottom = box_around((20, 2, -1))
-    beside = seen(("car", left + 12, top, right + 12, bottom), ("car", left, top + 12, right, bottom + 12))
+    beside = seen(
+        ("car", left + 12, top, right + 12, bottom), ("car", left, top + 12, right, bottom + 12)
+    )
     assert explained(beside, tracks, RIG).tolist() == [False, False]
 
 
@@ -55,12 +59,20 @@ def test_a_track_behind_the_camera_explains_nothing(tracks_at, seen):
 
 
 def test_forecasts_are_turned_back_to_when_the_picture_was_taken(tracks_at, seen):
-    """The car has turned 0.2 rad left since: what is ahead now stood 0.2 rad to the left in the picture."""
+    """The car has turned 0.2 rad left since: what is ahead now stood 0.2 rad to the left in the
+    picture.
+    """
     ahead = tracks_at(("car", 20, 0, 0, 0))
     then = (20 * np.cos(0.2), 20 * np.sin(0.2), -1)
-    assert explained(seen(("car", *box_around(then)), yaw_change=0.2), ahead, RIG).tolist() == [True]
-    assert explained(seen(("car", *box_around(then)), yaw_change=0.0), ahead, RIG).tolist() == [False]
-    assert explained(seen(("car", *box_around(then)), yaw_change=-0.2), ahead, RIG).tolist() == [False]
+    assert explained(seen(("car", *box_around(then)), yaw_change=0.2), ahead, RIG).tolist() == [
+        True
+    ]
+    assert explained(seen(("car", *box_around(then)), yaw_change=0.0), ahead, RIG).tolist() == [
+        False
+    ]
+    assert explained(seen(("car", *box_around(then)), yaw_change=-0.2), ahead, RIG).tolist() == [
+        False
+    ]
 
 
 def test_wedges_are_turned_to_where_the_car_looks_now(seen):
@@ -86,7 +98,9 @@ def test_every_detection_is_judged_by_its_own_camera(tracks_at, seen, camera):
 def test_layers_part_what_memory_explains_from_what_it_does_not(tracks_at, seen):
     tracks = tracks_at(("car", 20, 2, 0, 0), ("car", 30, -6, 0, 0))
     boxes = seen(
-        ("car", *box_around((20, 2, -1))), ("pedestrian", *box_around((15, -8, -1))), ("car", *box_around((30, -6, -1)))
+        ("car", *box_around((20, 2, -1))),
+        ("pedestrian", *box_around((15, -8, -1))),
+        ("car", *box_around((30, -6, -1))),
     )
     unexplained, known = camera_layers(belief(boxes, tracks), RIG)
     first, second, third = (wedge.tolist() for wedge in wedges(boxes, RIG))
@@ -120,8 +134,17 @@ def test_a_box_is_explained_when_the_picture_of_a_forecast_of_its_class_lies_in_
     boxes = np.concatenate([corner, corner + rng.uniform(1, 200, (20, 2))], axis=1)
     detections = ImageDetections(classes, np.ones(20), boxes, cameras, np.zeros(20), yaw_changes)
     nothing = np.zeros(12, np.int64)
-    tracks = Tracks(nothing, kinds, np.column_stack([centres, np.ones((12, 4))]), np.zeros((12, 2)), nothing, nothing)
+    tracks = Tracks(
+        nothing,
+        kinds,
+        np.column_stack([centres, np.ones((12, 4))]),
+        np.zeros((12, 2)),
+        nothing,
+        nothing,
+    )
     for n, known in enumerate(explained(detections, tracks, Rig(cameras=SURROUND_CAMERAS))):
-        pixels, _ = SURROUND_CAMERAS[cameras[n]].project(turned(centres[kinds == classes[n]], yaw_changes[n]))
+        pixels, _ = SURROUND_CAMERAS[cameras[n]].project(
+            turned(centres[kinds == classes[n]], yaw_changes[n])
+        )
         inside = np.all((boxes[n, :2] <= pixels) & (pixels <= boxes[n, 2:]), axis=1)
         assert known == inside.any()

@@ -12,9 +12,12 @@ GRID = AngularGrid()
 STANDING = Ego()
 values = st.floats(-1000, 1000, width=32)
 classes = st.integers(0, len(CLASSES) - 1)
-track_rows = st.lists(st.tuples(st.integers(0, 2**20), classes, *[values] * 9, *[st.integers(0, 100)] * 2), max_size=8)
+track_rows = st.lists(
+    st.tuples(st.integers(0, 2**20), classes, *[values] * 9, *[st.integers(0, 100)] * 2), max_size=8
+)
 detection_rows = st.lists(
-    st.tuples(classes, st.floats(0, 1, width=32), *[values] * 4, st.integers(0, 5), values, values), max_size=8
+    st.tuples(classes, st.floats(0, 1, width=32), *[values] * 4, st.integers(0, 5), values, values),
+    max_size=8,
 )
 
 
@@ -22,13 +25,17 @@ def belief(tracks=(), detections=(), budget=1638, ego=STANDING, ranges=None):
     return Belief(
         ego,
         budget,
-        ImageDetections.from_rows(np.array(detections, dtype=float).reshape(-1, len(ImageDetections.COLUMNS))),
+        ImageDetections.from_rows(
+            np.array(detections, dtype=float).reshape(-1, len(ImageDetections.COLUMNS))
+        ),
         Tracks.from_rows(np.array(tracks, dtype=float).reshape(-1, len(Tracks.COLUMNS))),
         np.zeros(GRID.shape, np.float32) if ranges is None else ranges,
     )
 
 
-@given(track_rows, detection_rows, st.integers(1, GRID.size), st.builds(Ego, values, values, values))
+@given(
+    track_rows, detection_rows, st.integers(1, GRID.size), st.builds(Ego, values, values, values)
+)
 def test_what_gymnasium_shows_reads_back_without_loss(tracks, detections, budget, ego):
     before = belief(tracks, detections, budget, ego)
     after = Belief.from_observation(before.to_observation())
@@ -59,7 +66,12 @@ def test_columns_keep_their_meaning():
     assert tracks.velocities.tolist() == [[-1, 1]]
     assert tracks.ranges[0] == pytest.approx(np.hypot(10, 11))
     detection = belief(detections=[[4, 0.5, 1, 2, 3, 4, 1, 0.1, 0.2]]).detections
-    assert (detection.classes[0], detection.cameras[0], detection.ages[0], detection.yaw_changes[0]) == (4, 1, 0.1, 0.2)
+    assert (
+        detection.classes[0],
+        detection.cameras[0],
+        detection.ages[0],
+        detection.yaw_changes[0],
+    ) == (4, 1, 0.1, 0.2)
     assert detection.boxes.tolist() == [[1, 2, 3, 4]]
 
 

@@ -20,7 +20,8 @@ def controller(cruise=10.0, **rules):
 def objects(*rows, size=(2.0, 1.0, 1.5), yaw=0.0):
     """Tracks of `size` from (gap to the front bumper, y, vx, vy)."""
     table = [
-        [n, 0, gap + FRONT + size[0] / 2, y, 0, *size, yaw, vx, vy, 0, 2] for n, (gap, y, vx, vy) in enumerate(rows)
+        [n, 0, gap + FRONT + size[0] / 2, y, 0, *size, yaw, vx, vy, 0, 2]
+        for n, (gap, y, vx, vy) in enumerate(rows)
     ]
     return Tracks.from_rows(np.array(table, dtype=float).reshape(-1, len(Tracks.COLUMNS)))
 
@@ -29,7 +30,9 @@ def brakes(*rows, speed=10.0, **kwargs):
     return controller().command(objects(*rows, **kwargs), Ego(speed)).braking
 
 
-@pytest.mark.parametrize(("gap", "expected"), [(STOPPING_AT_10 + 0.01, False), (STOPPING_AT_10 - 0.01, True)])
+@pytest.mark.parametrize(
+    ("gap", "expected"), [(STOPPING_AT_10 + 0.01, False), (STOPPING_AT_10 - 0.01, True)]
+)
 def test_brakes_at_the_stopping_distance_and_not_before(gap, expected):
     assert brakes((gap, 0, 0, 0)) is expected
 
@@ -55,8 +58,8 @@ def drive(gap, speed=10.0, keyframes=60, obstacle_y=lambda _time: 0.0):
 
 
 def test_an_approach_worked_by_hand():
-    """Gaps 17.5, 16.5, 15.5, 14.5: the fourth is the first within 15 m. Three keyframes of reaction, then
-    10 m of braking: it stands 14.5 - 3 - 10 = 1.5 m before the object."""
+    """Gaps 17.5, 16.5, 15.5, 14.5: the fourth is the first within 15 m. Three keyframes of
+    reaction, then 10 m of braking: it stands 14.5 - 3 - 10 = 1.5 m before the object."""
     history = drive(17.5)
     assert [command.braking for _, _, command in history[:5]] == [False, False, False, True, True]
     assert [command.acceleration for _, _, command in history[3:8]] == [0.0, 0.0, 0.0, -5.0, -5.0]

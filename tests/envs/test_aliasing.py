@@ -54,7 +54,7 @@ def played(env, touch, inner=lambda _: None):
 
 
 def kept(inner):
-    records = getattr(inner, "keyframes", None) or inner.exposures
+    records = inner.keyframes
     return [record.fired.tolist() for record in records], inner.acted.tobytes(), inner.loop.belief.ranges.tobytes()
 
 

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from care_sim.sensors.engines.engine import Bullet
+from care_sim.sensors.engines.bullet import Bullet
 from care_sim.sensors.engines.fast import Fast
 
 BEHIND = (-15.0, 1.0, 0.0)

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from care_sim.scenarios.dartout import Dartout
-from care_sim.world.bullet_clients import MOST_FREE
-from care_sim.world.quiet_pybullet import pybullet
+from care_sim.world.bullet_clients import MOST_FREE, pybullet
 
 CYCLES = int(os.environ.get("CARE_SIM_CYCLES", "150"))
 MOST_CLIENTS = 1024

@@ -12,7 +12,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.envs import OPEN_LOOP
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.evaluation.recall import score
+from care_sim.evaluation.recall import score_scene
 from care_sim.evaluation.sightings import Sightings
 from care_sim.loops.film import Film
 from care_sim.sources.streets.recording import street_film
@@ -99,9 +99,9 @@ def test_an_episode_shows_every_keyframe_once_and_ends_with_the_tally(make):
 def test_the_score_is_that_of_what_the_detector_reported(make):
     env = make(budget=0.2)
     played(env, "history")
-    film, exposures = env.unwrapped.loop.film, env.unwrapped.exposures
+    film, keyframes = env.unwrapped.loop.film, env.unwrapped.keyframes
     sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden)
-    again = score(sightings, [exposure.detections for exposure in exposures])
+    again = score_scene(sightings, [record.detections for record in keyframes])
     assert again.tally() == env.unwrapped.score.tally()
     assert again.event_rows() == env.unwrapped.score.event_rows()
 

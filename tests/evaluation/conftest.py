@@ -37,7 +37,9 @@ def reported():
 
 @pytest.fixture(scope="session")
 def street():
-    """A random street of 8 keyframes from a seed: up to 12 objects that come, go and move, to 70 m away."""
+    """A random street of 8 keyframes from a seed: up to 12 objects that come, go and move, to 70 m
+    away.
+    """
 
     def make(seed):
         rng = np.random.default_rng(seed)
@@ -58,7 +60,9 @@ def keyframe(classes, centres, present):
 
 @pytest.fixture(scope="session")
 def detector():
-    """Reports of a street from a seed: some objects, half a metre off, some of another class, and some that are not."""
+    """Reports of a street from a seed: some objects, half a metre off, some of another class, and
+    some that are not.
+    """
 
     def make(street, seed):
         rng = np.random.default_rng(seed)

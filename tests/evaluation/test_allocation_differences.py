@@ -28,7 +28,9 @@ def test_equal_allocations_and_none():
 
 
 def test_scenes_add():
-    assert AllocationDifference(40, 7, 100) + AllocationDifference(39, 0, 0) == AllocationDifference(79, 7, 100)
+    assert AllocationDifference(40, 7, 100) + AllocationDifference(
+        39, 0, 0
+    ) == AllocationDifference(79, 7, 100)
 
 
 def test_other_keyframes_are_refused():

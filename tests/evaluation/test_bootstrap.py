@@ -47,7 +47,9 @@ def test_the_same_samples_give_the_same_interval():
     assert paired_difference(a, np.zeros(20)) == paired_difference(a, np.zeros(20))
 
 
-@pytest.mark.parametrize(("ours", "theirs"), [([], []), ([1.0], [1.0, 2.0]), ([np.nan], [1.0]), ([[1.0]], [[1.0]])])
+@pytest.mark.parametrize(
+    ("ours", "theirs"), [([], []), ([1.0], [1.0, 2.0]), ([np.nan], [1.0]), ([[1.0]], [[1.0]])]
+)
 def test_samples_that_are_no_pairs_are_refused(ours, theirs):
     with pytest.raises(InvalidInput):
         paired_difference(ours, theirs)
@@ -61,7 +63,9 @@ def test_two_ratios_have_a_distribution_known_by_hand():
 
 def test_a_ratio_of_equal_denominators_is_the_paired_difference():
     a = np.random.default_rng(6).normal(size=40)
-    assert ratio_of_sums((a * 3.0, np.full(40, 3.0))) == pytest.approx(paired_difference(a, np.zeros(40)))
+    assert ratio_of_sums((a * 3.0, np.full(40, 3.0))) == pytest.approx(
+        paired_difference(a, np.zeros(40))
+    )
 
 
 def test_ratios_agree_with_the_linear_theory():
@@ -88,7 +92,9 @@ def test_equal_ratios_are_certain_and_silent_and_draws_are_seeded():
         warnings.simplefilter("error")
         assert ratio_of_sums(([1.0, 2.0, 0.5], [2.0, 4.0, 1.0])) == (0.5, 0.5, 0.5)
         assert ratio_of_sums(([7.0], [10.0])) == (0.7, 0.7, 0.7)
-        assert ratio_of_sums(([7.0], [10.0]), less=([2.0, 1.0], [10.0, 5.0])) == pytest.approx((0.5, 0.5, 0.5))
+        assert ratio_of_sums(([7.0], [10.0]), less=([2.0, 1.0], [10.0, 5.0])) == pytest.approx(
+            (0.5, 0.5, 0.5)
+        )
     sums = np.random.default_rng(9).random((2, 12)) + 0.5
     assert ratio_of_sums(tuple(sums)) == ratio_of_sums(tuple(sums))
     assert ratio_of_sums(tuple(sums)) != ratio_of_sums(tuple(sums), seed=1)
@@ -138,7 +144,9 @@ def rare_steps(rng, n):
     ],
 )
 def test_how_often_the_interval_holds_the_truth(draw, truth, n, least, most):
-    """Near 95% at the 30 seeds of a sweep; at five seeds it falls well short, and the captions say how far."""
+    """Near 95% at the 30 seeds of a sweep; at five seeds it falls well short, and the captions say
+    how far.
+    """
     rng = np.random.default_rng(5)
     trials, held = 400, 0
     for trial in range(trials):
@@ -148,8 +156,8 @@ def test_how_often_the_interval_holds_the_truth(draw, truth, n, least, most):
 
 
 def scenes(rng, n, gain, rate):
-    """Differences and events of n scenes: events from few to many, more of them gained where there are more, and a
-    share of the gain that the events of a scene have in common.
+    """Differences and events of n scenes: events from few to many, more of them gained where there
+    are more, and a share of the gain that the events of a scene have in common.
     """
     events = rng.negative_binomial(3, 3 / (3 + rate), n) + 1.0
     chance = np.clip(gain + rng.normal(0.0, 0.08, n) + 0.002 * (events - events.mean()), -1, 1)
@@ -161,7 +169,9 @@ def scenes(rng, n, gain, rate):
     ("n", "least", "most"), [(150, 0.92, 0.98), (50, 0.90, 0.97), (10, 0.80, 0.93), (5, 0.72, 0.87)]
 )
 def test_how_often_the_interval_of_a_ratio_holds_the_truth(n, least, most):
-    """At the 150 scenes of the protocol, the 50 of a third, and at ten and five, where it falls short."""
+    """At the 150 scenes of the protocol, the 50 of a third, and at ten and five, where it falls
+    short.
+    """
     rng = np.random.default_rng(10)
     gains, events = scenes(rng, 400_000, 0.05, 27)
     truth, held = gains.sum() / events.sum(), 0

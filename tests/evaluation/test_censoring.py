@@ -62,9 +62,16 @@ def test_a_miss_counts_with_the_most_it_can_have_been_and_makes_a_bound(ours, th
         ([None] * 5, [2.0] * 5, False, -2.0),
     ],
 )
-def test_a_claim_holds_wherever_in_its_range_a_missed_distance_lies(ours, theirs, excludes, cautious):
-    """Missed, an actor was between 0 and 3 m away: at 0 where that speaks against the difference, else at 3."""
-    found, turned = difference(readings(*ours), readings(*theirs)), difference(readings(*theirs), readings(*ours))
+def test_a_claim_holds_wherever_in_its_range_a_missed_distance_lies(
+    ours, theirs, excludes, cautious
+):
+    """Missed, an actor was between 0 and 3 m away: at 0 where that speaks against the difference,
+    else at 3.
+    """
+    found, turned = (
+        difference(readings(*ours), readings(*theirs)),
+        difference(readings(*theirs), readings(*ours)),
+    )
     assert found.excludes_zero == turned.excludes_zero == excludes
     assert found.cautious.mean == pytest.approx(cautious)
     if found.interval.mean:

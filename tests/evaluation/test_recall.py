@@ -9,7 +9,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import turned
 from care_sim.core.types import Detections
 from care_sim.evaluation import matching
-from care_sim.evaluation.recall import Score, Tally, score
+from care_sim.evaluation.recall import SceneScore, Tally, score_scene
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sensors.annotated import Annotations
 
@@ -19,8 +19,8 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 @pytest.fixture(scope="session")
 def follow(shown, reported):
-    """Score a pedestrian that comes into sight: where it is at each keyframe, None for not annotated, and at which of
-    them it is reported.
+    """Score a pedestrian that comes into sight: where it is at each keyframe, None for not
+    annotated, and at which of them it is reported.
     """
 
     def make(distances, detected):
@@ -29,7 +29,7 @@ def follow(shown, reported):
             reported(("pedestrian", 10.0 if x is None else x, 0.0)) if n in detected else reported()
             for n, x in enumerate(distances)
         ]
-        return score(Sightings.of("one", keyframes), reports)
+        return score_scene(Sightings.of("one", keyframes), reports)
 
     return make
 
@@ -45,12 +45,42 @@ LONG = [None, *[20] * 11]
         pytest.param(LONG, {6}, False, 5, 6, id="found at the last keyframe that counts"),
         pytest.param(LONG, {7}, False, 6, 6, id="found at K: censored"),
         pytest.param(LONG, set(), False, 6, 6, id="never found: censored"),
-        pytest.param([None, 20, 20], set(), False, 6, 2, id="the scene ends before K: censored all the same"),
+        pytest.param(
+            [None, 20, 20], set(), False, 6, 2, id="the scene ends before K: censored all the same"
+        ),
         pytest.param([None, 20, 20], {2}, False, 1, 2, id="the scene ends before K, found"),
-        pytest.param([None, 20, 60, 60, 60, 60, 60, 60], {2, 3}, False, 6, 1, id="leaves by range, found out there"),
-        pytest.param([None, 20, 60, 60, 30, 60, 60, 60], {4}, False, 3, 2, id="leaves and returns in time, found"),
-        pytest.param([None, 20, None, None, *[20] * 8], {2, 3}, False, 6, 4, id="reported in an annotation gap"),
-        pytest.param([60, 60, 40, 40], {0, 1, 2}, True, 0, 2, id="found before it is in range, and at its entry"),
+        pytest.param(
+            [None, 20, 60, 60, 60, 60, 60, 60],
+            {2, 3},
+            False,
+            6,
+            1,
+            id="leaves by range, found out there",
+        ),
+        pytest.param(
+            [None, 20, 60, 60, 30, 60, 60, 60],
+            {4},
+            False,
+            3,
+            2,
+            id="leaves and returns in time, found",
+        ),
+        pytest.param(
+            [None, 20, None, None, *[20] * 8],
+            {2, 3},
+            False,
+            6,
+            4,
+            id="reported in an annotation gap",
+        ),
+        pytest.param(
+            [60, 60, 40, 40],
+            {0, 1, 2},
+            True,
+            0,
+            2,
+            id="found before it is in range, and at its entry",
+        ),
         pytest.param([60, 60, 40, 40], {0, 1}, False, 6, 2, id="found before it is in range only"),
     ],
 )
@@ -63,33 +93,48 @@ def test_the_delay_of_an_event(follow, distances, detected, sighted, delay, chan
 
 
 def test_a_return_is_an_object_frame_but_no_second_event(follow):
-    assert follow([None, 20, 60, 20], {1}).tally() == Tally(events=1, sighted=1, delay=0, frames=2, found=1)
+    assert follow([None, 20, 60, 20], {1}).tally() == Tally(
+        events=1, sighted=1, delay=0, frames=2, found=1
+    )
 
 
 def test_an_object_present_at_start_counts_in_overall_recall_alone(follow):
-    assert follow([20, 20, 60, 20], {1, 2}).tally() == Tally(events=0, sighted=0, delay=0, frames=3, found=1)
+    assert follow([20, 20, 60, 20], {1, 2}).tally() == Tally(
+        events=0, sighted=0, delay=0, frames=3, found=1
+    )
 
 
 def test_a_detection_of_the_wrong_class_is_no_sighting(shown, reported):
     keyframes = [shown(), shown((1, "bicycle", 9, 0)), shown((1, "bicycle", 9, 0))]
-    result = score(Sightings.of("wrong", keyframes), [reported(), reported(("car", 9, 0)), reported(("bicycle", 9, 0))])
+    result = score_scene(
+        Sightings.of("wrong", keyframes),
+        [reported(), reported(("car", 9, 0)), reported(("bicycle", 9, 0))],
+    )
     assert result.tally() == Tally(events=1, sighted=0, delay=1, frames=2, found=1)
 
 
 def test_a_scene_of_several_objects_worked_by_hand(shown, reported):
-    """The parked car is there at start; a van enters by range, a child out of hiding, a cyclist behind, unseen."""
+    """The parked car is there at start; a van enters by range, a child out of hiding, a cyclist
+    behind, unseen.
+    """
     car, van, child, rider = (
         (1, "car", 8.0, 3.0), (2, "truck", 49.0, 0.0), (3, "pedestrian", 12.0, -2.0), (4, "bicycle", -30.0, 0.5)
     )  # fmt: skip
-    keyframes = [shown(car, (2, "truck", 55.0, 0.0)), shown(van, car, child), shown(rider, child, van, car)]
+    keyframes = [
+        shown(car, (2, "truck", 55.0, 0.0)),
+        shown(van, car, child),
+        shown(rider, child, van, car),
+    ]
     reports = [
         reported(("car", 8.0, 3.0), ("truck", 55.0, 0.0)),
         reported(("pedestrian", 12.0, -2.5), ("car", 8.0, 5.01)),
         reported(("truck", 49.0, 1.99), ("bicycle", -30.0, -1.51)),
     ]
-    result = score(Sightings.of("street", keyframes), reports)
+    result = score_scene(Sightings.of("street", keyframes), reports)
     assert result.tally() == Tally(events=3, sighted=1, delay=1 + 0 + 6, frames=8, found=3)
-    assert [(row["keyframe"], row["object"], row["class"], row["ttfd"]) for row in result.event_rows()] == [
+    assert [
+        (row["keyframe"], row["object"], row["class"], row["ttfd"]) for row in result.event_rows()
+    ] == [
         (1, 2, "truck", 1),
         (1, 3, "pedestrian", 0),
         (2, 4, "bicycle", 6),
@@ -101,7 +146,9 @@ def test_a_scene_of_several_objects_worked_by_hand(shown, reported):
 
 
 def test_an_event_counts_in_the_stratum_of_its_first_sighting(follow):
-    """Seen first at 30 m and found at 10 m: the delay belongs to the far stratum, the found frame to the near one."""
+    """Seen first at 30 m and found at 10 m: the delay belongs to the far stratum, the found frame
+    to the near one.
+    """
     result = follow([None, 30, 10], {2})
     near = result.sightings.frames.ranges < 20
     assert result.tally(near) == Tally(events=0, sighted=0, delay=0, frames=1, found=1)
@@ -111,47 +158,64 @@ def test_an_event_counts_in_the_stratum_of_its_first_sighting(follow):
 def test_censoring_can_be_set(shown, reported):
     scene = Sightings.of("short", [shown(), shown((1, "car", 9, 0)), shown((1, "car", 9, 0))])
     late = [reported(), reported(), reported(("car", 9, 0))]
-    assert score(scene, late, censored_at=1).delays.tolist() == [1]
-    assert score(scene, late, censored_at=2).delays.tolist() == [1]
-    assert score(scene, [reported()] * 3, censored_at=2).delays.tolist() == [2]
+    assert score_scene(scene, late, censored_at=1).delays.tolist() == [1]
+    assert score_scene(scene, late, censored_at=2).delays.tolist() == [1]
+    assert score_scene(scene, [reported()] * 3, censored_at=2).delays.tolist() == [2]
 
 
 @pytest.mark.parametrize("censored_at", [0, 2.5])
 def test_censoring_takes_a_whole_keyframe_at_least(shown, reported, censored_at):
     with pytest.raises(InvalidInput, match="censored_at must be a whole number >= 1"):
-        score(Sightings.of("any", [shown()]), [reported()], censored_at)
+        score_scene(Sightings.of("any", [shown()]), [reported()], censored_at)
 
 
 def test_an_empty_scene_has_nothing_to_find(shown, reported):
-    assert score(Sightings.of("quiet", [shown(), shown()]), [reported(("car", 1, 1)), reported()]).tally() == Tally()
+    assert (
+        score_scene(
+            Sightings.of("quiet", [shown(), shown()]), [reported(("car", 1, 1)), reported()]
+        ).tally()
+        == Tally()
+    )
 
 
 def test_reports_must_be_one_a_keyframe(shown, reported):
     with pytest.raises(InvalidInput, match="scene brief: 2 keyframes need as many reports, got 1"):
-        score(Sightings.of("brief", [shown(), shown()]), [reported()])
+        score_scene(Sightings.of("brief", [shown(), shown()]), [reported()])
 
 
 def test_a_scene_matched_keyframe_by_keyframe_scores_the_same(street, detector):
     keyframes = street(3)
     reports, sightings = detector(keyframes, 4), Sightings.of("any", keyframes)
-    masks = [matching.found(shown, report) for shown, report in zip(keyframes, reports, strict=True)]
-    kept = Score.of(sightings, masks)
+    masks = [
+        matching.found_objects(shown, report)
+        for shown, report in zip(keyframes, reports, strict=True)
+    ]
+    kept = SceneScore.of(sightings, masks)
     assert kept.tally().found > 0
-    assert kept.event_rows() == score(sightings, reports).event_rows()
-    assert Score.of(sightings, masks, censored_at=2).delays.max() == 2
+    assert kept.event_rows() == score_scene(sightings, reports).event_rows()
+    assert SceneScore.of(sightings, masks, censored_at=2).delays.max() == 2
 
 
 @pytest.mark.parametrize(
     ("masks", "says"),
     [
         ([[]], "scene brief: 2 keyframes need as many masks, got 1"),
-        ([[], [True, False]], r"scene brief, keyframe 1: 1 annotations need a boolean mask \(1,\), got bool \(2,\)"),
-        ([[], [1]], r"scene brief, keyframe 1: 1 annotations need a boolean mask \(1,\), got int64 \(1,\)"),
+        (
+            [[], [True, False]],
+            r"scene brief, keyframe 1: 1 annotations need a boolean mask \(1,\), got bool \(2,\)",
+        ),
+        (
+            [[], [1]],
+            r"scene brief, keyframe 1: 1 annotations need a boolean mask \(1,\), got int64 \(1,\)",
+        ),
     ],
 )
 def test_masks_must_fit_the_annotations(shown, masks, says):
     with pytest.raises(InvalidInput, match=says):
-        Score.of(Sightings.of("brief", [shown(), shown((1, "car", 9, 0))]), [np.array(m) if m else NONE for m in masks])
+        SceneScore.of(
+            Sightings.of("brief", [shown(), shown((1, "car", 9, 0))]),
+            [np.array(m) if m else NONE for m in masks],
+        )
 
 
 def test_tallies_add():
@@ -165,7 +229,7 @@ def perfect(keyframes):
 @given(SEEDS)
 def test_a_perfect_detector_finds_everything_at_once(street, seed):
     keyframes = street(seed)
-    tally = score(Sightings.of("any", keyframes), perfect(keyframes)).tally()
+    tally = score_scene(Sightings.of("any", keyframes), perfect(keyframes)).tally()
     assert tally.sighted == tally.events
     assert tally.found == tally.frames
     assert tally.delay == 0
@@ -174,7 +238,7 @@ def test_a_perfect_detector_finds_everything_at_once(street, seed):
 @given(SEEDS, SEEDS)
 def test_counts_stay_within_what_there_is(street, detector, seed, other):
     keyframes = street(seed)
-    result = score(Sightings.of("any", keyframes), detector(keyframes, other))
+    result = score_scene(Sightings.of("any", keyframes), detector(keyframes, other))
     tally = result.tally()
     assert 0 <= tally.sighted <= tally.events <= tally.frames
     assert tally.sighted <= tally.found <= tally.frames
@@ -184,18 +248,29 @@ def test_counts_stay_within_what_there_is(street, detector, seed, other):
 
 
 @given(SEEDS, SEEDS, st.floats(-np.pi, np.pi))
-def test_neither_order_nor_a_turn_of_the_sensor_changes_the_tally(street, detector, seed, other, yaw):
+def test_neither_order_nor_a_turn_of_the_sensor_changes_the_tally(
+    street, detector, seed, other, yaw
+):
     keyframes = street(seed)
     reports = detector(keyframes, other)
     around = [
-        Annotations(a.objects[::-1], a.classes[::-1], np.c_[turned(a.boxes[:, :3], yaw), a.boxes[:, 3:]][::-1])
+        Annotations(
+            a.objects[::-1],
+            a.classes[::-1],
+            np.c_[turned(a.boxes[:, :3], yaw), a.boxes[:, 3:]][::-1],
+        )
         for a in keyframes
     ]
     rolled = [
-        Detections(r.classes[::-1], np.c_[turned(r.boxes[:, :3], yaw), r.boxes[:, 3:]][::-1], r.returns)
+        Detections(
+            r.classes[::-1], np.c_[turned(r.boxes[:, :3], yaw), r.boxes[:, 3:]][::-1], r.returns
+        )
         for r in reports
     ]
-    before, after = score(Sightings.of("a", keyframes), reports), score(Sightings.of("b", around), rolled)
+    before, after = (
+        score_scene(Sightings.of("a", keyframes), reports),
+        score_scene(Sightings.of("b", around), rolled),
+    )
     assert before.tally() == after.tally()
 
 
@@ -205,4 +280,6 @@ def test_more_reports_never_find_less(street, detector, seed, other):
     reports = detector(keyframes, other)
     fewer = [Detections(r.classes[:-1], r.boxes[:-1], r.returns[:-1]) for r in reports]
     sightings = Sightings.of("any", keyframes)
-    assert score(sightings, fewer).tally().found <= score(sightings, reports).tally().found
+    assert (
+        score_scene(sightings, fewer).tally().found <= score_scene(sightings, reports).tally().found
+    )

@@ -1,15 +1,27 @@
-"""Contrasts of two policies over scenes: values by hand, pairing, weights, thirds, and what cannot be compared."""
+"""Contrasts of two policies over scenes: values by hand, pairing, weights, thirds, and what cannot
+be compared.
+"""
 
 import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, averaged, contrast, contrast_gap, level
+from care_sim.evaluation.scene_contrasts import (
+    FIRST_SIGHTING,
+    OVERALL,
+    TTFD,
+    averaged,
+    contrast_gap,
+    ratio_level,
+    scene_contrast,
+)
 
 
 def tallies(*scenes):
-    """Scenes from (events, sighted), ten object frames an event, two frames found for each event sighted."""
+    """Scenes from (events, sighted), ten object frames an event, two frames found for each event
+    sighted.
+    """
     return {
         f"scene {n}": Tally(events, sighted, 6 * (events - sighted), 10 * events, 2 * sighted)
         for n, (events, sighted) in enumerate(scenes)
@@ -17,48 +29,66 @@ def tallies(*scenes):
 
 
 def test_levels_by_event_and_by_scene():
-    """4 of 10, 1 of 2 and 0 of 8: 5 of 20 events, or 30% of an average scene; one without events is in neither."""
-    found = level(FIRST_SIGHTING, tallies((10, 4), (2, 1), (8, 0), (0, 0)))
+    """4 of 10, 1 of 2 and 0 of 8: 5 of 20 events, or 30% of an average scene; one without events is
+    in neither.
+    """
+    found = ratio_level(FIRST_SIGHTING, tallies((10, 4), (2, 1), (8, 0), (0, 0)))
     assert found.by_event == pytest.approx(100 * 5 / 20)
     assert found.by_scene == pytest.approx(30.0)
-    assert level(TTFD, tallies((10, 4), (2, 1))).by_event == pytest.approx(6 * 7 / 12)
-    assert level(OVERALL, tallies((10, 4), (2, 1))).by_event == pytest.approx(100 * 10 / 120)
+    assert ratio_level(TTFD, tallies((10, 4), (2, 1))).by_event == pytest.approx(6 * 7 / 12)
+    assert ratio_level(OVERALL, tallies((10, 4), (2, 1))).by_event == pytest.approx(100 * 10 / 120)
 
 
 def test_a_level_of_nothing():
-    assert level(FIRST_SIGHTING, {}) == level(FIRST_SIGHTING, tallies((0, 0))) == (level(TTFD, {}))
-    assert level(FIRST_SIGHTING, {}).by_event is None
+    assert (
+        ratio_level(FIRST_SIGHTING, {})
+        == ratio_level(FIRST_SIGHTING, tallies((0, 0)))
+        == (ratio_level(TTFD, {}))
+    )
+    assert ratio_level(FIRST_SIGHTING, {}).by_event is None
 
 
 def test_a_contrast_weighs_events_alike_and_beside_it_scenes():
     ours, theirs = tallies((10, 4), (2, 1), (0, 0)), tallies((10, 2), (2, 1), (0, 0))
-    found = contrast(FIRST_SIGHTING, ours, theirs)
+    found = scene_contrast(FIRST_SIGHTING, ours, theirs)
     assert found.by_event.mean == pytest.approx(100 * 2 / 12)
     assert found.by_scene.mean == pytest.approx(10.0)
     assert (found.scenes, found.weight) == (2, 12)
     assert (found.by_event.low, found.by_event.high) == pytest.approx((0.0, 20.0))
-    assert contrast(TTFD, ours, theirs).by_event.mean == pytest.approx(-12 / 12)
-    assert contrast(OVERALL, ours, theirs).weight == 120
+    assert scene_contrast(TTFD, ours, theirs).by_event.mean == pytest.approx(-12 / 12)
+    assert scene_contrast(OVERALL, ours, theirs).weight == 120
 
 
 def test_a_contrast_turned_round_changes_its_sign():
     rng = np.random.default_rng(2)
     ours, theirs = (tallies(*[(20, int(rng.integers(3, 9))) for _ in range(30)]) for _ in range(2))
-    there, back = contrast(FIRST_SIGHTING, ours, theirs), contrast(FIRST_SIGHTING, theirs, ours)
-    assert there.by_event == pytest.approx([-back.by_event.mean, -back.by_event.high, -back.by_event.low])
+    there, back = (
+        scene_contrast(FIRST_SIGHTING, ours, theirs),
+        scene_contrast(FIRST_SIGHTING, theirs, ours),
+    )
+    assert there.by_event == pytest.approx(
+        [-back.by_event.mean, -back.by_event.high, -back.by_event.low]
+    )
 
 
 def test_less_excludes_zero_as_more_does():
     more, less = tallies(*[(10, 5), (10, 7)] * 4), tallies(*[(10, 4)] * 8)
-    assert contrast(FIRST_SIGHTING, more, less).excludes_zero
-    assert contrast(FIRST_SIGHTING, less, more).excludes_zero
+    assert scene_contrast(FIRST_SIGHTING, more, less).excludes_zero
+    assert scene_contrast(FIRST_SIGHTING, less, more).excludes_zero
 
 
 def test_the_draws_of_a_contrast_are_seeded():
     rng = np.random.default_rng(3)
-    ours, theirs = (tallies(*[(int(rng.integers(5, 40)), int(rng.integers(0, 5))) for _ in range(20)]) for _ in "ab")
-    theirs = {s: Tally(ours[s].events, t.sighted, 0, ours[s].frames, t.found) for s, t in theirs.items()}
-    one, same, other = (contrast(FIRST_SIGHTING, ours, theirs, seed=seed) for seed in (1, 1, 2))
+    ours, theirs = (
+        tallies(*[(int(rng.integers(5, 40)), int(rng.integers(0, 5))) for _ in range(20)])
+        for _ in "ab"
+    )
+    theirs = {
+        s: Tally(ours[s].events, t.sighted, 0, ours[s].frames, t.found) for s, t in theirs.items()
+    }
+    one, same, other = (
+        scene_contrast(FIRST_SIGHTING, ours, theirs, seed=seed) for seed in (1, 1, 2)
+    )
     assert one == same
     assert one.by_event.low != other.by_event.low
     assert one.by_scene.low != other.by_scene.low
@@ -69,38 +99,43 @@ def test_the_draws_of_a_contrast_are_seeded():
 
 def test_a_policy_against_itself_is_certainly_equal():
     same = tallies((10, 4), (2, 1), (5, 0), (9, 3), (1, 1))
-    found = contrast(FIRST_SIGHTING, same, same)
+    found = scene_contrast(FIRST_SIGHTING, same, same)
     assert (found.by_event, found.scenes, found.excludes_zero) == ((0.0, 0.0, 0.0), 5, False)
 
 
 def test_scenes_are_paired_by_name_and_only_shared_ones_count():
     ours = {"b": Tally(4, 3, 0, 4, 3), "a": Tally(4, 1, 0, 4, 1), "only ours": Tally(9, 9, 0, 9, 9)}
     theirs = {"a": Tally(4, 0, 0, 4, 0), "b": Tally(4, 2, 0, 4, 2)}
-    found = contrast(FIRST_SIGHTING, ours, theirs)
+    found = scene_contrast(FIRST_SIGHTING, ours, theirs)
     assert (found.by_event, found.scenes) == ((25.0, 25.0, 25.0), 2)
 
 
 def test_pairing_removes_what_scenes_share():
     """Scenes from easy to hard, and ours one event ahead in each."""
     ours, theirs = ([(20, sighted + more) for sighted in range(2, 18)] for more in (1, 0))
-    found = contrast(FIRST_SIGHTING, tallies(*ours), tallies(*theirs))
+    found = scene_contrast(FIRST_SIGHTING, tallies(*ours), tallies(*theirs))
     assert found.by_event == pytest.approx((5.0, 5.0, 5.0))
     assert found.excludes_zero
 
 
 @pytest.mark.parametrize(("scenes", "excludes"), [(4, False), (5, True)])
 def test_four_scenes_carry_no_claim(scenes, excludes):
-    found = contrast(FIRST_SIGHTING, tallies(*[(10, 5)] * scenes), tallies(*[(10, 4)] * scenes))
+    found = scene_contrast(
+        FIRST_SIGHTING, tallies(*[(10, 5)] * scenes), tallies(*[(10, 4)] * scenes)
+    )
     assert found.excludes_zero == excludes
 
 
 def test_no_contrast_of_nothing():
-    assert contrast(FIRST_SIGHTING, {}, tallies((1, 1))) is None
-    assert contrast(FIRST_SIGHTING, tallies((0, 0)), tallies((0, 0))) is None
+    assert scene_contrast(FIRST_SIGHTING, {}, tallies((1, 1))) is None
+    assert scene_contrast(FIRST_SIGHTING, tallies((0, 0)), tallies((0, 0))) is None
 
 
 def test_floor_seeds_are_averaged_scene_by_scene():
-    seeds = [{"a": Tally(4, sighted, 6, 10, found), "b": Tally()} for sighted, found in [(1, 4), (2, 5), (3, 9)]]
+    seeds = [
+        {"a": Tally(4, sighted, 6, 10, found), "b": Tally()}
+        for sighted, found in [(1, 4), (2, 5), (3, 9)]
+    ]
     assert averaged(seeds) == {"a": Tally(4, 2, 6, 10, 6), "b": Tally()}
     assert averaged([seeds[0], {"b": Tally()}]) == {"b": Tally()}
     assert averaged([]) == {}
@@ -108,8 +143,10 @@ def test_floor_seeds_are_averaged_scene_by_scene():
 
 def test_tallies_of_other_films_are_refused():
     other = tallies((9, 4))
-    with pytest.raises(InvalidInput, match=r"scene 0: .* one film, got 9 events in 90 .* and 10 events in 100"):
-        contrast(FIRST_SIGHTING, tallies((10, 4)), other)
+    with pytest.raises(
+        InvalidInput, match=r"scene 0: .* one film, got 9 events in 90 .* and 10 events in 100"
+    ):
+        scene_contrast(FIRST_SIGHTING, tallies((10, 4)), other)
     with pytest.raises(InvalidInput, match=r"scene 0: .* one film"):
         averaged([tallies((10, 4)), other])
 

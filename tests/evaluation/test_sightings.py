@@ -22,10 +22,14 @@ def events(sightings):
 
 @pytest.fixture(scope="session")
 def path(shown):
-    """The scene of one pedestrian at these distances straight ahead; None where it is not annotated."""
+    """The scene of one pedestrian at these distances straight ahead; None where it is not
+    annotated.
+    """
 
     def make(*distances):
-        return Sightings.of("path", [shown() if x is None else shown((7, "pedestrian", x, 0.0)) for x in distances])
+        return Sightings.of(
+            "path", [shown() if x is None else shown((7, "pedestrian", x, 0.0)) for x in distances]
+        )
 
     return make
 
@@ -35,7 +39,9 @@ def path(shown):
     [
         pytest.param((10, 10, 10), None, id="present at start"),
         pytest.param((60, 60, 49), 2, id="annotated at start, enters by range"),
-        pytest.param((None, 60, 40), 2, id="annotated later and beyond range, then enters by range"),
+        pytest.param(
+            (None, 60, 40), 2, id="annotated later and beyond range, then enters by range"
+        ),
         pytest.param((None, None, 20), 2, id="out of an occlusion"),
         pytest.param((None, 20), 1, id="at the last keyframe"),
         pytest.param((None, 20, None, 20, None, 20), 1, id="annotation gaps after the event"),
@@ -58,12 +64,21 @@ def test_when_an_object_is_first_sighted(path, distances, keyframe):
     ("hidden_at", "distances", "annotated", "visible", "emerging"),
     [
         pytest.param(20, (None, None, 15), None, 2, 1, id="behind a van from the start, walks out"),
-        pytest.param(20, (None, 60, 15), None, 2, 1, id="hidden within range, shown beyond it, enters by range"),
+        pytest.param(
+            20,
+            (None, 60, 15),
+            None,
+            2,
+            1,
+            id="hidden within range, shown beyond it, enters by range",
+        ),
         pytest.param(50.0, (None, 40), None, 1, 1, id="hidden at the range at start"),
         pytest.param(50.01, (None, 40), 1, 1, 0, id="hidden just beyond the range at start"),
         pytest.param(60, (None, None, 40), 2, 2, 0, id="hidden and beyond range, enters by range"),
         pytest.param(20, (None, None, None), None, None, 0, id="hidden to the end"),
-        pytest.param(20, (None, 70, 60), None, None, 0, id="hidden within range, shown beyond it alone"),
+        pytest.param(
+            20, (None, 70, 60), None, None, 0, id="hidden within range, shown beyond it alone"
+        ),
     ],
 )
 def test_who_is_annotated_at_the_start_is_present_though_nothing_shows_it(
@@ -76,11 +91,16 @@ def test_who_is_annotated_at_the_start_is_present_though_nothing_shows_it(
     assert events(by_rule) == ([] if annotated is None else [(annotated, 7)])
     assert events(by_sight) == ([] if visible is None else [(visible, 7)])
     assert len(by_rule.emerging) == len(by_sight.emerging) == emerging
-    assert by_rule.frames.keyframes.tolist() == by_sight.frames.keyframes.tolist(), "what is scored is the same"
+    assert by_rule.frames.keyframes.tolist() == by_sight.frames.keyframes.tolist(), (
+        "what is scored is the same"
+    )
 
 
 def test_who_was_hidden_is_told_from_who_was_not(shown):
-    keyframes = [shown((1, "car", 9, 0)), shown((3, "car", 5, 5), (1, "car", 8, 0), (2, "pedestrian", 6, 0))]
+    keyframes = [
+        shown((1, "car", 9, 0)),
+        shown((3, "car", 5, 5), (1, "car", 8, 0), (2, "pedestrian", 6, 0)),
+    ]
     scene = Sightings.of("two", keyframes, hidden=shown((2, "pedestrian", 7, 3)))
     assert events(scene) == [(1, 3)]
     assert scene.appearing(1).tolist() == [True, False, False]
@@ -88,7 +108,9 @@ def test_who_was_hidden_is_told_from_who_was_not(shown):
 
 
 def test_an_object_cannot_be_hidden_and_seen_at_once_nor_a_presence_made_up(shown):
-    with pytest.raises(InvalidInput, match="scene both, keyframe 0: object 4 is annotated more than once"):
+    with pytest.raises(
+        InvalidInput, match="scene both, keyframe 0: object 4 is annotated more than once"
+    ):
         Sightings.of("both", [shown((4, "car", 9, 0))], hidden=shown((4, "car", 9, 0)))
     for other in ("seen", None, [ANNOTATED]):
         with pytest.raises(InvalidInput, match="presence must be 'annotated' or 'visible', got"):
@@ -96,14 +118,23 @@ def test_an_object_cannot_be_hidden_and_seen_at_once_nor_a_presence_made_up(show
 
 
 def test_which_annotations_of_a_keyframe_are_first_sightings(shown):
-    start, here, far, new = (1, "car", 10, 0), (2, "car", 20, 0), (3, "car", 60, 0), (4, "car", 5, 5)
-    scene = Sightings.of("street", [shown(start), shown(far, here, start, new), shown(here, (3, "car", 40, 0))])
+    start, here, far, new = (
+        (1, "car", 10, 0),
+        (2, "car", 20, 0),
+        (3, "car", 60, 0),
+        (4, "car", 5, 5),
+    )
+    scene = Sightings.of(
+        "street", [shown(start), shown(far, here, start, new), shown(here, (3, "car", 40, 0))]
+    )
     appearing = [scene.appearing(keyframe).tolist() for keyframe in range(3)]
     assert appearing == [[False], [False, True, False, True], [False, True]]
 
 
 def test_an_event_says_what_was_seen_and_where(shown):
-    scene = Sightings.of("left", [shown((1, "car", 10, 0)), shown((1, "car", 9, 0), (2, "bicycle", -3, 4))])
+    scene = Sightings.of(
+        "left", [shown((1, "car", 10, 0)), shown((1, "car", 9, 0), (2, "bicycle", -3, 4))]
+    )
     event = scene.frames.take(scene.events)
     assert (scene.scene, len(event), CLASSES[event.classes[0]]) == ("left", 1, "bicycle")
     assert (event.keyframes[0], event.objects[0], event.ranges[0]) == (1, 2, 5.0)
@@ -130,17 +161,25 @@ def test_the_range_can_be_set(shown):
 
 def test_a_scene_may_be_empty_of_objects_but_not_of_keyframes(shown):
     assert len(Sightings.of("quiet", [shown(), shown()]).frames) == 0
-    with pytest.raises(InvalidInput, match="scene nothing: a scene must have at least one keyframe"):
+    with pytest.raises(
+        InvalidInput, match="scene nothing: a scene must have at least one keyframe"
+    ):
         Sightings.of("nothing", [])
 
 
 def test_an_object_annotated_twice_is_named(shown):
-    with pytest.raises(InvalidInput, match="scene twins, keyframe 1: object 5 is annotated more than once"):
-        Sightings.of("twins", [shown(), shown((3, "car", 1, 1), (5, "car", 2, 2), (5, "car", 3, 3))])
+    with pytest.raises(
+        InvalidInput, match="scene twins, keyframe 1: object 5 is annotated more than once"
+    ):
+        Sightings.of(
+            "twins", [shown(), shown((3, "car", 1, 1), (5, "car", 2, 2), (5, "car", 3, 3))]
+        )
 
 
 def test_one_number_at_two_keyframes_is_one_object_and_numbers_may_have_gaps(shown):
-    scene = Sightings.of("gaps", [shown((900, "car", 5, 0)), shown((900, "car", 5, 0), (2, "car", 5, 0))])
+    scene = Sightings.of(
+        "gaps", [shown((900, "car", 5, 0)), shown((900, "car", 5, 0), (2, "car", 5, 0))]
+    )
     assert events(scene) == [(1, 2)]
 
 
@@ -160,18 +199,30 @@ def test_a_range_that_is_none_is_refused(shown, range_m):
 def test_a_first_sighting_is_the_earliest_of_an_object_that_was_not_there_at_start(street, seed):
     keyframes = street(seed)
     near = [
-        {n for n, box in zip(a.objects.tolist(), a.boxes, strict=True) if np.hypot(box[0], box[1]) <= 50}
+        {
+            n
+            for n, box in zip(a.objects.tolist(), a.boxes, strict=True)
+            if np.hypot(box[0], box[1]) <= 50
+        }
         for a in keyframes
     ]
-    expected = [(k, n) for k in range(1, len(near)) for n in sorted(near[k] - set().union(*near[:k]))]
+    expected = [
+        (k, n) for k in range(1, len(near)) for n in sorted(near[k] - set().union(*near[:k]))
+    ]
     assert events(Sightings.of("any", keyframes)) == expected
 
 
 @given(SEEDS, st.floats(-np.pi, np.pi))
-def test_neither_the_order_of_objects_nor_a_turn_of_the_sensor_changes_the_events(street, seed, yaw):
+def test_neither_the_order_of_objects_nor_a_turn_of_the_sensor_changes_the_events(
+    street, seed, yaw
+):
     keyframes = street(seed)
     changed = [
-        Annotations(a.objects[::-1], a.classes[::-1], np.c_[turned(a.boxes[:, :3], yaw), a.boxes[:, 3:]][::-1])
+        Annotations(
+            a.objects[::-1],
+            a.classes[::-1],
+            np.c_[turned(a.boxes[:, :3], yaw), a.boxes[:, 3:]][::-1],
+        )
         for a in keyframes
     ]
     before, after = Sightings.of("a", keyframes), Sightings.of("b", changed)
@@ -180,14 +231,17 @@ def test_neither_the_order_of_objects_nor_a_turn_of_the_sensor_changes_the_event
 
 
 @given(SEEDS)
-def test_with_nobody_hidden_the_two_presences_agree_and_hiding_takes_events_alone_away(street, seed):
+def test_with_nobody_hidden_the_two_presences_agree_and_hiding_takes_events_alone_away(
+    street, seed
+):
     keyframes = street(seed)
     plain = events(Sightings.of("any", keyframes))
     assert events(Sightings.of("any", keyframes, presence=VISIBLE)) == plain
     later = keyframes[1:]
     hidden = keyframes[0]
     by_rule, by_sight = (
-        Sightings.of("any", later, hidden=_without(hidden, later[0]), presence=p) for p in (ANNOTATED, VISIBLE)
+        Sightings.of("any", later, hidden=_without(hidden, later[0]), presence=p)
+        for p in (ANNOTATED, VISIBLE)
     )
     assert set(events(by_rule)) <= set(events(by_sight)) == set(events(Sightings.of("any", later)))
     assert len(by_sight.events) - len(by_rule.events) == len(by_rule.emerging)
@@ -195,7 +249,9 @@ def test_with_nobody_hidden_the_two_presences_agree_and_hiding_takes_events_alon
 
 def _without(annotations, others):
     kept = ~np.isin(annotations.objects, others.objects)
-    return Annotations(annotations.objects[kept], annotations.classes[kept], annotations.boxes[kept])
+    return Annotations(
+        annotations.objects[kept], annotations.classes[kept], annotations.boxes[kept]
+    )
 
 
 def test_a_presence_that_is_none_is_shown_in_a_short_line():

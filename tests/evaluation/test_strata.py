@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.evaluation.recall import Tally, score
+from care_sim.evaluation.recall import Tally, score_scene
 from care_sim.evaluation.sightings import Sightings
 from care_sim.evaluation.strata import strata, thirds
 
@@ -43,7 +43,7 @@ def test_by_class(shown, name):
 @given(st.integers(0, 2**32 - 1))
 def test_the_strata_of_a_kind_add_up_to_the_scene(street, detector, seed):
     keyframes = street(seed)
-    result = score(Sightings.of("any", keyframes), detector(keyframes, seed))
+    result = score_scene(Sightings.of("any", keyframes), detector(keyframes, seed))
     for parts in strata(result.sightings.frames).values():
         assert np.all(np.sum(list(parts.values()), axis=0) == 1)
         assert sum((result.tally(rows) for rows in parts.values()), Tally()) == result.tally()

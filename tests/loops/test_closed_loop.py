@@ -50,7 +50,9 @@ def row_of_cars(street):
 
 
 def loop_in(world, seeds=(0, 1, 2), **sensing):
-    return ClosedLoop(world, RIG, Sensing(**sensing), tuple(np.random.SeedSequence(seed) for seed in seeds))
+    return ClosedLoop(
+        world, RIG, Sensing(**sensing), tuple(np.random.SeedSequence(seed) for seed in seeds)
+    )
 
 
 def cells_on(loop, actor):
@@ -70,9 +72,13 @@ def test_a_keyframe_tells_time_speed_and_distance_at_its_scan(street):
     assert [frame.index for frame in frames] == list(range(6))
     assert all(frame.braking for frame in frames)
     assert [frame.time_s for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
-    assert [frame.speed_mps for frame in frames] == pytest.approx([10.0, 10.0, 10.0, 10.0, 9.5, 9.0])
+    assert [frame.speed_mps for frame in frames] == pytest.approx(
+        [10.0, 10.0, 10.0, 10.0, 9.5, 9.0]
+    )
     assert [frame.distance_m for frame in frames] == pytest.approx([ahead - x for x in travelled])
-    assert [frame.distance_m for frame in frames[:4]] == pytest.approx([ahead, ahead - 1, ahead - 2, ahead - 3])
+    assert [frame.distance_m for frame in frames[:4]] == pytest.approx(
+        [ahead, ahead - 1, ahead - 2, ahead - 3]
+    )
     assert [frame.nearest_m for frame in frames[:3]] == pytest.approx(
         [frame.distance_m + LIDAR_POSITION[0] for frame in frames[1:4]]
     )
@@ -114,7 +120,9 @@ def test_a_body_that_is_not_fired_at_any_more_is_forecast_on_and_on_and_then_for
     for misses in range(1, 6):
         loop.keyframe(NOTHING)
         assert loop.belief.tracks.misses.tolist() == [misses]
-        assert loop.belief.tracks.boxes[0, 0] == pytest.approx(20.0 - LIDAR_POSITION[0] - 1.0 * world.time)
+        assert loop.belief.tracks.boxes[0, 0] == pytest.approx(
+            20.0 - LIDAR_POSITION[0] - 1.0 * world.time
+        )
     for _ in range(round(MemoryRules().coast_s / RIG.keyframe_s) - 4):
         loop.keyframe(NOTHING)
     assert len(loop.belief.tracks) == 0
@@ -130,7 +138,10 @@ def test_the_ego_that_has_turned_sees_its_tracks_turned(street):
     x, y, heading = world.ego.pose
     assert heading == pytest.approx(0.2)
     ahead, left = 20.0 - x, 0.0 - y
-    expected = ahead * np.cos(0.2) + left * np.sin(0.2) - LIDAR_POSITION[0], left * np.cos(0.2) - ahead * np.sin(0.2)
+    expected = (
+        ahead * np.cos(0.2) + left * np.sin(0.2) - LIDAR_POSITION[0],
+        left * np.cos(0.2) - ahead * np.sin(0.2),
+    )
     assert loop.belief.tracks.boxes[0, :2] == pytest.approx(expected)
     assert loop.belief.tracks.boxes[0, 6] == pytest.approx(-0.2)
 
@@ -148,7 +159,9 @@ def test_in_view_is_what_the_camera_saw_before_the_scan(street):
     """The person steps out from behind the hoarding while the world moves on."""
     world = street()
     world.add("hoarding", "hoarding", (16.0, 0.0, np.pi / 2))
-    world.first_sighting = world.add("person", "pedestrian", lambda time: (20.0 if time < 0.15 else 12.0, 0.0, 0.0))
+    world.first_sighting = world.add(
+        "person", "pedestrian", lambda time: (20.0 if time < 0.15 else 12.0, 0.0, 0.0)
+    )
     loop = loop_in(world)
     assert [loop.keyframe(NOTHING).in_view for _ in range(3)] == [False, False, True]
 
@@ -216,17 +229,23 @@ def misses_and_losses(world, seeds):
 
 
 def test_equal_seeds_miss_and_lose_alike(row_of_cars):
-    assert misses_and_losses(row_of_cars(), (7, 8, 9)) == misses_and_losses(row_of_cars(), (7, 8, 9))
+    assert misses_and_losses(row_of_cars(), (7, 8, 9)) == misses_and_losses(
+        row_of_cars(), (7, 8, 9)
+    )
 
 
 def test_the_camera_misses_by_its_own_seed(row_of_cars):
-    (misses, losses), (other_misses, same_losses) = (misses_and_losses(row_of_cars(), (s, 8, 9)) for s in (7, 9))
+    (misses, losses), (other_misses, same_losses) = (
+        misses_and_losses(row_of_cars(), (s, 8, 9)) for s in (7, 9)
+    )
     assert misses != other_misses
     assert losses == same_losses
 
 
 def test_the_lidar_loses_by_its_own_seed(row_of_cars):
-    (misses, losses), (same_misses, other_losses) = (misses_and_losses(row_of_cars(), (7, s, 9)) for s in (8, 9))
+    (misses, losses), (same_misses, other_losses) = (
+        misses_and_losses(row_of_cars(), (7, s, 9)) for s in (8, 9)
+    )
     assert misses == same_misses
     assert all(one != other for one, other in zip(losses, other_losses, strict=True))
 
@@ -289,12 +308,18 @@ def test_the_belief_shows_the_scan_in_its_cells_and_zero_elsewhere(row_of_cars):
 
 
 @pytest.mark.parametrize(("min_returns", "detected"), [(3, True), (10**6, False)])
-def test_a_detector_that_asks_for_too_many_returns_stays_silent_and_the_car_drives_on(street, min_returns, detected):
+def test_a_detector_that_asks_for_too_many_returns_stays_silent_and_the_car_drives_on(
+    street, min_returns, detected
+):
     world = street()
     world.first_sighting = world.add("bus", "bus", (BUMPER + 12.0 + BUS, 0.0, 0.0))
     loop = loop_in(world, min_returns=min_returns)
     frame = loop.keyframe(EVERYTHING)
-    assert (frame.detected, frame.braking, len(loop.belief.tracks)) == (detected, detected, int(detected))
+    assert (frame.detected, frame.braking, len(loop.belief.tracks)) == (
+        detected,
+        detected,
+        int(detected),
+    )
 
 
 def test_a_collision_is_told_at_its_keyframe_with_the_speed_of_the_contact(street):

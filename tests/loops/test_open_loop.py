@@ -1,5 +1,5 @@
-"""The open loop on a film made by hand: the car drives 2 m a keyframe, in a bend if it is told to, behind another car
-that may drive too, past a wall.
+"""The open loop on a film made by hand: the car drives 2 m a keyframe, in a bend if it is told to,
+behind another car that may drive too, past a wall.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, Sights
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
@@ -26,19 +26,23 @@ NOWHERE = np.array([], np.int64)
 
 def shot(index, annotated, speed, bend):
     sensor = Frame(2.0 * index, 0.0, HEIGHT, bend * index)
-    boxes = sensor.boxes_to_local(BOX[None] + [0.5 * speed * index, 0, 0, 0, 0, 0, 0])[: int(annotated)]
+    boxes = sensor.boxes_to_local(BOX[None] + [0.5 * speed * index, 0, 0, 0, 0, 0, 0])[
+        : int(annotated)
+    ]
     cells = RIG.grid.hulls(boxes, 0, 0)[0] if annotated else NOWHERE
     fired = np.concatenate([WALL, np.sort(cells)])
     ranges = np.concatenate([np.full(3, 30.0), np.full(len(cells), 10.0)])
     objects = np.concatenate([np.full(3, NOBODY), np.full(len(cells), OTHER)])
-    picture = np.array([[CLASSES.index("car"), 0.9, 100.0 + index, 80, 120, 95, 0, 0, 0]])[: int(annotated)]
+    picture = np.array([[CLASSES.index("car"), 0.9, 100.0 + index, 80, 120, 95, 0, 0, 0]])[
+        : int(annotated)
+    ]
     return Shot(
         0.5 * index,
         f"shot {index}",
         sensor,
         Ego(4.0 + index),
         Annotations(np.full(len(boxes), OTHER), np.zeros(len(boxes), np.int64), boxes),
-        Sights(ImageDetections.from_rows(picture), np.full(len(picture), OTHER)),
+        IdentifiedDetections(ImageDetections.from_rows(picture), np.full(len(picture), OTHER)),
         Cloud(fired, RIG.grid.directions[fired] * ranges[:, None], objects),
     )
 
@@ -60,7 +64,11 @@ def on_the_car(loop):
 def test_before_the_first_scan_there_are_pictures_and_motion_and_no_more():
     belief = loop_of(film()).belief
     assert (belief.ego, belief.budget) == (Ego(4.0), RIG.budget)
-    assert (belief.detections.boxes[0, 0], len(belief.tracks), belief.ranges.any()) == (100, 0, False)
+    assert (belief.detections.boxes[0, 0], len(belief.tracks), belief.ranges.any()) == (
+        100,
+        0,
+        False,
+    )
 
 
 @pytest.mark.parametrize(("speed", "bend"), [(0.0, 0.0), (3.0, 0.0), (3.0, 0.2)])
@@ -74,7 +82,9 @@ def test_what_is_fired_at_is_detected_and_tracked_over_ground(speed, bend):
         assert (seen.index, seen.detections.returns.tolist()) == (index, [len(fired)])
         assert np.array_equal(seen.detections.boxes, driven.shots[index].annotations.boxes)
     assert loop.belief.tracks.boxes[0] == pytest.approx(loop.shot.annotations.boxes[0])
-    assert loop.belief.tracks.velocities[0] == pytest.approx([speed * np.cos(2 * bend), -speed * np.sin(2 * bend)])
+    assert loop.belief.tracks.velocities[0] == pytest.approx(
+        [speed * np.cos(2 * bend), -speed * np.sin(2 * bend)]
+    )
     assert loop.belief.ego == Ego(6.0)
 
 
@@ -124,7 +134,9 @@ def test_the_film_ends_with_its_last_keyframe():
 
 
 def test_a_picture_one_keyframe_old_is_the_one_before():
-    """The strict-causal camera: nothing at the first keyframe, then what the one before saw, half a second old."""
+    """The strict-causal camera: nothing at the first keyframe, then what the one before saw, half a
+    second old.
+    """
     loop = loop_of(film(bend=0.1), camera_latency=1)
     assert len(loop.belief.detections) == 0
     for before in range(3):
@@ -166,7 +178,10 @@ def test_a_full_scan_is_read_without_a_draw():
     scan = loop.full_scan()
     assert np.count_nonzero(np.isfinite(scan.ranges)) == len(film().shots[0].cloud)
     everything = np.arange(RIG.grid.size)
-    assert loop.keyframe(everything).detections.returns == other.keyframe(everything).detections.returns
+    assert (
+        loop.keyframe(everything).detections.returns
+        == other.keyframe(everything).detections.returns
+    )
 
 
 def test_policies_meet_the_same_faults_whatever_they_fire():
@@ -177,7 +192,10 @@ def test_policies_meet_the_same_faults_whatever_they_fire():
     assert one.belief.ego == other.belief.ego != Ego(5.0)
     assert len(one.belief.detections) == len(other.belief.detections)
     fired = on_the_car(one)
-    assert one.keyframe(fired).detections.returns == other.keyframe(np.arange(RIG.grid.size)).detections.returns
+    assert (
+        one.keyframe(fired).detections.returns
+        == other.keyframe(np.arange(RIG.grid.size)).detections.returns
+    )
 
 
 def test_the_camera_misses_what_is_far():
@@ -187,10 +205,18 @@ def test_the_camera_misses_what_is_far():
 
 
 def test_an_appearance_is_missed_no_more_often_than_what_was_there_before():
-    """At 1.5% a keyframe, in bursts of four, hardly one in forty; not by a burst that began while it was absent."""
+    """At 1.5% a keyframe, in bursts of four, hardly one in forty; not by a burst that began while
+    it was absent.
+    """
     absent = (False, False, False, True)
     loops = [
-        loop_of(film(annotated=absent), None, (seed, 1, 2), false_negative_per_m=0.001, false_negative_burst=4)
+        loop_of(
+            film(annotated=absent),
+            None,
+            (seed, 1, 2),
+            false_negative_per_m=0.001,
+            false_negative_burst=4,
+        )
         for seed in range(40)
     ]
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""What a witness tells of an episode whose camera errs."""
+"""What a watcher tells of an episode whose camera errs."""
 
 from types import SimpleNamespace
 
@@ -22,8 +22,8 @@ class Notes(Watching):
         seen = np.isin(loop.picture.bodies, labelled) & (loop.picture.pixels >= MIN_PIXELS)
         self.shown.append(int(np.count_nonzero(seen)))
 
-    def keep(self, moment):
-        self.moments.append(moment)
+    def keep(self, watched):
+        self.moments.append(watched)
 
     def end(self, outcome):
         self.outcome = outcome
@@ -41,13 +41,18 @@ def watch(name="CARE-Dense-v0", seed=0, keyframes=30, **conditions):
 
 def counts(notes):
     """Of every keyframe: detections that arrived, false ones among them, missed ones."""
-    stances = [moment.stance for moment in notes.moments]
-    return [SimpleNamespace(given=len(s.belief.detections), false=s.false.sum(), missed=len(s.missed)) for s in stances]
+    situations = [watched.situation for watched in notes.moments]
+    return [
+        SimpleNamespace(given=len(s.belief.detections), false=s.false.sum(), missed=len(s.missed))
+        for s in situations
+    ]
 
 
 def test_a_camera_without_faults_misses_nothing_and_invents_nothing():
     notes = watch()
-    assert [(c.given, c.false, c.missed) for c in counts(notes)] == [(shown, 0, 0) for shown in notes.shown]
+    assert [(c.given, c.false, c.missed) for c in counts(notes)] == [
+        (shown, 0, 0) for shown in notes.shown
+    ]
     assert sum(notes.shown) > 60
 
 
@@ -82,7 +87,7 @@ def test_a_late_camera_misses_whom_it_has_not_shown_yet_and_nobody_else():
     found = counts(late)
     assert [c.missed for c in found[:2]] == late.shown[:2]
     assert all(c.false == 0 for c in found)
-    appeared = next(n for n, moment in enumerate(late.moments) if moment.frame.in_view)
+    appeared = next(n for n, watched in enumerate(late.moments) if watched.frame.in_view)
     assert appeared >= 2
     assert [c.missed for c in found[2:appeared]] == [0] * (appeared - 2)
     assert [c.missed for c in found[appeared : appeared + 3]] == [1, 1, 0]
@@ -90,16 +95,18 @@ def test_a_late_camera_misses_whom_it_has_not_shown_yet_and_nobody_else():
 
 def test_a_moment_holds_the_truth_of_its_keyframe():
     notes = watch("CARE-Dartout-v0", seed=3)
-    for moment in notes.moments:
-        stance, frame = moment.stance, moment.frame
-        assert stance.time_s == frame.time_s
-        assert stance.names[stance.target] == "person"
-        x, y = stance.bodies[stance.target, :2]
-        assert np.hypot(x - stance.sensor.x, y - stance.sensor.y) == pytest.approx(frame.distance_m)
-        np.testing.assert_array_equal(np.flatnonzero(moment.shares), frame.fired)
-        np.testing.assert_array_equal(np.flatnonzero(moment.ranges), frame.fired)
-    first, last = notes.moments[0].stance, notes.moments[-1].stance
-    travelled = sum(moment.frame.speed_mps * 0.1 for moment in notes.moments[:-1])
+    for watched in notes.moments:
+        situation, frame = watched.situation, watched.frame
+        assert situation.time_s == frame.time_s
+        assert situation.names[situation.target] == "person"
+        x, y = situation.bodies[situation.target, :2]
+        assert np.hypot(x - situation.sensor.x, y - situation.sensor.y) == pytest.approx(
+            frame.distance_m
+        )
+        np.testing.assert_array_equal(np.flatnonzero(watched.shares), frame.fired)
+        np.testing.assert_array_equal(np.flatnonzero(watched.ranges), frame.fired)
+    first, last = notes.moments[0].situation, notes.moments[-1].situation
+    travelled = sum(watched.frame.speed_mps * 0.1 for watched in notes.moments[:-1])
     assert last.ego[0] - first.ego[0] == pytest.approx(travelled, abs=0.5)
     assert notes.outcome is None
 
@@ -114,5 +121,5 @@ def test_a_refused_action_does_not_confuse_the_witness():
             notes.step(action[:2])
         for _ in range(5):
             notes.step(action)
-        assert all(not moment.stance.false.any() for moment in notes.moments)
+        assert all(not watched.situation.false.any() for watched in notes.moments)
         assert len(notes.moments) == 6

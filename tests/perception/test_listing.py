@@ -1,4 +1,6 @@
-"""Detectors by name: ours, those of installed packages, and one from a TorchScript file that the test writes."""
+"""Detectors by name: ours, those of installed packages, and one from a TorchScript file that the
+test writes.
+"""
 
 import sys
 
@@ -58,7 +60,13 @@ class Blind:
 
 @pytest.fixture
 def installed(install):
-    things = {"middle": "Middle", "stubborn": "Stubborn", "blind": "Blind", "number": "module", "lost": "Nowhere"}
+    things = {
+        "middle": "Middle",
+        "stubborn": "Stubborn",
+        "blind": "Blind",
+        "number": "module",
+        "lost": "Nowhere",
+    }
     things |= {"listed": "listed", "loose": "loose", "quits": "quits"}
     install("own_detectors", MODULE, ENTRY_POINTS, returns="Middle", torchscript="Middle", **things)
 
@@ -74,7 +82,16 @@ def test_the_cluster_detector_finds_a_car_and_names_the_object(open3d):
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[3:] == ["blind", "listed", "loose", "lost", "middle", "number", "quits", "stubborn"]
+    assert detector_names()[3:] == [
+        "blind",
+        "listed",
+        "loose",
+        "lost",
+        "middle",
+        "number",
+        "quits",
+        "stubborn",
+    ]
     detector = make_detector("middle", HEIGHT, label=0)
     assert isinstance(detector, PointsOnly)
     found, _ = detector.detect(CLOUD, CAR)
@@ -104,7 +121,9 @@ def test_of_two_with_one_name_the_first_on_the_path_counts(install):
 
 def test_a_package_that_ends_the_program_gets_one_line(install):
     install("rude_detectors", "raise SystemExit('no device')", ENTRY_POINTS, rude="Any")
-    with pytest.raises(BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"):
+    with pytest.raises(
+        BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"
+    ):
         make_detector("rude", HEIGHT)
 
 
@@ -128,7 +147,11 @@ def test_a_broken_one_gets_one_line(installed, name, line):
     ("name", "parameters", "line"),
     [
         ("yolo", {}, "unknown detector 'yolo'; known: cluster, returns, torchscript"),
-        ("returns", {"least": 3}, "unknown parameter of detector returns 'least'; known: min_returns"),
+        (
+            "returns",
+            {"least": 3},
+            "unknown parameter of detector returns 'least'; known: min_returns",
+        ),
         ("returns", {"min_returns": 0}, "min_returns must be a whole number >= 1, got 0"),
         ("cluster", {"eps": 1}, "unknown parameter of detector cluster 'eps'; known: grid"),
         ("torchscript", {}, "detector torchscript needs the parameter file"),
@@ -140,7 +163,9 @@ def test_names_and_parameters_are_checked(name, parameters, line):
 
 
 def scripted(torch, path):
-    """A module that sees one person amid the points, or none where there are no points; in training it is unsure."""
+    """A module that sees one person amid the points, or none where there are no points; in training
+    it is unsure.
+    """
 
     class Middle(torch.nn.Module):
         def forward(self, points: torch.Tensor, sensor_height_m: float):
@@ -166,7 +191,10 @@ def test_a_torchscript_file_that_gives_no_boxes_is_named(tmp_path):
 
     torch.jit.script(Flat()).save(str(tmp_path / "flat.pt"))
     detector = make_detector("torchscript", HEIGHT, file=tmp_path / "flat.pt")
-    with pytest.raises(BrokenDetector, match=r"torchscript fails .* boxes must have the shape \(n, 7\), got \(2, 3\)"):
+    with pytest.raises(
+        BrokenDetector,
+        match=r"torchscript fails .* boxes must have the shape \(n, 7\), got \(2, 3\)",
+    ):
         detector.detect(CLOUD, CAR)
 
 

@@ -22,7 +22,9 @@ def cloud(*bodies):
     return Cloud(np.arange(len(points)), points, numbers)
 
 
-SCENE = cloud((30, shell(8, 6, 0.4, 4.61, 1.95, 1.72)), (NOBODY, np.full((5, 3), 20.0)), (7, PERSON[None, :3]))
+SCENE = cloud(
+    (30, shell(8, 6, 0.4, 4.61, 1.95, 1.72)), (NOBODY, np.full((5, 3), 20.0)), (7, PERSON[None, :3])
+)
 
 FEW = f"returns must be whole numbers from 0 to the {len(SCENE)} points"
 
@@ -39,7 +41,12 @@ class Says:
 
 
 def detections(**columns):
-    right = {"classes": np.array([0]), "boxes": CAR[None], "returns": np.array([9]), "scores": np.array([0.5])}
+    right = {
+        "classes": np.array([0]),
+        "boxes": CAR[None],
+        "returns": np.array([9]),
+        "scores": np.array([0.5]),
+    }
     return Detections(**{**right, **columns})
 
 
@@ -74,7 +81,9 @@ def test_what_it_returned_is_kept_though_it_writes_there_again():
     for column in (said.classes, said.boxes, said.returns, said.scores):
         column *= 0.0
         column += 1.0
-    kept = [values.tolist() for values in (before.classes, before.boxes, before.returns, before.scores)]
+    kept = [
+        values.tolist() for values in (before.classes, before.boxes, before.returns, before.scores)
+    ]
     assert kept == [[0], [CAR.tolist()], [9], [0.5]]
 
 
@@ -91,12 +100,18 @@ def test_truth_does_not_change_what_it_finds():
 def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
     nowhere = CAR + np.array([0, 30, 0, 0, 0, 0, 0])
     found = Detections(np.array([4, 0, 0]), np.stack([PERSON, CAR, nowhere]), np.array([3, 3, 3]))
-    assert PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)[1].tolist() == [7, 30, NOBODY]
+    assert PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)[1].tolist() == [
+        7,
+        30,
+        NOBODY,
+    ]
 
 
 def test_most_returns_on_an_object_decide_and_those_on_the_road_do_not():
     """In the car's box: two returns of the person, three of the car, and four of the road."""
-    amid = Cloud(np.arange(9), np.tile(CAR[:3], (9, 1)), np.array([7, 7, 30, 30, 30, *[NOBODY] * 4]))
+    amid = Cloud(
+        np.arange(9), np.tile(CAR[:3], (9, 1)), np.array([7, 7, 30, 30, 30, *[NOBODY] * 4])
+    )
     assert PointsOnly("mine", Says(detections()), HEIGHT).detect(amid, OBJECTS)[1].tolist() == [30]
 
 
@@ -110,8 +125,14 @@ def test_most_returns_on_an_object_decide_and_those_on_the_road_do_not():
         (detections(boxes=CAR), r"boxes must have the shape \(1, 7\), got \(7,\)"),
         (detections(boxes=np.full((1, 7), np.nan)), "boxes must be finite, in single precision"),
         (detections(boxes=CAR[None] * 1e39), "boxes must be finite, in single precision"),
-        (detections(boxes=CAR[None] * [1, 1, 1, 1, 1, 0, 1]), "lengths, widths and heights of boxes must be above 0"),
-        (detections(boxes=np.zeros((1, 7))), "lengths, widths and heights of boxes must be above 0"),
+        (
+            detections(boxes=CAR[None] * [1, 1, 1, 1, 1, 0, 1]),
+            "lengths, widths and heights of boxes must be above 0",
+        ),
+        (
+            detections(boxes=np.zeros((1, 7))),
+            "lengths, widths and heights of boxes must be above 0",
+        ),
         (detections(returns=np.array([-1])), FEW),
         (detections(returns=np.array([len(SCENE) + 1])), FEW),
         (detections(returns=np.array([2.5])), FEW),
@@ -135,7 +156,9 @@ def test_more_boxes_than_an_official_evaluation_takes_are_refused(count, allowed
     if allowed:
         assert len(detector.detect(SCENE, OBJECTS)[0]) == count
     else:
-        with pytest.raises(BrokenDetector, match=r"^detector mine: at most 500 detections are allowed, got 501$"):
+        with pytest.raises(
+            BrokenDetector, match=r"^detector mine: at most 500 detections are allowed, got 501$"
+        ):
             detector.detect(SCENE, OBJECTS)
 
 
@@ -167,14 +190,21 @@ def test_a_detector_that_fails_is_named():
         def detect(self, points, height):
             return {}["weights"]
 
-    with pytest.raises(BrokenDetector, match=r"^detector mine fails on \d+ points: KeyError: 'weights'$"):
+    with pytest.raises(
+        BrokenDetector, match=r"^detector mine fails on \d+ points: KeyError: 'weights'$"
+    ):
         PointsOnly("mine", Fails(), HEIGHT).detect(SCENE, OBJECTS)
 
 
 def test_lists_and_no_detections_are_welcome():
-    listed, _ = PointsOnly("mine", Says(Detections([4], [PERSON.tolist()], [2])), HEIGHT).detect(SCENE, OBJECTS)
+    listed, _ = PointsOnly("mine", Says(Detections([4], [PERSON.tolist()], [2])), HEIGHT).detect(
+        SCENE, OBJECTS
+    )
     assert (listed.classes.dtype, listed.boxes.dtype, listed.scores) == (np.int64, np.float64, None)
-    for nothing in (Detections(np.array([]), np.empty((0, 7)), np.array([])), Detections([], [], [], [])):
+    for nothing in (
+        Detections(np.array([]), np.empty((0, 7)), np.array([])),
+        Detections([], [], [], []),
+    ):
         found, objects = PointsOnly("mine", Says(nothing), HEIGHT).detect(SCENE, OBJECTS)
         assert (len(found), found.boxes.shape, len(objects)) == (0, (0, 7), 0)
 

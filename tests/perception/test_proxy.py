@@ -9,7 +9,9 @@ LABELS = {4: 0, 9: 4}
 
 
 def boxes_of(bodies):
-    return np.array([[body, 0, 0, 1, 1, 1, 0] for body in bodies.tolist()], dtype=float).reshape(-1, 7)
+    return np.array([[body, 0, 0, 1, 1, 1, 0] for body in bodies.tolist()], dtype=float).reshape(
+        -1, 7
+    )
 
 
 def detect(hits, **rules):

@@ -11,7 +11,9 @@ DT = 0.1
 
 def detections(*objects, sensor=STILL):
     """Detections from (class name, world x, world y), as `sensor` sees them."""
-    boxes = np.array([[x, y, 0.9, 2, 1, 1.8, 0.3] for _, x, y in objects], dtype=float).reshape(-1, 7)
+    boxes = np.array([[x, y, 0.9, 2, 1, 1.8, 0.3] for _, x, y in objects], dtype=float).reshape(
+        -1, 7
+    )
     classes = np.array([CLASSES.index(name) for name, _, _ in objects], dtype=np.int64)
     return Detections(classes, sensor.boxes_to_local(boxes), np.full(len(objects), 5))
 
@@ -46,12 +48,17 @@ def test_velocity_from_two_frames_and_a_forecast_one_keyframe_ahead():
 
 
 def test_each_detection_is_told_the_velocity_of_its_track_and_a_new_one_0():
-    """Over ground, in the axes of a sensor that looks along y; tracks that died leave gaps in the ids."""
+    """Over ground, in the axes of a sensor that looks along y; tracks that died leave gaps in the
+    ids.
+    """
     memory, turned = TrackMemory(DT, MemoryRules(coast_s=0.0)), Frame(0.0, 0.0, 1.84, np.pi / 2)
     gone = [("bus", 30, 30), ("car", 10, 2), ("pedestrian", 5, -5)]
     memory.update(detections(*gone, sensor=turned), turned)
     memory.predict()
-    ids = memory.update(detections(("bicycle", 9, 9), ("pedestrian", 5, -4.9), ("car", 10.8, 2), sensor=turned), turned)
+    ids = memory.update(
+        detections(("bicycle", 9, 9), ("pedestrian", 5, -4.9), ("car", 10.8, 2), sensor=turned),
+        turned,
+    )
     assert ids.tolist() == [3, 2, 1]
     assert memory.velocities(ids, turned) == pytest.approx(np.array([[0, 0], [1, 0], [0, -8]]))
 
@@ -66,16 +73,22 @@ def test_velocity_follows_a_change_at_once():
 def test_ids_stay_with_two_people_whose_ways_cross():
     """They pass half a metre from each other, in opposite directions."""
     frames = [
-        [("pedestrian", 10, -2 + 2 * DT * t), ("pedestrian", 10.5, 2 - 2 * DT * t)][:: 1 if t % 2 else -1]
+        [("pedestrian", 10, -2 + 2 * DT * t), ("pedestrian", 10.5, 2 - 2 * DT * t)][
+            :: 1 if t % 2 else -1
+        ]
         for t in range(21)
     ]
     memory = TrackMemory(DT)
     history = follow(memory, frames)
     for tracks in history[1:]:
-        by_place = sorted(zip(tracks.boxes[:, 0].tolist(), tracks.velocities[:, 1].tolist(), strict=True))
+        by_place = sorted(
+            zip(tracks.boxes[:, 0].tolist(), tracks.velocities[:, 1].tolist(), strict=True)
+        )
         assert len(tracks) == 2
         assert [speed for _, speed in by_place] == pytest.approx([2, -2])
-    ids = [dict(zip(np.round(t.boxes[:, 0], 1).tolist(), t.ids.tolist(), strict=True)) for t in history]
+    ids = [
+        dict(zip(np.round(t.boxes[:, 0], 1).tolist(), t.ids.tolist(), strict=True)) for t in history
+    ]
     assert all(one == ids[0] for one in ids)
 
 
@@ -116,9 +129,15 @@ def test_an_update_names_the_track_of_every_detection():
     seen = detections(("pedestrian", 5, 5), ("truck", 30, 0), ("bicycle", 20, -8))
     assert memory.update(seen, STILL).tolist() == [2, 1, 3]
     memory.predict()
-    assert memory.update(detections(("truck", 30, 0), ("pedestrian", 5, 5)), STILL).tolist() == [1, 2]
+    assert memory.update(detections(("truck", 30, 0), ("pedestrian", 5, 5)), STILL).tolist() == [
+        1,
+        2,
+    ]
     tracks = memory.tracks(STILL)
-    places = {number: box[0] for number, box in zip(tracks.ids.tolist(), tracks.boxes.tolist(), strict=True)}
+    places = {
+        number: box[0]
+        for number, box in zip(tracks.ids.tolist(), tracks.boxes.tolist(), strict=True)
+    }
     assert places == pytest.approx({1: 30, 2: 5, 3: 20})
 
 
@@ -153,9 +172,13 @@ def test_the_gate_is_a_rule():
 
 
 def test_the_nearest_assignment_wins_as_a_whole():
-    """The new object stands nearer to track 0 than track 0's own detection, and is not mistaken for it."""
+    """The new object stands nearer to track 0 than track 0's own detection, and is not mistaken for
+    it.
+    """
     frames = [[("car", 10, 0), ("car", 13, 0)]] * 3
-    history = follow(TrackMemory(DT), [*frames, [("car", 11.2, 0), ("car", 10, 0.1), ("car", 13, 0.1)]])
+    history = follow(
+        TrackMemory(DT), [*frames, [("car", 11.2, 0), ("car", 10, 0.1), ("car", 13, 0.1)]]
+    )
     tracks = history[-1]
     where = dict(zip(tracks.ids.tolist(), tracks.boxes[:, :2].tolist(), strict=True))
     assert where[0] == pytest.approx([10, 0.1])

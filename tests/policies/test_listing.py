@@ -8,7 +8,7 @@ import care_sim
 
 
 class Good(care_sim.Policy):
-    """Polyhedra ahead.
+    """Looks ahead.
 
     And more."""
 
@@ -44,7 +44,7 @@ def test_an_installed_policy_is_listed_with_its_package(install):
     install("good", GOOD, beacon="Good")
     assert list(listing())[-1].splitlines() == [
         "beacon (causal, learned)",
-        "    Polyhedra ahead. [good 1.5]",
+        "    Looks ahead. [good 1.5]",
         "    reach width=3 name='fan'",
         "    Doe et al., 2026",
     ]
@@ -56,7 +56,7 @@ def test_a_hidden_policy_is_said_to_be(install):
     assert [text.splitlines() for text in listing()][len(BUILT_IN) :] == [
         [
             "beacon (causal, learned)",
-            "    Polyhedra ahead. [first 1.5]",
+            "    Looks ahead. [first 1.5]",
             "    reach width=3 name='fan'",
             "    Doe et al., 2026",
         ],

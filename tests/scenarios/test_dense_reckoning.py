@@ -1,4 +1,6 @@
-"""The numbers that the docstring of the dense street states, recomputed from geometry and Algorithm 1 alone."""
+"""The numbers that the docstring of the dense street states, recomputed from geometry and Algorithm
+1 alone.
+"""
 
 from functools import cache
 
@@ -13,7 +15,7 @@ from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
-from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, sights_of
+from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, faultless_detections
 from care_sim.sensors.lidar import LIDAR_POSITION
 
 pytestmark = pytest.mark.slow
@@ -24,8 +26,12 @@ SEEDS = range(8)
 
 @cache
 def appearance(seed):
-    """(hulls of perfect tracks, wedges of all camera boxes, the person's wedge) at the first three returns."""
-    world = make_scenario("dense").build(np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0]))
+    """(hulls of perfect tracks, wedges of all camera boxes, the person's wedge) at the first three
+    returns.
+    """
+    world = make_scenario("dense").build(
+        np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0])
+    )
     person = world.first_sighting
     while True:
         sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
@@ -45,13 +51,19 @@ def returns_of(world, sensor, cells):
 def scene(world, sensor, person):
     ids, counts = np.unique(returns_of(world, sensor, np.arange(GRID.size)), return_counts=True)
     hit = set(ids[counts >= MIN_RETURNS].tolist())
-    tracked = [actor for actor in world.actors if actor.label is not None and actor is not person and actor.body in hit]
+    tracked = [
+        actor
+        for actor in world.actors
+        if actor.label is not None and actor is not person and actor.body in hit
+    ]
     boxes = sensor.boxes_to_local(world.boxes(tracked))
     nearest_first = boxes[np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]))]
     labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
     camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA])
-    seen = camera.detect(sights_of([picture], labels), 0.0, np.full(len(labels), 20.0), 0.0)
+    seen = camera.detect(
+        faultless_detections([picture], labels), 0.0, np.full(len(labels), 20.0), 0.0
+    )
     (of_person,) = [n for n in range(len(seen)) if seen.classes[n] == person.label]
     cells = wedges(seen, RIG)
     return GRID.hulls(nearest_first), cells, cells[of_person]
@@ -76,7 +88,9 @@ def test_the_persons_wedge_is_about_54_cells():
 
 @pytest.mark.parametrize(("budget", "cells"), [(0.03, 24), (0.035, 34), (0.04, 45), (0.05, 54)])
 def test_cells_a_reserve_for_every_box_fires_on_the_person(budget, cells):
-    assert np.mean([fired_on_person(seed, budget, True) for seed in SEEDS]) == pytest.approx(cells, abs=1)
+    assert np.mean([fired_on_person(seed, budget, True) for seed in SEEDS]) == pytest.approx(
+        cells, abs=1
+    )
 
 
 @pytest.mark.parametrize("budget", [0.03, 0.035, 0.04, 0.05])

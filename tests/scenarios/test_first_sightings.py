@@ -1,4 +1,6 @@
-"""The encounter of every scenario, seen by a full scan and the unimpaired camera of an ego that never brakes."""
+"""The encounter of every scenario, seen by a full scan and the unimpaired camera of an ego that
+never brakes.
+"""
 
 from dataclasses import dataclass
 from functools import cache
@@ -37,12 +39,18 @@ class Sight:
 
 
 def sight(world):
-    """What a full scan and the camera have of the first-sighting actor; rays outside its hull cannot meet it."""
+    """What a full scan and the camera have of the first-sighting actor; rays outside its hull
+    cannot meet it.
+    """
     actor, sensor = world.first_sighting, Frame.mounted(world.ego.pose, LIDAR_POSITION)
     box = sensor.boxes_to_local(world.boxes([actor]))
     (hull,) = GRID.hulls(box)
     heading = np.array(
-        [[np.cos(sensor.yaw), -np.sin(sensor.yaw), 0], [np.sin(sensor.yaw), np.cos(sensor.yaw), 0], [0, 0, 1]]
+        [
+            [np.cos(sensor.yaw), -np.sin(sensor.yaw), 0],
+            [np.sin(sensor.yaw), np.cos(sensor.yaw), 0],
+            [0, 0, 1],
+        ]
     )
     _, ids = world.bullet.cast(sensor.origin, GRID.directions[hull] @ heading.T, GRID.range_m)
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
@@ -61,7 +69,9 @@ def sight(world):
 
 @cache
 def episode(name, seed):
-    world = make_scenario(name).build(np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0]))
+    world = make_scenario(name).build(
+        np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0])
+    )
     sights = [sight(world) for _ in range(60)]
     world.close()
     return sights
@@ -120,7 +130,9 @@ def test_an_ego_that_never_brakes_hits_nobody_and_passes_close(name, seed):
 @every_episode
 @every_crossing
 def test_there_is_room_to_brake_when_the_person_appears(name, seed):
-    """Less reaction, more than the stopping distance from 30 km/h at 5 m/s^2, so that sensing decides."""
+    """Less reaction, more than the stopping distance from 30 km/h at 5 m/s^2, so that sensing
+    decides.
+    """
     first = next(one for one in encounter(name, seed) if one.returns >= FIRST_RETURNS)
     assert 14.0 < first.ahead_m < 18.5
 
@@ -128,7 +140,11 @@ def test_there_is_room_to_brake_when_the_person_appears(name, seed):
 @every_episode
 def test_dartout_and_dense_differ_only_in_the_other_vehicles(seed):
     for alone, crowded in zip(encounter("dartout", seed), encounter("dense", seed), strict=True):
-        assert (alone.returns, alone.pixels, alone.ahead_m) == (crowded.returns, crowded.pixels, crowded.ahead_m)
+        assert (alone.returns, alone.pixels, alone.ahead_m) == (
+            crowded.returns,
+            crowded.pixels,
+            crowded.ahead_m,
+        )
 
 
 @every_episode
@@ -139,6 +155,9 @@ def test_five_reported_vehicles_are_in_view_when_the_person_appears(seed):
 
 
 def test_over_ten_seeds_the_street_holds_five_vehicles():
-    firsts = [next(one for one in encounter("dense", seed) if one.returns >= FIRST_RETURNS) for seed in range(10)]
+    firsts = [
+        next(one for one in encounter("dense", seed) if one.returns >= FIRST_RETURNS)
+        for seed in range(10)
+    ]
     assert np.median([one.reported for one in firsts]) == 5
     assert all(one.reported == 0 for seed in range(10) for one in encounter("dartout", seed))

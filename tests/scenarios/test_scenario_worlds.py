@@ -81,7 +81,9 @@ def test_dartout_and_dense_share_the_crossing(seed):
     assert alone.ego.speed == crowded.ego.speed
     for name in ("occluder", "person"):
         one, other = actor_named(alone, name), actor_named(crowded, name)
-        assert [one.pose_at(t) for t in np.arange(0, 6, 0.25)] == [other.pose_at(t) for t in np.arange(0, 6, 0.25)]
+        assert [one.pose_at(t) for t in np.arange(0, 6, 0.25)] == [
+            other.pose_at(t) for t in np.arange(0, 6, 0.25)
+        ]
     alone.close()
     crowded.close()
 
@@ -96,7 +98,10 @@ def test_vehicles_of_the_dense_street_are_counted_without_the_follower(vehicles)
 
 def test_more_vehicles_leave_the_earlier_ones_in_place():
     few, many = built("dense", 3, vehicles=5), built("dense", 3, vehicles=12)
-    places = [{a.name: a.pose_at(0.0) for a in world.actors if a.name[-1].isdigit()} for world in (few, many)]
+    places = [
+        {a.name: a.pose_at(0.0) for a in world.actors if a.name[-1].isdigit()}
+        for world in (few, many)
+    ]
     shared = list(places[0])
     assert len(shared) == 5
     assert all(places[0][name] == places[1][name] for name in shared)
@@ -114,7 +119,9 @@ def test_a_vehicle_that_hides_the_person_can_be_reported_or_not(name, occluder, 
     world.close()
 
 
-@pytest.mark.parametrize(("name", "reported"), [("dartout", False), ("dense", False), ("cutin", True)])
+@pytest.mark.parametrize(
+    ("name", "reported"), [("dartout", False), ("dense", False), ("cutin", True)]
+)
 def test_what_perception_reports_by_default(name, reported):
     world = built(name, 0)
     assert (actor_named(world, "occluder").label is not None) is reported
@@ -134,7 +141,9 @@ def test_what_has_no_class_cannot_be_reported(occluder):
 
 
 def test_reporting_the_occluder_moves_nothing():
-    silent, reported = (traced("dense", 2, occluder="truck", occluder_reported=switch) for switch in (False, True))
+    silent, reported = (
+        traced("dense", 2, occluder="truck", occluder_reported=switch) for switch in (False, True)
+    )
     assert np.array_equal(silent, reported)
 
 
@@ -171,8 +180,16 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones(name, parameter):
     ("name", "parameters", "named"),
     [
         ("dartout", {"occluder": "bush"}, r"occluder 'bush'; known: hoarding, trailer, truck, van"),
-        ("dense", {"vehicles": -1}, r"vehicles of dense must be a whole number >= 0 and <= 12, got -1"),
-        ("dense", {"vehicles": 13}, r"vehicles of dense must be a whole number >= 0 and <= 12, got 13"),
+        (
+            "dense",
+            {"vehicles": -1},
+            r"vehicles of dense must be a whole number >= 0 and <= 12, got -1",
+        ),
+        (
+            "dense",
+            {"vehicles": 13},
+            r"vehicles of dense must be a whole number >= 0 and <= 12, got 13",
+        ),
         ("dense", {"vehicles": "five"}, "dense"),
         ("roundabout", {}, r"scenario 'roundabout'; known: cutin, dartout, dense"),
     ],
@@ -184,7 +201,8 @@ def test_an_impossible_value_is_refused_in_one_line(name, parameters, named):
 
 
 @pytest.mark.parametrize(
-    "parameters", [{"run_mps": 5.0}, {"run_mps": (3.0, 2.0)}, {"duration_s": -1.0}, {"run_up_mps2": 0.0}]
+    "parameters",
+    [{"run_mps": 5.0}, {"run_mps": (3.0, 2.0)}, {"duration_s": -1.0}, {"run_up_mps2": 0.0}],
 )
 def test_an_impossible_range_is_refused_before_an_episode(parameters):
     with pytest.raises(InvalidInput):

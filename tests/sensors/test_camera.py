@@ -9,7 +9,7 @@ from care_sim.sensors.camera import (
     FRONT_CAMERA,
     CameraDetector,
     Picture,
-    sights_of,
+    faultless_detections,
     window_on,
 )
 from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
@@ -29,7 +29,12 @@ class Detector(CameraDetector):
 
     def detect(self, picture, heading):
         self.frame += 1
-        return super().detect(sights_of([picture], self.labels), heading, self.ranges, self.frame * self.keyframe_s)
+        return super().detect(
+            faultless_detections([picture], self.labels),
+            heading,
+            self.ranges,
+            self.frame * self.keyframe_s,
+        )
 
 
 def detector(labels, keyframe_s=0.1, seed=0, **faults):
@@ -84,7 +89,9 @@ def test_a_sliver_has_no_box(pixels, visible):
 def test_a_person_in_the_open_has_a_box_where_the_projection_says(bullet):
     person = bullet.add(CATALOGUE["pedestrian"], (15.0, 2.0, 0.0))
     seen = look(bullet)
-    corners = [(15 + x, 2 + y, z - 1.84) for x in (-0.37, 0.37) for y in (-0.33, 0.33) for z in (0, 1.76)]
+    corners = [
+        (15 + x, 2 + y, z - 1.84) for x in (-0.37, 0.37) for y in (-0.33, 0.33) for z in (0, 1.76)
+    ]
     pixels, _ = FRONT_CAMERA.project(corners)
     left, top, right, bottom = seen.boxes[seen.bodies == person][0]
     assert [left, top] == pytest.approx(pixels.min(axis=0), abs=1.7)
@@ -103,7 +110,9 @@ def test_a_half_hidden_bus_has_half_a_box(bullet):
     whole = look(bullet)
     bullet.add(CATALOGUE["building"], (20.0, -4.0, 0.0))
     half = look(bullet)
-    (all_left, _, all_right, _), (left, _, right, _) = (s.boxes[s.bodies == bus][0] for s in (whole, half))
+    (all_left, _, all_right, _), (left, _, right, _) = (
+        s.boxes[s.bodies == bus][0] for s in (whole, half)
+    )
     assert left == all_left
     assert (right - left) / (all_right - all_left) == pytest.approx(0.5, abs=0.1)
 
@@ -165,7 +174,9 @@ def test_the_rate_of_misses_is_right(rate):
 
 def test_misses_are_drawn_anew_for_every_detection_and_frame():
     camera = detector(LABELS, false_negative_rate=0.5)
-    frames = np.array([[body in missed(camera.detect(EVERYBODY, 0.0)) for body in LABELS] for _ in range(2)])
+    frames = np.array(
+        [[body in missed(camera.detect(EVERYBODY, 0.0)) for body in LABELS] for _ in range(2)]
+    )
     again = detector(LABELS, false_negative_rate=0.5)
     patterns = {frozenset(missed(again.detect(EVERYBODY, 0.0))) for _ in range(20)}
     assert len(patterns) > 15
@@ -223,7 +234,9 @@ def test_impossible_faults_are_refused_by_name(faults, named):
 
 @pytest.mark.parametrize("heading", [0.0, 0.4, -0.3])
 def test_rendering_only_a_window_shows_the_same_bodies(bullet, heading):
-    """What is looked for lies in the window whole, hidden and half-hidden parts as in the full picture."""
+    """What is looked for lies in the window whole, hidden and half-hidden parts as in the full
+    picture.
+    """
     places = {
         "car": (12, 3),
         "pedestrian": (9, -1),
@@ -232,16 +245,26 @@ def test_rendering_only_a_window_shows_the_same_bodies(bullet, heading):
         "truck": (1.5, 4),
         "van": (-9, 0),
     }
-    looked_for = {bullet.add(CATALOGUE[name], (*place, 0.3)): (name, place) for name, place in places.items()}
+    looked_for = {
+        bullet.add(CATALOGUE[name], (*place, 0.3)): (name, place) for name, place in places.items()
+    }
     bullet.add(CATALOGUE["trailer"], (25.0, 4.0, 0.0))
-    boxes = np.array([[*at, CATALOGUE[n].size[2] / 2, *CATALOGUE[n].size, 0.3] for n, at in looked_for.values()])
+    boxes = np.array(
+        [[*at, CATALOGUE[n].size[2] / 2, *CATALOGUE[n].size, 0.3] for n, at in looked_for.values()]
+    )
     sensor = Frame(0.0, 0.0, 1.84, heading)
     window = window_on(FRONT_CAMERA, sensor.boxes_to_local(boxes))
-    whole, part = bullet.body_ids(FRONT_CAMERA, sensor), bullet.body_ids(FRONT_CAMERA, sensor, window)
+    whole, part = (
+        bullet.body_ids(FRONT_CAMERA, sensor),
+        bullet.body_ids(FRONT_CAMERA, sensor, window),
+    )
     left, top, right, bottom = window
     assert part.shape == (bottom - top, right - left)
     for body in looked_for:
-        before, after = np.argwhere(whole == body), np.argwhere(part == body) + np.array([top, left])
+        before, after = (
+            np.argwhere(whole == body),
+            np.argwhere(part == body) + np.array([top, left]),
+        )
         assert abs(len(before) - len(after)) <= 0.01 * len(before)
         if len(before):
             assert np.abs(before.min(axis=0) - after.min(axis=0)).max() <= 1

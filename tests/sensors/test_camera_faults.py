@@ -31,9 +31,19 @@ def runs(missing):
 @pytest.mark.parametrize("burst", [1, 3, 10])
 @pytest.mark.parametrize("rate", [0.1, 0.4])
 def test_bursts_leave_the_share_of_misses_as_it_is_from_the_first_frame_on(rate, burst):
-    shares = np.array([missed(400, false_negative_rate=rate, false_negative_burst=burst, seed=s) for s in range(8)])
+    shares = np.array(
+        [
+            missed(400, false_negative_rate=rate, false_negative_burst=burst, seed=s)
+            for s in range(8)
+        ]
+    )
     assert shares.mean() == pytest.approx(rate, abs=0.02)
-    first = np.array([missed(1, false_negative_rate=rate, false_negative_burst=burst, seed=s) for s in range(100)])
+    first = np.array(
+        [
+            missed(1, false_negative_rate=rate, false_negative_burst=burst, seed=s)
+            for s in range(100)
+        ]
+    )
     assert first.mean() == pytest.approx(rate, abs=0.03)
 
 
@@ -104,7 +114,10 @@ def observations(policy="care", keyframes=6, **conditions):
 
 
 def test_a_blackout_is_black_while_it_lasts():
-    seen = [np.sum(o["detections"][:, 0] >= 0) for o in observations(blackout_start_s=0.2, blackout_s=0.2)]
+    seen = [
+        np.sum(o["detections"][:, 0] >= 0)
+        for o in observations(blackout_start_s=0.2, blackout_s=0.2)
+    ]
     assert [count > 0 for count in seen] == [True, True, False, False, True, True, True]
 
 
@@ -115,7 +128,10 @@ def test_a_crooked_camera_moves_the_boxes_and_not_the_world():
 
 
 def test_the_confidence_threshold_keeps_what_is_sure():
-    usual, sure = observations()[0]["detections"], observations(camera_confidence=0.5)[0]["detections"]
+    usual, sure = (
+        observations()[0]["detections"],
+        observations(camera_confidence=0.5)[0]["detections"],
+    )
     kept = usual[usual[:, 1] >= 0.5]
     assert 0 < len(kept) < np.sum(usual[:, 0] >= 0)
     assert np.array_equal(sure[: len(kept)], kept)
@@ -126,7 +142,9 @@ def test_odometry_noise_has_its_spread_and_leaves_the_car_alone():
     true = np.array([o["ego"][0] for o in observations(keyframes=40)])
     read = np.array([o["ego"][0] for o in observations(keyframes=40, ego_speed_sigma=0.3)])
     assert np.std(read[:15] - true[:15]) == pytest.approx(0.3, rel=0.5)
-    assert np.array_equal([o["ego"][0] for o in observations(keyframes=3, ego_speed_sigma=0.0)], true[:4])
+    assert np.array_equal(
+        [o["ego"][0] for o in observations(keyframes=3, ego_speed_sigma=0.0)], true[:4]
+    )
 
 
 @pytest.mark.parametrize("policy", ["care", "care-priority", "all-camera"])
@@ -137,9 +155,16 @@ def test_with_the_camera_black_camera_policies_scan_as_history(policy):
 
 
 def test_every_policy_meets_the_same_faults():
-    faults = {"false_negative_rate": 0.3, "false_negative_burst": 3, "false_positive_rate": 2.0, "camera_jitter": 2}
+    faults = {
+        "false_negative_rate": 0.3,
+        "false_negative_burst": 3,
+        "false_positive_rate": 2.0,
+        "camera_jitter": 2,
+    }
     ours, theirs = observations("care", 10, **faults), observations("random", 10, **faults)
-    assert all(np.array_equal(a["detections"], b["detections"]) for a, b in zip(ours, theirs, strict=True))
+    assert all(
+        np.array_equal(a["detections"], b["detections"]) for a, b in zip(ours, theirs, strict=True)
+    )
     assert any((a["detections"][:, 0] >= 0).any() for a in ours)
 
 
@@ -158,7 +183,10 @@ def test_every_policy_meets_the_same_faults():
         ({"lidar_dead_rows": None}, "lidar_dead_rows must be a list of rows"),
         ({"false_positive_rate": 1e20}, "false_positive_rate"),
         ({"camera_jitter": 2**70}, "camera_jitter must be a whole number >= 0 and <= 1200"),
-        ({"false_negative_burst": 10**19}, "false_negative_burst must be a whole number >= 1 and <= 1200"),
+        (
+            {"false_negative_burst": 10**19},
+            "false_negative_burst must be a whole number >= 1 and <= 1200",
+        ),
         ({"engine": ["bullet"]}, "engine must be a name"),
         ({"ego_speed_sigma": -0.1}, "ego_speed_sigma"),
         ({"camera_confidence": 1.5}, "camera_confidence"),
@@ -183,7 +211,9 @@ def test_dead_rows_are_a_set_however_they_are_given(rows):
 def test_equal_numbers_are_equal_conditions():
     ours = Conditions(false_negative_rate=np.float64(0), floor_seed=np.int64(1), lidar_dropout=1)
     assert ours == Conditions(floor_seed=1, lidar_dropout=1.0)
-    assert [type(value) for value in (ours.false_negative_rate, ours.floor_seed, ours.lidar_dropout)] == [
+    assert [
+        type(value) for value in (ours.false_negative_rate, ours.floor_seed, ours.lidar_dropout)
+    ] == [
         float,
         int,
         float,

@@ -1,4 +1,6 @@
-"""False boxes: how many come, where from, and how little the numbers of a single one say that it is false."""
+"""False boxes: how many come, where from, and how little the numbers of a single one say that it is
+false.
+"""
 
 import itertools
 import json
@@ -15,9 +17,9 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.scenarios.dense import Dense
-from care_sim.sensors.annotated import Sights
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
-from care_sim.sensors.false_boxes import NOTHING_TO_HAUNT, TRIES, Ghosts, Pool
+from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.nuscenes.cameras import CHANNELS
@@ -45,7 +47,7 @@ def table(*boxes, pixels=400, label=CAR, camera=0):
 def pool(rows, times=None, cameras=(FRONT_CAMERA,), apart=0.0):
     """A pool of rows, each seen at its time."""
     times = np.zeros(len(rows)) if times is None else times
-    return Pool.of([ImageDetections.from_rows(row[None]) for row in rows], times, cameras, apart)
+    return BoxPool.of([ImageDetections.from_rows(row[None]) for row in rows], times, cameras, apart)
 
 
 def spread(number, seed=0):
@@ -56,13 +58,18 @@ def spread(number, seed=0):
 
 
 def drawn(rate, keyframes=400, rows=None, true=None, seed=0):
-    haunted = Ghosts(pool(spread(200) if rows is None else rows), rate, 1, np.random.default_rng(seed))
-    return [haunted.draw(spread(0) if true is None else true, 0.0) for _ in range(keyframes)]
+    false_boxes = FalseBoxes(
+        pool(spread(200) if rows is None else rows), rate, 1, np.random.default_rng(seed)
+    )
+    return [false_boxes.draw(spread(0) if true is None else true, 0.0) for _ in range(keyframes)]
 
 
 def overlaps(ours, theirs):
     """(n, m) intersection over union of boxes of one class and camera, else 0."""
-    low, high = np.maximum(ours[:, None, 2:4], theirs[:, 2:4]), np.minimum(ours[:, None, 4:6], theirs[:, 4:6])
+    low, high = (
+        np.maximum(ours[:, None, 2:4], theirs[:, 2:4]),
+        np.minimum(ours[:, None, 4:6], theirs[:, 4:6]),
+    )
     common = np.prod(np.clip(high - low, 0, None), axis=-1)
     areas = [np.prod(rows[:, 4:6] - rows[:, 2:4], axis=1) for rows in (ours, theirs)]
     alike = (ours[:, None, 0] == theirs[:, 0]) & (ours[:, None, 6] == theirs[:, 6])
@@ -77,14 +84,16 @@ def test_ghosts_come_in_poisson_numbers():
 
 def test_no_ghosts_by_default_and_none_from_an_empty_pool():
     assert sum(map(len, drawn(0.0, 20))) == 0
-    empty = Ghosts(NOTHING_TO_HAUNT, 5.0, 1, np.random.default_rng(0))
+    empty = FalseBoxes(EMPTY_POOL, 5.0, 1, np.random.default_rng(0))
     assert sum(len(empty.draw(spread(3), 0.0)) for _ in range(20)) == 0
 
 
 def test_the_rate_is_a_mean_over_the_pictures_and_boxes_come_where_true_ones_do():
     rows = np.concatenate([spread(90), table((10, 10, 50, 50), camera=1)[[0] * 10]])
-    haunted = Ghosts(pool(rows, cameras=SURROUND_CAMERAS[:2]), 2.0, 2, np.random.default_rng(0))
-    ghosts = [haunted.draw(spread(0), 0.0) for _ in range(400)]
+    false_boxes = FalseBoxes(
+        pool(rows, cameras=SURROUND_CAMERAS[:2]), 2.0, 2, np.random.default_rng(0)
+    )
+    ghosts = [false_boxes.draw(spread(0), 0.0) for _ in range(400)]
     assert np.mean(list(map(len, ghosts))) == pytest.approx(4.0, abs=0.3)
     assert np.mean(np.concatenate(ghosts)[:, 6]) == pytest.approx(0.1, abs=0.03)
 
@@ -100,7 +109,7 @@ def test_a_ghost_on_a_box_of_its_class_is_drawn_again_and_at_last_left_out():
     assert any((rows[:, 2] < 150).any() for rows in alone)
     assert all((rows[:, 2] > 150).all() for rows in beside)
     numbers = np.array([[len(rows) for rows in kind] for kind in (alone, beside)])
-    assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{TRIES} draws find the free place"
+    assert np.all((numbers[1] > 0) == (numbers[0] > 0)), f"{MOST_DRAWS} draws find the free place"
 
 
 def test_a_ghost_may_lie_on_a_box_of_another_class():
@@ -117,7 +126,7 @@ def test_ghosts_do_not_lie_on_each_other():
 def test_every_policy_meets_the_same_draws_whatever_is_there():
     """The second keyframe's do not depend on what was there at the first."""
     rows = spread(200)
-    ones, others = (Ghosts(pool(rows), 3.0, 1, np.random.default_rng(1)) for _ in range(2))
+    ones, others = (FalseBoxes(pool(rows), 3.0, 1, np.random.default_rng(1)) for _ in range(2))
     ones.draw(spread(0), 0.0)
     others.draw(spread(40, seed=3), 0.0)
     assert np.array_equal(ones.draw(spread(0), 0.1), others.draw(spread(0), 0.1))
@@ -125,20 +134,27 @@ def test_every_policy_meets_the_same_draws_whatever_is_there():
 
 def test_a_film_lends_boxes_of_other_times_only():
     rows = table(*((30 * n, 80, 30 * n + 20, 110) for n in range(10)))
-    haunted = Ghosts(pool(rows, np.arange(10.0), apart=3.0), 3.0, 1, np.random.default_rng(0))
-    lefts = np.concatenate([haunted.draw(spread(0), 5.0) for _ in range(50)])[:, 2]
+    false_boxes = FalseBoxes(
+        pool(rows, np.arange(10.0), apart=3.0), 3.0, 1, np.random.default_rng(0)
+    )
+    lefts = np.concatenate([false_boxes.draw(spread(0), 5.0) for _ in range(50)])[:, 2]
     assert set(np.rint(lefts / 30)) == {0, 1, 2, 8, 9}
 
 
 edges = st.tuples(st.integers(0, 280), st.integers(0, 150), st.integers(1, 39), st.integers(1, 29))
 
 
-@given(st.lists(st.tuples(edges, st.floats(0.05, 1)), min_size=1, max_size=12), st.integers(0, 2**32 - 1))
+@given(
+    st.lists(st.tuples(edges, st.floats(0.05, 1)), min_size=1, max_size=12),
+    st.integers(0, 2**32 - 1),
+)
 def test_ghosts_of_rendered_pictures_have_whole_edges_and_pixels_that_fit(boxes, seed):
     """And stay as far from the border, and as sure, as the boxes that they are made from."""
     rows = np.concatenate(
         [
-            table((left, top, left + width, top + height), pixels=max(round(fill * width * height), 1))
+            table(
+                (left, top, left + width, top + height), pixels=max(round(fill * width * height), 1)
+            )
             for (left, top, width, height), fill in boxes
         ]
     )
@@ -149,7 +165,9 @@ def test_ghosts_of_rendered_pictures_have_whole_edges_and_pixels_that_fit(boxes,
     pixels = 36 * ghosts[:, 1] / (1 - ghosts[:, 1])
     assert np.array_equal(ghosts[:, 2:6], np.rint(ghosts[:, 2:6]))
     assert pixels == pytest.approx(np.rint(pixels), abs=1e-6)
-    assert np.all((left < right) & (top < bottom) & (pixels <= (right - left) * (bottom - top) + 1e-6))
+    assert np.all(
+        (left < right) & (top < bottom) & (pixels <= (right - left) * (bottom - top) + 1e-6)
+    )
     assert ghosts[:, 1].min() >= rows[:, 1].min() - 1e-12
     assert np.all(ghosts[:, 2:4].min(axis=0) >= rows[:, 2:4].min(axis=0))
     assert np.all(ghosts[:, 4:6].max(axis=0) <= rows[:, 4:6].max(axis=0))
@@ -164,7 +182,9 @@ def test_what_the_edge_of_the_picture_cuts_it_cuts_in_a_ghost_too():
 
 
 def test_ghosts_are_written_with_the_decimals_of_the_file_that_they_come_from():
-    """The recorded picture is off the rig's by a part of a pixel, so that no edge is a round number."""
+    """The recorded picture is off the rig's by a part of a pixel, so that no edge is a round
+    number.
+    """
     rng = np.random.default_rng(0)
     corners = np.round(rng.uniform(0, 600, (30, 2)), 1)
     boxes = np.column_stack([corners, corners + np.round(rng.uniform(20, 200, (30, 2)), 1)])
@@ -174,17 +194,27 @@ def test_ghosts_are_written_with_the_decimals_of_the_file_that_they_come_from():
     ghosts = pool(rows).varied(rng.integers(30, size=200), rng.random((200, 3)))
     for values, decimals in ((ghosts[:, 2:6] - off, 1), (ghosts[:, 1], 3)):
         assert values == pytest.approx(np.round(values, decimals), abs=1e-6)
-    assert len({tuple(row) for row in ghosts[:, 2:6].tolist()} & {tuple(row) for row in rows[:, 2:6].tolist()}) < 10
+    assert (
+        len(
+            {tuple(row) for row in ghosts[:, 2:6].tolist()}
+            & {tuple(row) for row in rows[:, 2:6].tolist()}
+        )
+        < 10
+    )
 
 
 def played(env, seed):
-    """Tables of the true and of the false boxes of every keyframe of an episode in which every cell is fired."""
+    """Tables of the true and of the false boxes of every keyframe of an episode in which every cell
+    is fired.
+    """
     observation, _ = env.reset(seed=seed)
     loop, everything, over = env.unwrapped.loop, np.ones(env.action_space.shape, np.float32), False
     keyframes = []
     while not over:
-        sights = loop.sights if hasattr(loop, "sights") else loop.shot.sights
-        truth = {tuple(row) for row in sights.detections.rows().astype(np.float32)[:, SHOWN].tolist()}
+        identified = loop.seen if hasattr(loop, "seen") else loop.shot.seen
+        truth = {
+            tuple(row) for row in identified.detections.rows().astype(np.float32)[:, SHOWN].tolist()
+        }
         shown = observation["detections"][observation["detections"][:, 0] >= 0]
         true = np.array([tuple(row) in truth for row in shown[:, SHOWN].tolist()], bool)
         keyframes.append((shown[true], shown[~true]))
@@ -193,8 +223,10 @@ def played(env, seed):
     return keyframes
 
 
-def haunted(name, rate, seeds, **more):
-    env = gymnasium.make(name, budget=1.0, false_positive_rate=rate, disable_env_checker=True, **more)
+def keyframes_of(name, rate, seeds, **more):
+    env = gymnasium.make(
+        name, budget=1.0, false_positive_rate=rate, disable_env_checker=True, **more
+    )
     episodes = [played(env, seed) for seed in seeds]
     env.close()
     return episodes
@@ -209,13 +241,15 @@ def copies(keyframes, kind):
     """Share of the boxes that stand, to the last digit, at another keyframe too."""
     rows = [[tuple(row) for row in np.concatenate(both)[:, SHOWN].tolist()] for both in keyframes]
     seen = Counter(itertools.chain.from_iterable(map(set, rows)))
-    return np.mean([seen[tuple(row)] > 1 for both in keyframes for row in both[kind][:, SHOWN].tolist()])
+    return np.mean(
+        [seen[tuple(row)] > 1 for both in keyframes for row in both[kind][:, SHOWN].tolist()]
+    )
 
 
 @pytest.fixture(scope="module")
 def dense():
     """Eight episodes of the dense street with two ghosts a picture."""
-    return haunted("CARE-Dense-v0", 2.0, range(8))
+    return keyframes_of("CARE-Dense-v0", 2.0, range(8))
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +259,14 @@ def streets():
     for seed in (3000, 3001):
         street = make_street(seed)
         first = slice(0, 24)
-        film = record(replace(street, poses=street.poses[first], ego=street.ego[first], motion=street.motion[first]))
+        film = record(
+            replace(
+                street,
+                poses=street.poses[first],
+                ego=street.ego[first],
+                motion=street.motion[first],
+            )
+        )
         episodes.append(played(FilmEnv(film, budget=1.0, false_positive_rate=3.0), 0))
     return episodes
 
@@ -233,34 +274,48 @@ def streets():
 @pytest.fixture(scope="module")
 def cutin():
     """Sixteen episodes of the cut-in."""
-    return haunted("CARE-CutIn-v0", 2.0, range(16))
+    return keyframes_of("CARE-CutIn-v0", 2.0, range(16))
 
 
 @pytest.fixture(scope="module")
 def dartout():
     """Thirty-two of the dart-out, where 20 keyframes of an episode show a true box."""
-    return haunted("CARE-Dartout-v0", 2.0, range(32))
+    return keyframes_of("CARE-Dartout-v0", 2.0, range(32))
 
 
 TOLD = {"dense": 0.55, "cutin": 0.63, "dartout": 0.52, "streets": 0.53}
-"""Area under the curve, the median of the three classifiers, measured with as many boxes as there were, up to 1,000 of
-each kind (24, 60, 60 and 4 drives of CARE at 10%; never less than 513 boxes). No world may tell more than that and what
-chance adds to 300 boxes.
+"""Area under the curve, the median of the three classifiers, measured with as many boxes as there
+were, up to 1,000 of each kind (24, 60, 60 and 4 drives of CARE at 10%; never less than 513 boxes).
+No world may tell more than that and what chance adds to 300 boxes.
 """
 
 
 @pytest.mark.parametrize("world", TOLD)
-def test_small_classifiers_of_single_boxes_tell_false_from_true_as_badly_as_they_did(world, request):
-    """With 300 boxes of each kind. What else tells them apart, and how well, is in `docs/concepts.md`."""
+def test_small_classifiers_of_single_boxes_tell_false_from_true_as_badly_as_they_did(
+    world, request
+):
+    """With 300 boxes of each kind. What else tells them apart, and how well, is in
+    `docs/concepts.md`.
+    """
     episodes = request.getfixturevalue(world)
-    areas = areas_under_the_curve(*(of_kind(episodes, kind) for kind in (0, 1)), np.random.default_rng(0))
+    areas = areas_under_the_curve(
+        *(of_kind(episodes, kind) for kind in (0, 1)), np.random.default_rng(0)
+    )
     assert all(0.5 - CHANCE <= area <= TOLD[world] + CHANCE for area in areas.values()), areas
 
 
 def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
-    """Scenarios run by the clock: 40% of the false people stood there too early when any moment lent its boxes."""
+    """Scenarios run by the clock: 40% of the false people stood there too early when any moment
+    lent its boxes.
+    """
     true, false = (
-        [n for episode in dense for n, both in enumerate(episode) for row in both[kind] if row[0] == PEDESTRIAN]
+        [
+            n
+            for episode in dense
+            for n, both in enumerate(episode)
+            for row in both[kind]
+            if row[0] == PEDESTRIAN
+        ]
         for kind in (0, 1)
     )
     assert len(false) > 30
@@ -269,8 +324,15 @@ def test_few_false_people_stand_where_nobody_can_have_emerged_yet(dense):
 
 @pytest.mark.parametrize("world", ["dense", "streets"])
 def test_who_remembers_all_boxes_meets_no_more_copies_among_the_false_ones(world, request):
-    """Give or take what chance does: three standard errors of a share of one in ten of some hundred boxes."""
-    shares = np.array([[copies(keyframes, kind) for kind in (0, 1)] for keyframes in request.getfixturevalue(world)])
+    """Give or take what chance does: three standard errors of a share of one in ten of some hundred
+    boxes.
+    """
+    shares = np.array(
+        [
+            [copies(keyframes, kind) for kind in (0, 1)]
+            for keyframes in request.getfixturevalue(world)
+        ]
+    )
     true, false = shares.mean(axis=0)
     assert false <= true + 0.05
 
@@ -289,8 +351,8 @@ def test_as_many_ghosts_as_asked_for(dense, streets):
 
 
 def test_a_crooked_camera_sees_ghosts_as_crookedly_as_the_rest():
-    (keyframes,) = haunted("CARE-Dense-v0", 4.0, [PITCHED], camera_rotation_sigma_deg=10.0)
-    (straight,) = haunted("CARE-Dense-v0", 4.0, [PITCHED])
+    (keyframes,) = keyframes_of("CARE-Dense-v0", 4.0, [PITCHED], camera_rotation_sigma_deg=10.0)
+    (straight,) = keyframes_of("CARE-Dense-v0", 4.0, [PITCHED])
     true, false, usual = (
         np.median(np.concatenate(rows)[:, [3, 5]].mean(axis=1))
         for rows in ([b[0] for b in keyframes], [b[1] for b in keyframes], [b[0] for b in straight])
@@ -323,21 +385,28 @@ def test_the_other_drive_is_of_a_world_of_its_own_and_leaves_no_client_behind(mo
 
 
 def test_ghosts_change_nothing_of_what_is_true():
-    plain, with_ghosts = haunted("CARE-Dartout-v0", 0.0, [0]), haunted("CARE-Dartout-v0", 1.0, [0])
+    plain, with_ghosts = (
+        keyframes_of("CARE-Dartout-v0", 0.0, [0]),
+        keyframes_of("CARE-Dartout-v0", 1.0, [0]),
+    )
     assert all(np.array_equal(a[0], b[0]) for a, b in zip(plain[0], with_ghosts[0], strict=True))
-    assert {row[0] for _, false in with_ghosts[0] for row in false} == {PEDESTRIAN}, "nobody else has a box here"
+    assert {row[0] for _, false in with_ghosts[0] for row in false} == {PEDESTRIAN}, (
+        "nobody else has a box here"
+    )
 
 
 def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
-    """Confidence and left edge decide; a true and a false box that have both in common may come in either order."""
+    """Confidence and left edge decide; a true and a false box that have both in common may come in
+    either order.
+    """
     boxes = high, low = table((10, 20, 30, 40)), table((10, 60, 30, 80))
     orders = []
     for true, false in (boxes, boxes[::-1]):
         lent = pool(false)
         lent.__dict__["varied"] = lambda rows, draws, lent=lent: lent.rows[rows]
         camera = CameraDetector([], Sensing(false_positive_rate=9), 0.1, SEED, [FRONT_CAMERA], lent)
-        sights = Sights(ImageDetections.from_rows(true), np.array([0]))
-        orders.append(camera.detect(sights, 0.0, np.empty(0), 0.0).boxes.tolist())
+        identified = IdentifiedDetections(ImageDetections.from_rows(true), np.array([0]))
+        orders.append(camera.detect(identified, 0.0, np.empty(0), 0.0).boxes.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
 
 
@@ -354,7 +423,7 @@ def ghosts_of(film, rate=1.0, seeds=range(4)):
 
 
 def true_of(film):
-    return np.concatenate([shot.sights.detections.rows() for shot in film.shots])
+    return np.concatenate([shot.seen.detections.rows() for shot in film.shots])
 
 
 def pixels_of_area(rows):
@@ -375,8 +444,12 @@ def test_ghosts_of_projected_annotations_have_their_visible_shares_and_edges(nus
     film = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
     ghosts, true = ghosts_of(film), true_of(film)
     assert len(ghosts) > 50
-    assert pixels_of_area(ghosts) == pytest.approx(pixels_of_area(true)[0], rel=1e-3), "all are wholly visible"
-    assert not {tuple(row) for row in ghosts[:, 2:6]} & {tuple(row) for row in true[:, 2:6].astype(np.float32)}
+    assert pixels_of_area(ghosts) == pytest.approx(pixels_of_area(true)[0], rel=1e-3), (
+        "all are wholly visible"
+    )
+    assert not {tuple(row) for row in ghosts[:, 2:6]} & {
+        tuple(row) for row in true[:, 2:6].astype(np.float32)
+    }
     for camera in np.unique(ghosts[:, 6]):
         ours, theirs = (rows[rows[:, 6] == camera] for rows in (ghosts, true))
         assert np.all(ours[:, 2:4] >= theirs[:, 2:4].min(axis=0) - 1e-3)
@@ -388,13 +461,17 @@ def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
     annotated = recordings(f"nuscenes:{nuscenes}").film("scene-0103")
     rng, rows = np.random.default_rng(0), []
     for shot in annotated.shots:
-        seen = shot.sights.detections
+        seen = shot.seen.detections
         for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
             found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
             found["sample_data_token"] = f"{shot.token}-{CHANNELS[camera]}"
-            rows.append(found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()})
+            rows.append(
+                found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()}
+            )
     (tmp_path / "found.json").write_text(json.dumps(rows))
-    film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film("scene-0103")
+    film = recordings(f"nuscenes:{nuscenes}", {"camera_detections": tmp_path / "found.json"}).film(
+        "scene-0103"
+    )
     ghosts, true = ghosts_of(film), true_of(film)
     assert len(ghosts) > 50
     assert ghosts[:, 1] == pytest.approx(np.round(ghosts[:, 1], 2), abs=1e-6)

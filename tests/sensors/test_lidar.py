@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.types import Scan
-from care_sim.sensors.engines.engine import ENGINES, check_engine
+from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import Lidar, dead_cells, noisy
 from care_sim.world.bodies import CATALOGUE
 
@@ -44,7 +44,9 @@ def lidar(engine):
     """Makes a LiDAR over a world, with noise."""
 
     def make(grid, bullet, seed=0, **noise):
-        return Lidar(grid, ENGINES[engine](bullet, grid), Sensing(**noise), np.random.SeedSequence(seed))
+        return Lidar(
+            grid, ENGINES[engine](bullet, grid), Sensing(**noise), np.random.SeedSequence(seed)
+        )
 
     return make
 
@@ -80,10 +82,14 @@ def test_returns_lie_on_the_bodies_they_hit(grid, street, lidar):
     scan, bodies = lidar(grid, street).fire(everything(grid), SENSOR)
     hit = bodies == bus
     points = SENSOR.origin + scan.ranges[hit, None] * grid.directions[hit]
-    local = Frame(5.0, 20.0, 3.47 / 2, 1.0).boxes_to_local(np.hstack([points, np.zeros((hit.sum(), 4))]))[:, :3]
+    local = Frame(5.0, 20.0, 3.47 / 2, 1.0).boxes_to_local(
+        np.hstack([points, np.zeros((hit.sum(), 4))])
+    )[:, :3]
     assert hit.sum() > 50
     assert np.all(np.abs(local) <= np.array([11.19, 2.94, 3.47]) / 2 + 1e-3)
-    assert np.abs(np.abs(local) / (np.array([11.19, 2.94, 3.47]) / 2)).max(axis=1) == pytest.approx(1, abs=1e-3)
+    assert np.abs(np.abs(local) / (np.array([11.19, 2.94, 3.47]) / 2)).max(axis=1) == pytest.approx(
+        1, abs=1e-3
+    )
 
 
 def test_the_scan_turns_with_the_sensor(grid, street, lidar):
@@ -131,7 +137,9 @@ def test_total_dropout_returns_nothing(grid, street, lidar):
 
 def test_noise_does_not_move_what_drops_out(grid, street, lidar):
     plain, _ = lidar(grid, street, lidar_dropout=0.3).fire(everything(grid), SENSOR)
-    noisy, _ = lidar(grid, street, lidar_dropout=0.3, lidar_range_sigma=0.1).fire(everything(grid), SENSOR)
+    noisy, _ = lidar(grid, street, lidar_dropout=0.3, lidar_range_sigma=0.1).fire(
+        everything(grid), SENSOR
+    )
     assert np.array_equal(np.isinf(plain.ranges), np.isinf(noisy.ranges))
 
 
@@ -150,7 +158,9 @@ def test_noisy_returns_near_the_ends_do_not_heap_up(grid, bullet, lidar, distanc
     clean, bodies = lidar(grid, bullet).fire(everything(grid), SENSOR)
     hit = np.isfinite(clean.ranges) & (bodies == bodies.max())
     erring = lidar(grid, bullet, lidar_range_sigma=0.5)
-    ranges = np.concatenate([erring.fire(everything(grid), SENSOR)[0].ranges[hit] for _ in range(5)])
+    ranges = np.concatenate(
+        [erring.fire(everything(grid), SENSOR)[0].ranges[hit] for _ in range(5)]
+    )
     assert len(np.unique(ranges)) == len(ranges) > 10
     assert 0 < ranges.min() < ranges.max() < 50
 

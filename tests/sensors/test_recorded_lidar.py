@@ -70,11 +70,14 @@ def test_noise_moves_points_along_their_rays_by_its_spread(grid):
 def test_noise_leaves_a_return_a_return(grid, range_m, least, most):
     """Neither at 0 m, which reads as not fired, nor at the reach, which reads as no return."""
     ranges = np.linalg.norm(
-        lidar(grid, lidar_range_sigma=0.2).fire(everything(grid), full(grid, range_m)).points, axis=1
+        lidar(grid, lidar_range_sigma=0.2).fire(everything(grid), full(grid, range_m)).points,
+        axis=1,
     )
     assert ranges.min() >= least - 1e-9
     assert ranges.max() <= most + 1e-9
-    assert len(np.unique(np.round(ranges, 9))) > 0.99 * len(ranges), "cut, they would heap up at one number"
+    assert len(np.unique(np.round(ranges, 9))) > 0.99 * len(ranges), (
+        "cut, they would heap up at one number"
+    )
 
 
 def test_every_choice_of_cells_meets_the_same_noise_and_dropout(grid):
@@ -92,7 +95,9 @@ def test_every_choice_of_cells_meets_the_same_noise_and_dropout(grid):
 
 @pytest.mark.parametrize("fault", ["lidar_dropout", "lidar_range_sigma"])
 def test_noise_and_dropout_are_seeded(grid, fault):
-    one, same, other = (lidar(grid, seed, **{fault: 0.3}).fire(everything(grid), full(grid)) for seed in (1, 1, 2))
+    one, same, other = (
+        lidar(grid, seed, **{fault: 0.3}).fire(everything(grid), full(grid)) for seed in (1, 1, 2)
+    )
     assert np.array_equal(one.points, same.points)
     assert not np.array_equal(one.points, other.points)
 

@@ -5,7 +5,7 @@ import pytest
 
 from care_sim.core.frames import Frame
 from care_sim.sensors.annotated import NOBODY
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
 
@@ -21,7 +21,9 @@ def test_every_direction_lies_in_some_picture():
 
 
 def test_the_ring_is_as_wide_as_nuscenes_says():
-    degrees = [(round(np.rad2deg(c.yaw)), round(np.rad2deg(c.horizontal_fov))) for c in SURROUND_CAMERAS]
+    degrees = [
+        (round(np.rad2deg(c.yaw)), round(np.rad2deg(c.horizontal_fov))) for c in SURROUND_CAMERAS
+    ]
     assert degrees == [(0, 70), (55, 70), (-55, 70), (110, 70), (-110, 70), (180, 110)]
 
 
@@ -42,10 +44,17 @@ def test_a_full_sweep_holds_every_return_at_its_place(bare, grid):
     }
     for name, pose in poses.items():
         bare.add(CATALOGUE[name], pose)
-    boxes = np.array([[x, y, CATALOGUE[n].size[2] / 2, *CATALOGUE[n].size, yaw] for n, (x, y, yaw) in poses.items()])
+    boxes = np.array(
+        [
+            [x, y, CATALOGUE[n].size[2] / 2, *CATALOGUE[n].size, yaw]
+            for n, (x, y, yaw) in poses.items()
+        ]
+    )
     for sensor in (SENSOR, Frame(3.0, -2.0, 1.84, 0.6)):
         cloud = full_sweep(bare, grid, sensor, sensor.boxes_to_local(boxes), 1.84)
-        ranges, bodies = bare.cast(sensor.origin, sensor.vectors_to_world(grid.directions), grid.range_m)
+        ranges, bodies = bare.cast(
+            sensor.origin, sensor.vectors_to_world(grid.directions), grid.range_m
+        )
         hit = cloud.objects != NO_BODY
         assert np.array_equal(cloud.cells[hit], np.flatnonzero(np.isfinite(ranges)))
         assert np.array_equal(cloud.objects[hit], bodies[cloud.cells[hit]])
@@ -64,13 +73,23 @@ def test_the_road_is_where_a_ground_plane_would_be_hit(bullet, grid):
 
 
 def test_cameras_report_labelled_bodies_alone(bullet):
-    bus, van = bullet.add(CATALOGUE["bus"], (20.0, -2.0, 0.0)), bullet.add(CATALOGUE["van"], (-15.0, -2.0, 0.0))
-    boxes = SENSOR.boxes_to_local(
-        np.array([[20.0, -2.0, 1.7, *CATALOGUE["bus"].size, 0.0], [-15.0, -2.0, 1.2, *CATALOGUE["van"].size, 0.0]])
+    bus, van = (
+        bullet.add(CATALOGUE["bus"], (20.0, -2.0, 0.0)),
+        bullet.add(CATALOGUE["van"], (-15.0, -2.0, 0.0)),
     )
-    sights = look_around(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2}, boxes)
-    assert set(sights.objects.tolist()) == {bus}
-    assert set(sights.detections.classes.tolist()) == {2}
-    both = look_around(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2, van: 1}, boxes)
+    boxes = SENSOR.boxes_to_local(
+        np.array(
+            [
+                [20.0, -2.0, 1.7, *CATALOGUE["bus"].size, 0.0],
+                [-15.0, -2.0, 1.2, *CATALOGUE["van"].size, 0.0],
+            ]
+        )
+    )
+    identified = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2}, boxes)
+    assert set(identified.objects.tolist()) == {bus}
+    assert set(identified.detections.classes.tolist()) == {2}
+    both = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2, van: 1}, boxes)
     assert set(both.objects.tolist()) == {bus, van}
-    assert numbers_of(both.objects, {bus: 7}).tolist() == [7 if b == bus else NOBODY for b in both.objects]
+    assert numbers_of(both.objects, {bus: 7}).tolist() == [
+        7 if b == bus else NOBODY for b in both.objects
+    ]

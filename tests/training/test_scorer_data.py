@@ -58,11 +58,11 @@ def test_a_front_alone_sees_what_the_first_camera_saw(film):
     front = front_alone(film)
     assert front.cameras == film.cameras[:1]
     for shown, shot in zip(front.shots, film.shots, strict=True):
-        first = shot.sights.detections.cameras == 0
-        assert not shown.sights.detections.cameras.any()
-        assert np.array_equal(shown.sights.detections.boxes, shot.sights.detections.boxes[first])
-        assert np.array_equal(shown.sights.objects, shot.sights.objects[first])
-    assert sum(len(shot.sights.objects) for shot in front.shots) > 0
+        first = shot.seen.detections.cameras == 0
+        assert not shown.seen.detections.cameras.any()
+        assert np.array_equal(shown.seen.detections.boxes, shot.seen.detections.boxes[first])
+        assert np.array_equal(shown.seen.objects, shot.seen.objects[first])
+    assert sum(len(shot.seen.objects) for shot in front.shots) > 0
 
 
 def test_positive_and_other_examples_weigh_the_same_and_1_on_average():

@@ -12,7 +12,7 @@ from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
-from care_sim.loops.watcher import Witness
+from care_sim.loops.watcher import EpisodeWatcher
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.recording import entities
@@ -209,12 +209,12 @@ def test_who_is_in_view_from_the_start_has_an_event(tmp_path, read):
         env.reset(seed=0)
         rig = env.unwrapped.rig
         episode = file.episode("agent", env.unwrapped.loop)
-        witness = Witness(env.unwrapped.loop, 0.5)
-        stance = witness.stance()
+        watcher = EpisodeWatcher(env.unwrapped.loop, 0.5)
+        situation = watcher.situation()
         episode.look(env.unwrapped.loop)
         env.step(np.zeros(rig.grid.shape, np.float32))
         frame = replace(env.unwrapped.keyframes[-1], in_view=True)
-        episode.keep(witness.moment(stance, env.unwrapped.acted, None, frame))
+        episode.keep(watcher.watched(situation, env.unwrapped.acted, None, frame))
         episode.end(None)
     assert "actor in view" in str(read(path).rows["agent/events"][0]["TextLog:text"])
 

@@ -33,11 +33,17 @@ def test_the_simulator_holds_a_body_of_that_size(kind, bullet):
 
 @kinds
 def test_no_part_floats_apart_from_the_rest(kind):
-    """Bounding boxes of parts, joined over gaps of 10 cm (the coupling of a lorry, a stride), form one piece."""
+    """Bounding boxes of parts, joined over gaps of 10 cm (the coupling of a lorry, a stride), form
+    one piece.
+    """
     boxes = [limits(part) for part in kind.parts]
     joined, left = [boxes[0]], boxes[1:]
     for _ in boxes:
-        near = [b for b in left if any(np.all(b[0] <= o[1] + 0.101) and np.all(b[1] >= o[0] - 0.101) for o in joined)]
+        near = [
+            b
+            for b in left
+            if any(np.all(b[0] <= o[1] + 0.101) and np.all(b[1] >= o[0] - 0.101) for o in joined)
+        ]
         left = [b for b in left if not any(b is n for n in near)]
         joined += near
     assert kind.name == "bicycle" or not left
@@ -59,7 +65,9 @@ def test_a_body_can_be_hit_from_every_side(kind, bullet):
     for part in kind.parts:
         for axis in range(3):
             direction = -np.eye(3)[axis]
-            ranges, ids = bullet.cast(np.array(part.centre) - 90 * direction, direction[None], 100.0)
+            ranges, ids = bullet.cast(
+                np.array(part.centre) - 90 * direction, direction[None], 100.0
+            )
             assert ids.tolist() == [body]
             assert ranges[0] <= 90 - part.size[axis] / 2 + 1e-3
             assert ranges[0] >= 90 - kind.size[axis]

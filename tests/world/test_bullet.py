@@ -76,7 +76,10 @@ def test_a_moved_body_is_where_it_was_put(bullet):
 
 def test_rays_pictures_and_clearance_all_know_of_a_move(bullet):
     """From 20 m ahead to 30, each asked first after its move."""
-    body, other = bullet.add(BLOCK, (20.0, 0.0, np.pi / 2)), bullet.add(BLOCK, (0.0, 0.0, np.pi / 2))
+    body, other = (
+        bullet.add(BLOCK, (20.0, 0.0, np.pi / 2)),
+        bullet.add(BLOCK, (0.0, 0.0, np.pi / 2)),
+    )
     bullet.move(body, (30.0, 0.0, np.pi / 2))
     assert bullet.clearance(body, other) == pytest.approx(30.0 - BLOCK.size[1], abs=1e-3)
     bullet.move(body, (-30.0, 0.0, np.pi / 2))
@@ -107,7 +110,9 @@ def test_moving_all_is_moving_each(bullet):
 
 
 def test_rays_know_of_bodies_moved_together(bullet):
-    bodies = np.array([bullet.add(BLOCK, (20.0, 0.0, np.pi / 2)), bullet.add(BLOCK, (30.0, 0.0, np.pi / 2))])
+    bodies = np.array(
+        [bullet.add(BLOCK, (20.0, 0.0, np.pi / 2)), bullet.add(BLOCK, (30.0, 0.0, np.pi / 2))]
+    )
     bullet.move_all(bodies, np.array([[40.0, 0.0, np.pi / 2], [10.0, 0.0, np.pi / 2]]))
     ranges, ids = bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)
     assert ids.tolist() == [bodies[1]]
@@ -137,15 +142,21 @@ def within_silhouettes(picture):
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.15, -0.2])
-@pytest.mark.parametrize("camera", [FRONT_CAMERA, PinholeCamera(320, 180, 1.2, (0.5, 0.3, -0.2), 0.1, 0.05)])
+@pytest.mark.parametrize(
+    "camera", [FRONT_CAMERA, PinholeCamera(320, 180, 1.2, (0.5, 0.3, -0.2), 0.1, 0.05)]
+)
 def test_the_picture_agrees_with_rays_through_its_pixels(bullet, heading, camera):
-    """Camera and LiDAR see the same world, except at silhouettes, where a pixel is part one, part other."""
+    """Camera and LiDAR see the same world, except at silhouettes, where a pixel is part one, part
+    other.
+    """
     bodies = street(bullet)
     sensor = Frame.mounted((1.0, -0.5, heading), LIDAR_POSITION)
     picture = bullet.body_ids(camera, sensor)
     u, v = np.meshgrid(np.arange(320) + 0.5, np.arange(180) + 0.5)
     rays = camera.rays(np.stack([u.ravel(), v.ravel()], axis=-1))
-    turn = np.array([[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]])
+    turn = np.array(
+        [[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]]
+    )
     eye = sensor.origin + turn @ camera.position
     _, ids = bullet.cast(eye, (rays / np.linalg.norm(rays, axis=1)[:, None]) @ turn.T, 110.0)
     cast = np.where(ids == bullet.ground, NO_BODY, ids).reshape(180, 320)

@@ -5,8 +5,7 @@ from care_sim.core.frames import Frame
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.bullet_clients import borrow, give_back
-from care_sim.world.quiet_pybullet import pybullet
+from care_sim.world.bullet_clients import borrow, give_back, pybullet
 
 AHEAD = np.array([[1.0, 0.0, 0.0], [0.9, 0.0, -np.sqrt(0.19)]])
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)

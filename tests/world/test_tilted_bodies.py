@@ -17,12 +17,18 @@ FORWARD = np.array([[1.0, 0.0, 0.0]])
 def test_a_body_stands_at_any_height(bullet):
     bus = bullet.add(CATALOGUE["bus"], Frame(30.0, 0.0, 100.0, 0.0))
     heights = [99.9, 100.1, 103.4, 103.5]
-    assert [bullet.cast([0.0, 0.0, z], FORWARD, 50.0)[1][0] for z in heights] == [NO_BODY, bus, bus, NO_BODY]
+    assert [bullet.cast([0.0, 0.0, z], FORWARD, 50.0)[1][0] for z in heights] == [
+        NO_BODY,
+        bus,
+        bus,
+        NO_BODY,
+    ]
 
 
 def test_a_pitched_box_presents_its_slanting_front(bullet):
-    """A cube of 2 m, nose down by 0.2 rad about the middle of its bottom face, which lies at the height of a
-    level ray: the ray meets the front face, 1 m along the slope, nearer by 1 / cos(0.2).
+    """A cube of 2 m, nose down by 0.2 rad about the middle of its bottom face, which lies at the
+    height of a level ray: the ray meets the front face, 1 m along the slope, nearer by 1 /
+    cos(0.2).
     """
     cube = sized("cube", None, (2.0, 2.0, 2.0))
     body = bullet.add(cube, Frame(10.0, 0.0, 5.0, np.pi, pitch=0.2))
@@ -51,7 +57,11 @@ def test_a_frame_without_tilt_puts_a_body_where_a_pose_does(bullet):
 
 def test_a_tilted_camera_and_tilted_rays_see_the_same(bullet):
     sensor = Frame(1.0, -0.5, 1.84, 0.15, roll=0.08, pitch=-0.06)
-    for name, pose in {"car": (12, 3, 0.1), "truck": (30, 5, 0.4), "pedestrian": (9, -1, 1.5)}.items():
+    for name, pose in {
+        "car": (12, 3, 0.1),
+        "truck": (30, 5, 0.4),
+        "pedestrian": (9, -1, 1.5),
+    }.items():
         bullet.add(CATALOGUE[name], pose)
     picture = bullet.body_ids(FRONT_CAMERA, sensor)
     u, v = np.meshgrid(np.arange(320) + 0.5, np.arange(180) + 0.5)
@@ -77,7 +87,8 @@ def test_a_world_without_ground_returns_nothing_from_below():
 def test_a_body_of_any_size_fills_its_box_and_stays_within_it(label, size):
     kind = sized("thing", label, size)
     low, high = (
-        np.array([np.array(part.centre) + sign * np.array(part.size) / 2 for part in kind.parts]) for sign in (-1, 1)
+        np.array([np.array(part.centre) + sign * np.array(part.size) / 2 for part in kind.parts])
+        for sign in (-1, 1)
     )
     half = np.array([size[0] / 2, size[1] / 2, 0.0])
     assert np.all(low >= -half - 1e-9)
@@ -89,6 +100,8 @@ def test_a_body_of_any_size_fills_its_box_and_stays_within_it(label, size):
 
 def test_the_catalogue_s_own_size_gives_the_catalogue_s_own_parts():
     for label in CLASSES:
-        for mine, theirs in zip(sized("x", label, CATALOGUE[label].size).parts, CATALOGUE[label].parts, strict=True):
+        for mine, theirs in zip(
+            sized("x", label, CATALOGUE[label].size).parts, CATALOGUE[label].parts, strict=True
+        ):
             assert mine.size == pytest.approx(theirs.size)
             assert mine.centre == pytest.approx(theirs.centre)

@@ -76,7 +76,9 @@ def test_a_follower_does_not_hit_a_braking_ego():
     traffic = Traffic((1, -1), 0, 3.5, 14.0)
     ego = traffic.add_ego(0.0, 8.0, EGO)
     follower = traffic.add_driver(-22.5, 0, 8.0, CAR)
-    poses = drive(traffic, 8.0, ego, follower, ego=ego, acceleration=lambda time: 0.0 if time < 1 else -5.0)
+    poses = drive(
+        traffic, 8.0, ego, follower, ego=ego, acceleration=lambda time: 0.0 if time < 1 else -5.0
+    )
     gaps = poses[:, 0, 0] - poses[:, 1, 0] - (EGO.size[0] + CAR.size[0]) / 2
     assert gaps.min() > 0.5
     assert ego.speed == pytest.approx(0.0, abs=1e-9)
@@ -117,8 +119,8 @@ def test_two_roads_with_the_same_traffic_agree_to_the_last_bit():
 
 
 def mixed():
-    """Ego, a follower, an oncoming driver and two lane changes, one of them oncoming; the ego brakes on the way, and
-    the follower starts in the middle of its lane but not along it.
+    """Ego, a follower, an oncoming driver and two lane changes, one of them oncoming; the ego
+    brakes on the way, and the follower starts in the middle of its lane but not along it.
     """
     road = Traffic((1, 1, -1, -1), 0, 3.5, 14.0)
     ego = road.add_ego(0.0, 8.0, EGO)
@@ -127,7 +129,9 @@ def mixed():
     for x, start, target in ((25.0, 1, 0), (60.0, 3, 2)):
         drivers.append(road.add_parked_driver(x, start, CAR, 8.0))
         drivers[-1].pull_out(target)
-    return drive(road, 9.0, ego, *drivers, ego=ego, acceleration=lambda time: -2.0 if 1 < time < 3 else 0.5)
+    return drive(
+        road, 9.0, ego, *drivers, ego=ego, acceleration=lambda time: -2.0 if 1 < time < 3 else 0.5
+    )
 
 
 def test_all_vehicles_go_as_those_of_highway_env_to_the_last_bit(monkeypatch):

@@ -5,7 +5,9 @@ from hypothesis import strategies as st
 
 from care_sim.world.walker import Walk
 
-RUN = Walk(start=(10.0, -4.0), heading=np.pi / 2, speed=2.5, acceleration=5.0, length_m=8.0, starts_s=1.0)
+RUN = Walk(
+    start=(10.0, -4.0), heading=np.pi / 2, speed=2.5, acceleration=5.0, length_m=8.0, starts_s=1.0
+)
 walks = st.builds(
     Walk,
     start=st.just((0.0, 0.0)),
@@ -32,14 +34,18 @@ def test_pose_goes_along_the_heading():
     assert RUN.pose(60.0)[:2] == pytest.approx((10.0, 4.0))
 
 
-@pytest.mark.parametrize(("distance", "duration"), [(0.0, 0.0), (0.1, 0.2), (0.625, 0.5), (3.125, 1.5)])
+@pytest.mark.parametrize(
+    ("distance", "duration"), [(0.0, 0.0), (0.1, 0.2), (0.625, 0.5), (3.125, 1.5)]
+)
 def test_durations_worked_by_hand(distance, duration):
     assert RUN.duration_to(distance) == pytest.approx(duration)
 
 
 @given(walks, st.floats(0, 50))
 def test_a_duration_is_when_the_distance_is_covered(walk, distance):
-    assert walk.covered(walk.starts_s + walk.duration_to(distance)) == pytest.approx(distance, abs=1e-6)
+    assert walk.covered(walk.starts_s + walk.duration_to(distance)) == pytest.approx(
+        distance, abs=1e-6
+    )
 
 
 @given(walks, st.floats(0, 10))

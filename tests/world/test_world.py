@@ -15,7 +15,9 @@ def world():
     made.close()
 
 
-@pytest.mark.parametrize(("duration", "steps"), [(0.05, 1), (0.1, 2), (0.3, 6), (0.5, 10), (6.0, 120)])
+@pytest.mark.parametrize(
+    ("duration", "steps"), [(0.05, 1), (0.1, 2), (0.3, 6), (0.5, 10), (6.0, 120)]
+)
 def test_whole_steps(duration, steps):
     assert whole_steps(duration) == steps
 
@@ -42,7 +44,9 @@ def test_odometry_reports_what_braking_really_does(world):
 
 
 def test_a_collision_is_told_with_the_speed_of_the_first_contact(world):
-    """The bus stands 7 m before the bumper; braking at 5 m/s^2 from 10 m/s leaves sqrt(30) m/s there."""
+    """The bus stands 7 m before the bumper; braking at 5 m/s^2 from 10 m/s leaves sqrt(30) m/s
+    there.
+    """
     world.add("bus", "bus", (2.04 + 7.0 + 11.19 / 2, 0.0, 0.0))
     passage = world.advance(-5.0, 1.5)
     assert passage.impact_speed_mps == pytest.approx(np.sqrt(30), abs=0.25)
@@ -79,7 +83,9 @@ def test_actors_follow_their_functions_in_picture_and_truth(world):
     walk = Walk((20.0, -5.0), np.pi / 2, 2.0, 100.0, 50.0, 0.5)
     person = world.add("person", "pedestrian", walk.pose)
     world.advance(0.0, 1.5)
-    assert world.boxes([person])[0] == pytest.approx([20, -5 + 1.98, 0.88, 0.73, 0.66, 1.76, np.pi / 2])
+    assert world.boxes([person])[0] == pytest.approx(
+        [20, -5 + 1.98, 0.88, 0.73, 0.66, 1.76, np.pi / 2]
+    )
     ranges, ids = world.bullet.cast([20.0, -20.0, 1.0], np.array([[0.0, 1.0, 0.0]]), 30.0)
     assert ids.tolist() == [person.body]
     assert ranges[0] == pytest.approx(20 - 5 + 1.98 - 0.6 * 0.73 / 2, abs=1e-3)
@@ -118,9 +124,9 @@ def test_what_comes_later_is_at_once_where_it_belongs(world):
     world.advance(0.0, 0.05)
     (late,) = world.actors
     assert world.boxes([late])[0, 0] == pytest.approx(30.0)
-    assert world.bullet.cast(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0, 0.0]]), 50.0)[0] == pytest.approx(
-        30.0 - late.kind.size[0] / 2, abs=0.01
-    )
+    assert world.bullet.cast(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0.0, 0.0]]), 50.0)[
+        0
+    ] == pytest.approx(30.0 - late.kind.size[0] / 2, abs=0.01)
 
 
 def test_an_unknown_kind_of_body_is_named(world):

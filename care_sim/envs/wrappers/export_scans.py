@@ -21,7 +21,7 @@ from care_sim.core.frames import Floats
 from care_sim.core.types import CLASSES, Action
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.watcher import Moment
+from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
 UNITS = (
@@ -69,12 +69,12 @@ class ExportScans(Watching):
         self._folder.mkdir(parents=True, exist_ok=True)
         self._describe(None)
 
-    def keep(self, moment: Moment) -> None:
+    def keep(self, watched: WatchedKeyframe) -> None:
         """Write the two files of a keyframe."""
-        stem = f"{moment.frame.index:03d}"
-        cells, points = moment.returned(self._closed_loop.rig.grid)
-        self._write_cloud(self._folder / f"{stem}.pcd", points, cells, moment.shares.ravel()[cells])
-        write_text(self._folder / f"{stem}.json", json.dumps(described(moment)) + "\n")
+        stem = f"{watched.frame.index:03d}"
+        cells, points = watched.returned(self._closed_loop.rig.grid)
+        self._write_cloud(self._folder / f"{stem}.pcd", points, cells, watched.shares.ravel()[cells])
+        write_text(self._folder / f"{stem}.json", json.dumps(described(watched)) + "\n")
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Write the result."""
@@ -103,20 +103,20 @@ class ExportScans(Watching):
                 raise OSError(errno.EIO, reason, str(file))
 
 
-def described(moment: Moment) -> dict[str, Any]:
+def described(watched: WatchedKeyframe) -> dict[str, Any]:
     """What stood around a scan, as plain data; see `ExportScans`."""
-    stance, frame = moment.stance, moment.frame
-    sensor, tracks = stance.sensor, stance.belief.tracks
-    classes = [None if label is None else CLASSES[label] for label in stance.labels]
+    situation, frame = watched.situation, watched.frame
+    sensor, tracks = situation.sensor, situation.belief.tracks
+    classes = [None if label is None else CLASSES[label] for label in situation.labels]
     columns = zip(tracks.ids, tracks.classes, tracks.boxes, tracks.velocities, strict=True)
     return {
         "keyframe": frame.index,
         "time_s": frame.time_s,
         "sensor_in_world": [sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.pitch, sensor.roll],
-        "ego": stance.ego.tolist(),
+        "ego": situation.ego.tolist(),
         "bodies": [
             {"name": name, "class": label, "box": box.tolist()}
-            for name, label, box in zip(stance.names, classes, stance.bodies, strict=True)
+            for name, label, box in zip(situation.names, classes, situation.bodies, strict=True)
         ],
         "tracks": [
             {"id": int(number), "class": CLASSES[label], "box": box.tolist(), "velocity": velocity.tolist()}

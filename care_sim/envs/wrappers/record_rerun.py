@@ -15,7 +15,7 @@ from care_sim.base.text import shown
 from care_sim.core.types import Action
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.watcher import Moment
+from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
 if TYPE_CHECKING:
@@ -86,10 +86,10 @@ class RecordRerun(Watching):
         if self._episode is not None:
             self._episode.look(loop)
 
-    def keep(self, moment: Moment) -> None:
+    def keep(self, watched: WatchedKeyframe) -> None:
         """Log the keyframe."""
         if self._episode is not None:
-            self._episode.keep(moment)
+            self._episode.keep(watched)
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Finish the episode, and the file if it is its own."""

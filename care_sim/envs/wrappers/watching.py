@@ -12,7 +12,7 @@ from care_sim.base.text import shown
 from care_sim.core.types import Action
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.watcher import Moment, Witness
+from care_sim.loops.watcher import EpisodeWatcher, WatchedKeyframe
 from care_sim.policies.base import Policy
 
 
@@ -31,29 +31,29 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
             raise InvalidInput(f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}")
         super().__init__(env)
         self._closed_loop, self._policy = inner, policy
-        self._witness: Witness | None = None
+        self._watcher: EpisodeWatcher | None = None
         self._begun, self._episodes = False, 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the one before, if it was not played to its end, is closed as it is."""
         self._leave(None)
         answer = super().reset(seed=seed, options=options)
-        self._witness = Witness(self._closed_loop.loop, self._closed_loop.conditions.camera_confidence)
+        self._watcher = EpisodeWatcher(self._closed_loop.loop, self._closed_loop.conditions.camera_confidence)
         return answer
 
     def step(self, action: Action) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Play a keyframe and keep its moment."""
-        if self._witness is None:
+        """Play a keyframe and keep its record."""
+        if self._watcher is None:
             return super().step(action)
         loop = self._closed_loop.loop
         if not self._begun:
             self.begin(loop, self._episodes)
             self._begun, self._episodes = True, self._episodes + 1
-        stance = self._witness.stance()
+        situation = self._watcher.situation()
         self.look(loop)
         answer = super().step(action)
         demand = self._policy.demanded if self._policy is not None else None
-        self.keep(self._witness.moment(stance, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]))
+        self.keep(self._watcher.watched(situation, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]))
         if answer[2] or answer[3]:
             self._leave(answer[4].get("outcome"))
         return answer
@@ -66,7 +66,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
             super().close()
 
     def _leave(self, outcome: Mapping[str, Any] | None) -> None:
-        begun, self._begun, self._witness = self._begun, False, None
+        begun, self._begun, self._watcher = self._begun, False, None
         if begun:
             self.end(outcome)
 
@@ -78,7 +78,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         """A keyframe is about to be played."""
 
     @abstractmethod
-    def keep(self, moment: Moment) -> None:
+    def keep(self, watched: WatchedKeyframe) -> None:
         """A keyframe was played."""
 
     @abstractmethod

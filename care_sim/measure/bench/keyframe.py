@@ -10,7 +10,7 @@ from care_sim.measure.bench.timing import timed
 from care_sim.perception.proxy import ReturnsDetector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture
-from care_sim.sensors.engines.engine import Bullet
+from care_sim.sensors.engines.bullet import Bullet
 from care_sim.sensors.engines.fast import Fast
 from care_sim.sensors.lidar import Lidar
 from care_sim.study.episode_config import EpisodeConfig

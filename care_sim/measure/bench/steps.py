@@ -16,7 +16,7 @@ from care_sim.base.quiet_output import STANDARD_OUTPUT, silenced
 from care_sim.core.conditions import DEFAULTS
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.driven import Environment, driven
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import ENVIRONMENTS
 
 DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"

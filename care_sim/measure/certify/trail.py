@@ -140,5 +140,5 @@ def _filmed(loop: Any) -> tuple[Any, ...]:
 def _detected(env: Any) -> tuple[Any, ...]:
     if isinstance(env, ClosedLoopEnv):
         return env.keyframes[-1].detected, env.keyframes[-1].braking
-    found = env.exposures[-1].detections
+    found = env.keyframes[-1].detections
     return found.classes, found.boxes, found.returns

@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.sensors.engines.engine import Bullet, RayEngine
+from care_sim.sensors.engines import RayEngine
+from care_sim.sensors.engines.bullet import Bullet
 from care_sim.world.bodies import BodyKind, Triple
 from care_sim.world.bullet import BulletWorld
 
@@ -45,7 +46,7 @@ class Millimetres:
             self._world.move(body, _far(frame))
 
     def cast(self, sensor: Frame, cells: Cells) -> Answers:
-        """Ranges in metres, and body ids; see `care_sim.sensors.engines.engine.RayEngine`."""
+        """Ranges in metres, and body ids; see `care_sim.sensors.engines.RayEngine`."""
         ranges, ids = self._rays.cast(_far(sensor), cells)
         return ranges / MM, ids
 

@@ -11,10 +11,11 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.parity.answers import Answers, Millimetres
 from care_sim.measure.parity.scenes import AWAY
-from care_sim.sensors.engines.engine import ENGINES, Bullet
+from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.engines.bullet import Bullet
 from care_sim.world.bodies import BodyKind, Part
+from care_sim.world.body_tables import SHAPES, Primitives
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.primitives import SHAPES, Primitives
 
 NAME = "bullet in millimetres"
 _UNSEEN = BodyKind("unseen", None, (1.0, 1.0, 1.0), (Part("box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), (0.5, 0.5, 0.5)),))
@@ -28,7 +29,7 @@ class Exact(Bullet):
         self._bodies, self._exact = 0, Millimetres([], grid)
 
     def cast(self, sensor: Frame, cells: Cells) -> Answers:
-        """Ranges and body ids; see `care_sim.sensors.engines.engine.RayEngine`."""
+        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
         known = self._world.primitives
         if self._bodies != len(known.poses):
             self.close()

@@ -12,9 +12,9 @@ from care_sim.measure.bench.driven import driven
 from care_sim.measure.parity.answers import Millimetres
 from care_sim.measure.parity.pictures import Pictures
 from care_sim.measure.parity.scenes import AWAY
-from care_sim.measure.parity.tally import Tally, groups
+from care_sim.measure.parity.tally import AgreementCounts, groups
 from care_sim.measure.parity.verdicts import Engines, compare
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 
 POLICY, BUDGET = "care", 0.1
@@ -25,7 +25,7 @@ POLICY, BUDGET = "care", 0.1
 class Compared:
     """Verdicts on every ray of the full scan, and the pictures of the camera, of every keyframe."""
 
-    rays: Tally = field(default_factory=Tally)
+    rays: AgreementCounts = field(default_factory=AgreementCounts)
     pictures: Pictures = field(default_factory=Pictures)
 
 
@@ -61,7 +61,7 @@ def _exact(loop: ClosedLoop) -> Millimetres:
     return Millimetres([world.ego_kind, *(actor.kind for actor in world.actors)], loop.rig.grid)
 
 
-def _compare_scans(loop: ClosedLoop, engines: Engines, exact: Millimetres, seed: int, tally: Tally) -> None:
+def _compare_scans(loop: ClosedLoop, engines: Engines, exact: Millimetres, seed: int, tally: AgreementCounts) -> None:
     world = loop.world
     poses = (actor.pose_at(world.time) for actor in world.actors)
     frames = [AWAY, *(Frame(x, y, 0.0, yaw) for x, y, yaw in poses)]

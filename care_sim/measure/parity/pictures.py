@@ -8,7 +8,7 @@ import numpy as np
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import Picture
-from care_sim.sensors.engines.engine import Engine
+from care_sim.sensors.engines import Engine
 from care_sim.world.bullet import NO_BODY
 
 

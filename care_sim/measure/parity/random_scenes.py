@@ -6,16 +6,16 @@ from contextlib import closing
 from care_sim.core.grid import AngularGrid
 from care_sim.measure.parity.answers import Millimetres
 from care_sim.measure.parity.scenes import GRIDS, SCENES_A_CAST, draw_bodies, draw_scene
-from care_sim.measure.parity.tally import Tally, groups
+from care_sim.measure.parity.tally import AgreementCounts, groups
 from care_sim.measure.parity.verdicts import Engines, compare
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet import BulletWorld
 
 
-def random_scenes(seed: int, number: int, done: Callable[[int], None]) -> Tally:
+def random_scenes(seed: int, number: int, done: Callable[[int], None]) -> AgreementCounts:
     """Verdicts on the rays of the first `number` scenes of a seed; `done` hears how many are compared."""
-    tally = Tally()
+    tally = AgreementCounts()
     for first in range(0, number, SCENES_A_CAST):
         some = range(first, min(first + SCENES_A_CAST, number))
         compare_scenes(seed, some, tally)
@@ -23,7 +23,7 @@ def random_scenes(seed: int, number: int, done: Callable[[int], None]) -> Tally:
     return tally
 
 
-def compare_scenes(seed: int, numbers: range, tally: Tally) -> None:
+def compare_scenes(seed: int, numbers: range, tally: AgreementCounts) -> None:
     """Compare scenes that share their bodies."""
     cast = numbers.start // SCENES_A_CAST
     kinds, grid = draw_bodies(seed, cast), GRIDS[cast % len(GRIDS)]
@@ -40,7 +40,7 @@ def _compare_scene(
     kinds: tuple[BodyKind, ...],
     grid: AngularGrid,
     stage: tuple[BulletWorld, list[int], Engines, Millimetres],
-    tally: Tally,
+    tally: AgreementCounts,
 ) -> None:
     world, bodies, engines, exact = stage
     scene = draw_scene(seed, number, kinds, grid)

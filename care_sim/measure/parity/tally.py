@@ -28,7 +28,7 @@ def _family(kind: BodyKind) -> int:
     return 1 if all(round_parts) else 2 if any(round_parts) else 0
 
 
-class Tally:
+class AgreementCounts:
     """Verdicts on all rays against both references."""
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from care_sim.core.frames import Frame, Integers
 from care_sim.core.grid import Cells
 from care_sim.measure.parity.answers import Answers, aside, same
-from care_sim.sensors.engines.engine import RayEngine
+from care_sim.sensors.engines import RayEngine
 
 VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
 """Grazing: of rays a micrometre aside `fast` gives some the reference's answer, some its own. Lost: it does not, but

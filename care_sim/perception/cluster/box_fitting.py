@@ -1,7 +1,8 @@
 """The sides of a body that its points show: the rectangle that fits their corner.
 
-L-shape fitting by search, closeness criterion: Zhang, Xu, Dong, Dolan, "Efficient L-shape fitting for vehicle
-detection using laser scanners", IEEE Intelligent Vehicles Symposium 2017, Algorithms 2 and 4.
+L-shape fitting by search, closeness criterion: Zhang, Xu, Dong, Dolan, "Efficient L-shape fitting
+for vehicle detection using laser scanners", IEEE Intelligent Vehicles Symposium 2017, Algorithms 2
+and 4.
 """
 
 from dataclasses import dataclass
@@ -16,13 +17,15 @@ ON_THE_SIDE_M = 0.02
 """Nearer to a side no point counts more: the noise of a range."""
 
 DECIMALS = 6
-"""Candidates whose scores agree in so many are equal, whatever the last bits of a processor, and the first is taken."""
+"""Candidates whose scores agree in so many are equal, whatever the last bits of a processor, and
+the first is taken.
+"""
 
 
 @dataclass(frozen=True)
 class Sides:
-    """A rectangle in plan: `axes` (2, 2) unit vectors in rows, `low` and `high` (2,) its bounds along them, metres
-    from the sensor.
+    """A rectangle in plan: `axes` (2, 2) unit vectors in rows, `low` and `high` (2,) its bounds
+    along them, metres from the sensor.
     """
 
     axes: Floats
@@ -41,7 +44,9 @@ class Sides:
 
     @property
     def outside(self) -> Floats:
-        """(2,) how far the sensor is off the rectangle along each axis; 0 where it is level with it."""
+        """(2,) how far the sensor is off the rectangle along each axis; 0 where it is level with
+        it.
+        """
         return np.maximum(np.maximum(self.low, -self.high), 0.0)
 
     @property
@@ -66,9 +71,16 @@ def fit_sides(plan: Floats) -> Sides:
 
 
 def _closeness(along: Floats) -> Floats:
-    """(h,) the sum over the points of 1 / distance to the nearer of the two shown sides; `along` is (h, 2, n)."""
-    to_low, to_high = along - along.min(axis=2, keepdims=True), along.max(axis=2, keepdims=True) - along
-    to_lows, to_highs = (np.round(np.linalg.norm(one, axis=2), DECIMALS) for one in (to_low, to_high))
+    """(h,) the sum over the points of 1 / distance to the nearer of the two shown sides; `along` is
+    (h, 2, n).
+    """
+    to_low, to_high = (
+        along - along.min(axis=2, keepdims=True),
+        along.max(axis=2, keepdims=True) - along,
+    )
+    to_lows, to_highs = (
+        np.round(np.linalg.norm(one, axis=2), DECIMALS) for one in (to_low, to_high)
+    )
     low_is_shown = to_lows <= to_highs
     distance = np.where(low_is_shown[..., None], to_low, to_high).min(axis=1)
     return np.asarray((1.0 / np.maximum(distance, ON_THE_SIDE_M)).sum(axis=1))

@@ -1,4 +1,6 @@
-"""A detector that sees points only: the road removed, DBSCAN, boxes on the shown sides, classes by size."""
+"""A detector that sees points only: the road removed, DBSCAN, boxes on the shown sides, classes by
+size.
+"""
 
 from dataclasses import dataclass
 
@@ -15,8 +17,10 @@ from care_sim.perception.cluster.grouping import clusters_of
 from care_sim.perception.cluster.road import ROAD_M, heights_above, road_plane
 from care_sim.perception.cluster.size_classes import MOST_MISFIT, Guess, best_guess
 
-OWN_CAR_M = 2.0
-"""Nearer to the sensor than this there is the roof that carries it: of a recorded nuScenes sweep a quarter."""
+OWN_ROOF_M = 2.0
+"""Nearer to the sensor than this there is the roof that carries it: of a recorded nuScenes sweep a
+quarter.
+"""
 
 _GRID = AngularGrid()
 
@@ -31,18 +35,20 @@ class _Candidate:
 
 
 class ClusterDetector:
-    """Classical detection in four steps (`road`, `clusters`, `sides`, `sizes`), with nothing learned.
+    """Classical detection in four steps (`road`, `clusters`, `sides`, `sizes`), with nothing
+    learned.
 
-    `grid` tells how far apart neighbouring points are. A cluster counts from three points on, as for the proxy. The
-    confidence is 1 - 1 / sqrt(n): an average of n points is that much surer than one. The order of the points does
-    not matter. Needs Open3D. Raises MissingExtra.
+    `grid` tells how far apart neighbouring points are. A cluster counts from three points on, as
+    for the proxy. The confidence is 1 - 1 / sqrt(n): an average of n points is that much surer than
+    one. The order of the points does not matter. Needs Open3D. Raises MissingExtra.
 
-    Measured with every cell fired on one body of the catalogue alone, 12 headings a range, found within 2 m in its
-    class: cars, trucks and buses 99% to 25 m and 97% from 30 to 45 m; pedestrians 98% to 20 m, 58% at 25 and 30 m
-    (3 returns), none beyond; bicycles 93% to 20 m, 25% at 25 and 30 m (most are taken for pedestrians), none beyond.
-    Amid the bodies of six generated streets, of objects with three returns or more: 93% to 15 m, 59% from there to
-    30 m, 44% from there to 50 m (what is seen of a car in a parked row is taken for a pedestrian or bicycle); of 29
-    detections a keyframe 16 match no such object.
+    Measured with every cell fired on one body of the catalogue alone, 12 headings a range, found
+    within 2 m in its class: cars, trucks and buses 99% to 25 m and 97% from 30 to 45 m; pedestrians
+    98% to 20 m, 58% at 25 and 30 m (3 returns), none beyond; bicycles 93% to 20 m, 25% at 25 and 30
+    m (most are taken for pedestrians), none beyond. Amid the bodies of six generated streets, of
+    objects with three returns or more: 93% to 15 m, 59% from there to 30 m, 44% from there to 50 m
+    (what is seen of a car in a parked row is taken for a pedestrian or bicycle); of 29 detections a
+    keyframe 16 match no such object.
     """
 
     def __init__(self, grid: AngularGrid = _GRID):
@@ -55,16 +61,23 @@ class ClusterDetector:
         Raises InvalidInput for points that are not (P, 3) finite numbers.
         """
         points = _in_order(points)
-        points = points[np.hypot(points[:, 0], points[:, 1]) > OWN_CAR_M]
+        points = points[np.hypot(points[:, 0], points[:, 1]) > OWN_ROOF_M]
         plane = road_plane(points, sensor_height_m)
         heights = heights_above(points, plane)
         above = heights > ROAD_M
         standing, heights = points[above], heights[above]
-        clusters = [rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS]
-        found = [self._candidate(standing[rows], heights[rows].max(), plane, sensor_height_m) for rows in clusters]
+        clusters = [
+            rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS
+        ]
+        found = [
+            self._candidate(standing[rows], heights[rows].max(), plane, sensor_height_m)
+            for rows in clusters
+        ]
         return _detections(_one_a_place([one for one in found if one.guess.misfit <= MOST_MISFIT]))
 
-    def _candidate(self, points: Floats, top_m: float, plane: Floats, sensor_height_m: float) -> _Candidate:
+    def _candidate(
+        self, points: Floats, top_m: float, plane: Floats, sensor_height_m: float
+    ) -> _Candidate:
         sides = fit_sides(points[:, :2])
         place = sides.middle @ sides.axes
         guess = best_guess(sides, top_m, plane @ [*place, 1.0], sensor_height_m, self._grid)
@@ -80,12 +93,15 @@ def _in_order(points: Floats) -> Floats:
 
 
 def _one_a_place(found: list[_Candidate]) -> list[_Candidate]:
-    """Two bodies do not share a place: points in the box of a candidate that has more of them are its own.
+    """Two bodies do not share a place: points in the box of a candidate that has more of them are
+    its own.
 
     Such are a windscreen behind a bonnet, and a side seen too obliquely to hang together.
     """
     kept: list[_Candidate] = []
-    for candidate in sorted(found, key=lambda one: (-one.points, np.round(np.hypot(*one.place), DECIMALS))):
+    for candidate in sorted(
+        found, key=lambda one: (-one.points, np.round(np.hypot(*one.place), DECIMALS))
+    ):
         if not any(_holds(other.guess.box, candidate.place) for other in kept):
             kept.append(candidate)
     return kept

@@ -1,4 +1,6 @@
-"""Which points lie on the road: a robust plane, held close to where the car's own stance says that the road is."""
+"""Which points lie on the road: a robust plane, held close to where the car's own stance says that
+the road is.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,10 +9,12 @@ from scipy.optimize import least_squares
 from care_sim.core.frames import Floats
 
 STEEPEST = 0.03
-"""The most by which the road may slope against the car's own plane: 1 degree of pitch, as under hard braking, and the
-bend of a road over 50 m."""
+"""The most by which the road may slope against the car's own plane: 1 degree of pitch, as under
+hard braking, and the bend of a road over 50 m."""
 SETTLING_M = 0.15
-"""The most by which the road beneath may lie off the nominal height of the sensor: springs, and a kerb climbed."""
+"""The most by which the road beneath may lie off the nominal height of the sensor: springs, and a
+kerb climbed.
+"""
 ROUGHNESS_M = 0.05
 """Noise of ranges and unevenness; what lies much further off the plane has next to no vote."""
 ROAD_M = 0.25
@@ -25,8 +29,9 @@ def heights_above(points: Floats, plane: Floats) -> Floats:
 def road_plane(points: Floats, sensor_height_m: float) -> Floats:
     """(3,) a, b, c of the road z = a x + b y + c in the sensor frame.
 
-    Least squares with Cauchy's loss over the points that could lie on the road; slope and offset are bounded, so
-    few or misleading points do little, and none give the level plane beneath the sensor. The fit turns with the points.
+    Least squares with Cauchy's loss over the points that could lie on the road; slope and offset
+    are bounded, so few or misleading points do little, and none give the level plane beneath the
+    sensor. The fit turns with the points.
     """
     level = np.array([0.0, 0.0, -sensor_height_m])
     low = points[_could_be_road(points, level)]
@@ -45,8 +50,8 @@ def road_plane(points: Floats, sensor_height_m: float) -> Floats:
 
 
 def _bounded(free: Floats) -> tuple[Floats, Floats]:
-    """(3,) a departure from the level plane, slope below STEEPEST whatever its direction and offset below SETTLING_M,
-    from three free numbers; and its derivatives (3, 3).
+    """(3,) a departure from the level plane, slope below STEEPEST whatever its direction and offset
+    below SETTLING_M, from three free numbers; and its derivatives (3, 3).
     """
     departure, derivatives = np.empty(3), np.zeros((3, 3))
     for part, most in ((slice(2), STEEPEST), (slice(2, 3), SETTLING_M)):

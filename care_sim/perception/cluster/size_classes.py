@@ -1,7 +1,7 @@
 """What a body may be, by the size of the sides that its points show.
 
-A typical size of a class says how long each shown side should look. A side that the scan does not resolve says only
-that the body is no smaller; the far sides follow from the typical size.
+A typical size of a class says how long each shown side should look. A side that the scan does not
+resolve says only that the body is no smaller; the far sides follow from the typical size.
 """
 
 from dataclasses import dataclass
@@ -15,33 +15,49 @@ from care_sim.perception.cluster.box_fitting import DECIMALS, Sides
 from care_sim.perception.cluster.grouping import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius
 from care_sim.world.bodies import CATALOGUE
 
-SPREAD = 0.1
-"""Standard deviation of sizes within a class, as a share: passenger cars are 3.7 to 5.5 m long, adults 1.5 to 2 m."""
+SIZE_SPREAD = 0.1
+"""Standard deviation of sizes within a class, as a share: passenger cars are 3.7 to 5.5 m long,
+adults 1.5 to 2 m.
+"""
 FIT_M = 0.1
-"""Standard deviation of a fitted side, beside what the grid leaves open: rounded corners, mirrors, a swung arm."""
+"""Standard deviation of a fitted side, beside what the grid leaves open: rounded corners, mirrors,
+a swung arm.
+"""
 MOST_MISFIT = 11.3
-"""No class: the misfit of a body of the class stays below in 99 of 100 cases (chi-squared, three dimensions)."""
+"""No class: the misfit of a body of the class stays below in 99 of 100 cases (chi-squared, three
+dimensions).
+"""
 
 _KINDS = [kind for kind in CATALOGUE.values() if kind.label in CLASSES]
 _CLASSES: Cells = np.array([CLASSES.index(kind.label or "") for kind in _KINDS] * 2)
 _SIZES: Floats = np.array([kind.size for kind in _KINDS])
 """Length, width, height."""
 _ALONG: Floats = np.concatenate([_SIZES, _SIZES[:, [1, 0, 2]]])
-"""(2k, 3) extents along both axes of the sides and up, of bodies heading along the first axis, then the second."""
+"""(2k, 3) extents along both axes of the sides and up, of bodies heading along the first axis, then
+the second.
+"""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """The best class for some sides: `label` into CLASSES, `box` (7,) in the sensor frame, `misfit`, chi-squared."""
+    """The best class for some sides: `label` into CLASSES, `box` (7,) in the sensor frame,
+    `misfit`, chi-squared.
+    """
 
     label: int
     box: Floats
     misfit: float
 
 
-def best_guess(sides: Sides, top_m: float, road_z: float, sensor_height_m: float, grid: AngularGrid) -> Guess:
-    """The class and box for `sides` whose highest point is `top_m` above the road, itself at `road_z`."""
-    seen = np.append(sides.spans + _hidden_ends(sides, grid), top_m + grid.row_height * sides.range_m / 2)
+def best_guess(
+    sides: Sides, top_m: float, road_z: float, sensor_height_m: float, grid: AngularGrid
+) -> Guess:
+    """The class and box for `sides` whose highest point is `top_m` above the road, itself at
+    `road_z`.
+    """
+    seen = np.append(
+        sides.spans + _hidden_ends(sides, grid), top_m + grid.row_height * sides.range_m / 2
+    )
     misfits = np.round(_misfits(sides, seen, sensor_height_m, grid), DECIMALS)
     best = int(np.argmin(misfits))
     return Guess(int(_CLASSES[best]), _completed(sides, seen, best, road_z), float(misfits[best]))
@@ -53,15 +69,19 @@ def _hidden_ends(sides: Sides, grid: AngularGrid) -> Floats:
 
 
 def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: AngularGrid) -> Floats:
-    """(2k,) sum of the squared deviations of `seen` (3,) from each typical size, in standard deviations.
+    """(2k,) sum of the squared deviations of `seen` (3,) from each typical size, in standard
+    deviations.
 
-    No side should look longer than the body is, nor shorter than the part of it that hangs together.
+    No side should look longer than the body is, nor shorter than the part of it that hangs
+    together.
     """
     range_m = sides.range_m
     steps = np.array([grid.column_width, grid.column_width, grid.row_height / np.sqrt(2)]) * range_m
-    shown = np.minimum(_ALONG, np.append(_hanging(sides, grid), sensor_height_m + range_m * np.tan(grid.top)))
+    shown = np.minimum(
+        _ALONG, np.append(_hanging(sides, grid), sensor_height_m + range_m * np.tan(grid.top))
+    )
     blurred = np.where(shown < _ALONG, cluster_radius(grid, range_m), 0.0)
-    variance = (SPREAD * _ALONG) ** 2 + FIT_M**2 + steps**2 / 6 + blurred**2
+    variance = (SIZE_SPREAD * _ALONG) ** 2 + FIT_M**2 + steps**2 / 6 + blurred**2
     deviation = np.maximum(seen - _ALONG, 0.0) + np.minimum(seen - shown, 0.0)
     return np.asarray((deviation**2 / variance).sum(axis=1))
 
@@ -69,24 +89,31 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: AngularGr
 def _hanging(sides: Sides, grid: AngularGrid) -> Floats:
     """(2,) how much of the side along each axis may be seen in one piece, metres.
 
-    At the range r, the points of a side that lies d off the sensor are r^2 / d columns apart; they hang together as
-    far as this is within the cluster radius.
+    At the range r, the points of a side that lies d off the sensor are r^2 / d columns apart; they
+    hang together as far as this is within the cluster radius.
     """
     off = sides.outside[::-1]
     farthest = np.maximum(np.sqrt(NEAR_RADIUS_M * off / grid.column_width), COLUMNS_APART * off)
-    return np.asarray(np.maximum(np.sqrt(np.maximum(farthest**2 - off**2, 0.0)) - sides.outside, 0.0))
+    return np.asarray(
+        np.maximum(np.sqrt(np.maximum(farthest**2 - off**2, 0.0)) - sides.outside, 0.0)
+    )
 
 
 def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
-    """(7,) the box on the shown sides: from the nearest end away from the sensor, or about the middle where the
-    sensor is level with the side. The heading is known but for half a turn: it points away from the sensor.
+    """(7,) the box on the shown sides: from the nearest end away from the sensor, or about the
+    middle where the sensor is level with the side. The heading is known but for half a turn: it
+    points away from the sensor.
     """
     extents = np.maximum(seen, _ALONG[which])
     half = extents[:2] / 2
-    along = np.where(sides.low > 0, sides.low + half, np.where(sides.high < 0, sides.high - half, sides.middle))
+    along = np.where(
+        sides.low > 0, sides.low + half, np.where(sides.high < 0, sides.high - half, sides.middle)
+    )
     centre = along @ sides.axes
     forward = which // len(_KINDS)
-    heading = sides.axes[forward] * (1.0 if np.round(sides.middle[forward], DECIMALS) >= 0 else -1.0)
+    heading = sides.axes[forward] * (
+        1.0 if np.round(sides.middle[forward], DECIMALS) >= 0 else -1.0
+    )
     length_width = extents[[forward, 1 - forward]]
     yaw = np.arctan2(heading[1], heading[0])
     return np.array([*centre, road_z + extents[2] / 2, *length_width, extents[2], yaw])

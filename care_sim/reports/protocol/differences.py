@@ -16,8 +16,8 @@ from care_sim.evaluation.scene_contrasts import (
     Ratio,
     SceneContrast,
     Tallies,
-    contrast,
     contrast_gap,
+    scene_contrast,
 )
 from care_sim.reports.protocol.rows import Plays
 from care_sim.study.task import REFERENCE
@@ -111,7 +111,7 @@ class Pair:
 
     def _contrast(self, plays: Plays, budget: float) -> SceneContrast | None:
         ours, theirs = (plays.tallies(policy, budget, self.within) for policy in self.policies)
-        return contrast(self.ratio, ours, theirs)
+        return scene_contrast(self.ratio, ours, theirs)
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class Third:
 
 
 def _among(ratio: Ratio, ours: Tallies, theirs: Tallies) -> Gap | None:
-    found = contrast(ratio, ours, theirs)
+    found = scene_contrast(ratio, ours, theirs)
     if found is None:
         return None
     return Gap(ratio, found.by_event.mean, found.by_event if found.scenes >= FEWEST_PAIRS else None)

@@ -11,7 +11,7 @@ from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.core.frames import Floats
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import Level, Ratio, Tallies, averaged, level
+from care_sim.evaluation.scene_contrasts import Ratio, RatioLevel, Tallies, averaged, ratio_level
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.evaluation.strata import thirds
 from care_sim.perception.listing import PROXY
@@ -115,9 +115,9 @@ class Plays:
             self._tallies[key] = averaged(self.seeds(*key))
         return self._tallies[key]
 
-    def level(self, ratio: Ratio, policy: str, budget: float, within: str = "") -> Level:
+    def level(self, ratio: Ratio, policy: str, budget: float, within: str = "") -> RatioLevel:
         """A measure over all scenes of the policy."""
-        return level(ratio, self.tallies(policy, budget, within))
+        return ratio_level(ratio, self.tallies(policy, budget, within))
 
     def delays(self, policy: str, budget: float, scene: str) -> Floats:
         """(floor seeds, events) censored TTFD in keyframes of a scene's events."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from care_sim.base.text import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.evaluation.strata import THIRDS
+from care_sim.evaluation.strata import SCENE_THIRDS
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.differences import FEWEST_SCENES, GAP, RANKINGS, Pair, Third
 from care_sim.reports.protocol.formatting import PAPER, whole, written
@@ -103,10 +103,10 @@ def _has_thirds(plays: Plays) -> bool:
 
 def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
     yield (f"{RANKINGS[column]} a keyframe",)
-    for name in reversed(THIRDS):
+    for name in reversed(SCENE_THIRDS):
         yield (f"{name} third", *(_mean_count(plays, column, name, budget) for budget in plays.budgets))
     for ratio in (OVERALL, FIRST_SIGHTING):
-        thirds = [Third(which, column, ratio) for which in (*reversed(THIRDS), GAP)]
+        thirds = [Third(which, column, ratio) for which in (*reversed(SCENE_THIRDS), GAP)]
         yield (thirds[0].heading,)
         for third in thirds:
             yield from _third_lines(plays, third)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 
 from care_sim.base.text import percent
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, level
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, ratio_level
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import contrast_tables
 from care_sim.reports.protocol.differences import RATIOS
@@ -101,7 +101,7 @@ def _of_full(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
 
 
 def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | None:
-    return level(ratio, {scene: tallies[scene] for scene in scenes}).by_event
+    return ratio_level(ratio, {scene: tallies[scene] for scene in scenes}).by_event
 
 
 def _deviation(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:

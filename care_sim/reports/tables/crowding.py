@@ -7,13 +7,13 @@ from care_sim.reports.cells import Played
 from care_sim.reports.contrasts import Contrast
 from care_sim.reports.formatting import interval, mean, median
 from care_sim.reports.table import Table
-from care_sim.scenarios.dense import PLACES
+from care_sim.scenarios.dense import VEHICLE_PLACES
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.row_reading import Key, key_of
 from care_sim.study.task import Row
 
 BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
-VEHICLES = range(len(PLACES) + 1)
+VEHICLES = range(len(VEHICLE_PLACES) + 1)
 POLICIES = ("all-camera", "care", "full")
 COLUMN = "scenario.vehicles"
 """The column of the rows that the study varies."""

@@ -1,1 +1,47 @@
-"""Engines that answer rays and pictures: Bullet, and the compiled one."""
+"""Engines: who answers which body a ray hits, how far away, and which body a pixel shows.
+
+`bullet` is the reference. `fast` is compiled and gives the same answers within the differences that
+`care-sim parity` measures.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from care_sim.base.checks import check_known
+from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.sensors.engines.bullet import Bullet
+from care_sim.sensors.engines.fast import Fast
+from care_sim.world.bullet import BulletWorld, PixelWindow
+
+
+class RayEngine(Protocol):
+    """Casts the rays of one grid at the bodies of one world."""
+
+    def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
+        """Fire `cells` (n,) from the frame `sensor`.
+
+        Returns ranges (n,) in metres, inf without a hit within the grid's reach, and body ids (n,),
+        NO_BODY where there is no hit.
+        """
+        ...
+
+
+class Engine(RayEngine, Protocol):
+    """Casts rays, and draws the bodies for cameras."""
+
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
+        """The id of the body that each pixel of a window of `camera` shows, NO_BODY where there is
+        none; see `care_sim.world.bullet.BulletWorld.body_ids`.
+        """
+        ...
+
+
+ENGINES: dict[str, Callable[[BulletWorld, AngularGrid], Engine]] = {"bullet": Bullet, "fast": Fast}
+"""Engine makers by name."""
+
+
+def check_engine(name: str) -> None:
+    """Raise InvalidInput for a name that is not an engine."""
+    check_known("engine", name, ENGINES)

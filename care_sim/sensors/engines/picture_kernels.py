@@ -1,9 +1,10 @@
 """Pictures of body ids, compiled: convex polyhedra drawn into a depth buffer.
 
-A ray through pixel (u, v), one metre long along the optical axis, meets the plane n . x = h of the camera's frame at
-the inverse depth (n . ray) / h, which is linear in u and v. What is seen of a polyhedron lies at the least of these
-among its faces towards the camera; its outline is where a face towards the camera meets one that is turned away.
-PyBullet's renderer samples column i at u = i and row j at v = j + 1, outlines included, and so does this.
+A ray through pixel (u, v), one metre long along the optical axis, meets the plane n . x = h of the
+camera's frame at the inverse depth (n . ray) / h, which is linear in u and v. What is seen of a
+polyhedron lies at the least of these among its faces towards the camera; its outline is where a
+face towards the camera meets one that is turned away. PyBullet's renderer samples column i at u = i
+and row j at v = j + 1, outlines included, and so does this.
 """
 
 import math
@@ -16,11 +17,13 @@ from care_sim.world.bullet import NO_BODY
 
 @compiled(error_model="numpy")
 def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untyped-def]
-    """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NO_BODY where none is.
+    """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NO_BODY where
+    none is.
 
-    `camera` is its place in the world (3,) and its axes forward, left and up (3, 3); `lens` its focal length and
-    principal point in pixels; `reach` the least and the greatest depth drawn in metres; `meshes` the tables
-    of `care_sim.world.bullet_shapes.Polyhedra`; `poses` (m, 7) of bodies by id.
+    `camera` is its place in the world (3,) and its axes forward, left and up (3, 3); `lens` its
+    focal length and principal point in pixels; `reach` the least and the greatest depth drawn in
+    metres; `meshes` the tables of `care_sim.world.polyhedra.Polyhedra`; `poses` (m, 7) of
+    bodies by id.
     """
     left, top, right, bottom = window
     corners, faces, edges, starts, owners = meshes
@@ -46,8 +49,8 @@ def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untype
 
 @compiled()
 def tally(ids):  # type: ignore[no-untyped-def]
-    """(n, 6) the bodies in a picture of ids in ascending order: id, left, top, right, bottom of the box that holds all
-    its pixels, and their number.
+    """(n, 6) the bodies in a picture of ids in ascending order: id, left, top, right, bottom of the
+    box that holds all its pixels, and their number.
     """
     highest = -1
     for body in ids.flat:
@@ -88,7 +91,9 @@ def _turn(x, y, z, w):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _rows(corners, turn, shift, lens, nearest):  # type: ignore[no-untyped-def]
-    """First row of a polyhedron and the one after its last; all rows when it reaches through the image plane."""
+    """First row of a polyhedron and the one after its last; all rows when it reaches through the
+    image plane.
+    """
     focal, _, middle = lens
     high, low, behind = math.inf, -math.inf, 0
     for corner in corners:
@@ -102,13 +107,16 @@ def _rows(corners, turn, shift, lens, nearest):  # type: ignore[no-untyped-def]
         return 0, 0
     if behind > 0:
         return 0, math.ceil(2 * middle)
-    return math.floor(min(max(high, 0.0), 2 * middle)) - 1, math.ceil(max(min(low, 2 * middle), 0.0))
+    return math.floor(min(max(high, 0.0), 2 * middle)) - 1, math.ceil(
+        max(min(low, 2 * middle), 0.0)
+    )
 
 
 @compiled(error_model="numpy")
 def _planes(faces, turn, shift, lens):  # type: ignore[no-untyped-def]
-    """(f, 4) what is added a column and a row to the inverse depth of each face, what that is at pixel (0, 0), and the
-    distance of the face before the camera, negative where it is turned towards it.
+    """(f, 4) what is added a column and a row to the inverse depth of each face, what that is at
+    pixel (0, 0), and the distance of the face before the camera, negative where it is turned
+    towards it.
     """
     focal, across, down = lens
     planes = np.empty((len(faces), 4))
@@ -123,7 +131,9 @@ def _planes(faces, turn, shift, lens):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _outline(planes, edges):  # type: ignore[no-untyped-def]
-    """The planes that are turned towards the camera, and the outline: lines (m, 3) that are positive inside."""
+    """The planes that are turned towards the camera, and the outline: lines (m, 3) that are
+    positive inside.
+    """
     lines, count = np.empty((len(edges), 3)), 0
     for one, other in edges:
         if planes[one, 3] < 0.0 <= planes[other, 3]:

@@ -1,7 +1,7 @@
 """Rays of a scan against the road and the parts of bodies, boxes, cylinders and spheres, compiled.
 
-A box is cut out by three slabs (Kay and Kajiya 1986), a cylinder by a tube and a slab. A ray that starts inside a
-solid does not enter it: Bullet's rays answer the same.
+A box is cut out by three slabs (Kay and Kajiya 1986), a cylinder by a tube and a slab. A ray that
+starts inside a solid does not enter it: Bullet's rays answer the same.
 """
 
 import math
@@ -12,17 +12,17 @@ from care_sim.base.compiled import compiled
 from care_sim.world.bullet import NO_BODY
 
 BOX, CYLINDER, SPHERE = range(3)
-"""Places in `care_sim.world.primitives.SHAPES`."""
+"""Places in `care_sim.world.body_tables.SHAPES`."""
 
 
 @compiled(error_model="numpy")
 def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-untyped-def]
     """Ranges (n,) of ascending `cells`, inf beyond `reach`, and body ids (n,), NO_BODY there.
 
-    `fan` is the grid's (smaller than its directions, and so nearer at hand); `road` is the world's up (3,) in the frame
-    of the sensor, its height and the body id of the plane z = 0 (NO_BODY without). `parts` are their shapes, half
-    extents and body ids, `stances` their centres and axes, `windows` their windows, both of
-    `care_sim.sensors.engines.windows`.
+    `fan` is the grid's (smaller than its directions, and so nearer at hand); `road` is the world's
+    up (3,) in the frame of the sensor, its height and the body id of the plane z = 0 (NO_BODY
+    without). `parts` are their shapes, half extents and body ids, `stances` their centres and axes,
+    `windows` their windows, both of `care_sim.sensors.engines.windows`.
     """
     shapes, halves, owners = parts
     centres, turns = stances
@@ -69,7 +69,9 @@ def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
-    """The first place in low..high of ascending `cells` that holds `cell` or a later one, else `high`."""
+    """The first place in low..high of ascending `cells` that holds `cell` or a later one, else
+    `high`.
+    """
     while low < high:
         middle = (low + high) // 2
         if cells[middle] < cell:
@@ -104,7 +106,9 @@ def _entry(solid, ray):  # type: ignore[no-untyped-def]
     shape, turn, half, (u, v, w) = solid
     x, y, z = _dot(turn[0], ray), _dot(turn[1], ray), _dot(turn[2], ray)
     if shape == BOX:
-        near, far = _common(_common(_slab(u, x, half[0]), _slab(v, y, half[1])), _slab(w, z, half[2]))
+        near, far = _common(
+            _common(_slab(u, x, half[0]), _slab(v, y, half[1])), _slab(w, z, half[2])
+        )
     elif shape == CYLINDER:
         near, far = _common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2]))
     else:
@@ -128,7 +132,9 @@ def _slab(start, along, half):  # type: ignore[no-untyped-def]
 
 @compiled(error_model="numpy")
 def _tube(u, v, x, y, radius):  # type: ignore[no-untyped-def]
-    """The stretch of a ray within `radius` of the z axis, from (u, v) along (x, y) in the plane across it."""
+    """The stretch of a ray within `radius` of the z axis, from (u, v) along (x, y) in the plane
+    across it.
+    """
     speed, cross = x * x + y * y, u * y - v * x
     inside = radius * radius * speed - cross * cross
     if speed == 0.0 or inside < 0.0:

@@ -12,12 +12,14 @@ MARGIN = 1
 
 @compiled()
 def seen_from(sensor, parts, poses, lattice):  # type: ignore[no-untyped-def]
-    """Parts in the frame of a sensor at `sensor`: x, y, z, yaw, roll, pitch of a `care_sim.core.frames.Frame`.
+    """Parts in the frame of a sensor at `sensor`: x, y, z, yaw, roll, pitch of a
+    `care_sim.core.frames.Frame`.
 
-    `parts` are their half extents, offsets and body ids, `lattice` the grid's columns, rows, top and row height.
-    Returns the world's up (3,), their centres (k, 3), their own axes (k, 3, 3), row i axis i, and their windows (k, 4):
-    first and last column and row of the angular rectangle of the box that holds each. The first column lies on the
-    grid, the last up to a turn beyond it; the first row lies below the last where a part covers none.
+    `parts` are their half extents, offsets and body ids, `lattice` the grid's columns, rows, top
+    and row height. Returns the world's up (3,), their centres (k, 3), their own axes (k, 3, 3), row
+    i axis i, and their windows (k, 4): first and last column and row of the angular rectangle of
+    the box that holds each. The first column lies on the grid, the last up to a turn beyond it; the
+    first row lies below the last where a part covers none.
     """
     halves, offsets, owners = parts
     centres, turns, up = _placed(sensor, offsets, owners, poses)
@@ -89,7 +91,9 @@ def _lay_corners(centre, axes, half, corners):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _spread(centre, corners):  # type: ignore[no-untyped-def]
-    """Azimuth of a centre, and how far its corners reach to the right (negative) and left of it, radians."""
+    """Azimuth of a centre, and how far its corners reach to the right (negative) and left of it,
+    radians.
+    """
     rightmost, leftmost, least, most = (1.0, 0.0), (1.0, 0.0), 0.0, 0.0
     for x, y, _ in corners:
         along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
@@ -104,7 +108,9 @@ def _spread(centre, corners):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _order(along, across):  # type: ignore[no-untyped-def]
-    """Grows from -2 to 2 as the direction of (along, across) turns from -pi to pi, at less cost than the angle."""
+    """Grows from -2 to 2 as the direction of (along, across) turns from -pi to pi, at less cost
+    than the angle.
+    """
     size = abs(along) + abs(across)
     share = across / size if size > 0.0 else 0.0
     return share if along >= 0.0 else math.copysign(2.0, across) - share
@@ -133,7 +139,9 @@ def _rows(corners, surrounds, lattice):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _nearest(corners):  # type: ignore[no-untyped-def]
-    """Distance in the x, y plane from the origin to a box that does not surround it: to the nearest of its edges."""
+    """Distance in the x, y plane from the origin to a box that does not surround it: to the nearest
+    of its edges.
+    """
     least = math.inf
     for n in range(8):
         for i in range(3):

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.annotated import Annotations, Sights
+from care_sim.sensors.annotated import Annotations, IdentifiedDetections
 from care_sim.sensors.camera import CAMERA_WIDTH
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 
@@ -55,7 +55,9 @@ def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCa
     return RecordedCamera(frame, float(intrinsic[0, 0]), (float(intrinsic[0, 2]), float(intrinsic[1, 2])))
 
 
-def projected_sights(cameras: tuple[RecordedCamera, ...], annotations: Annotations, shares: Floats) -> Sights:
+def projected_detections(
+    cameras: tuple[RecordedCamera, ...], annotations: Annotations, shares: Floats
+) -> IdentifiedDetections:
     """Boxes of the annotated objects that the pictures show: `shares` (n,) of each are visible.
 
     An object has a box in every picture in which its projected box, cut at the edges and times the visible share,
@@ -70,7 +72,7 @@ def projected_sights(cameras: tuple[RecordedCamera, ...], annotations: Annotatio
         columns = annotations.classes, confidence_of(pixels), boxes
         rows.append(_rows([column[seen] for column in columns], number))
         objects.append(annotations.objects[seen])
-    return Sights(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
+    return IdentifiedDetections(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
 
 
 def projected(camera: RecordedCamera, boxes: Floats) -> Floats:

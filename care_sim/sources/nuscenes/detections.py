@@ -18,7 +18,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.sensors.annotated import NOBODY, Annotations, Sights
+from care_sim.sensors.annotated import NOBODY, Annotations, IdentifiedDetections
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
@@ -59,7 +59,9 @@ class DetectionFile:
                 table = database.path("sample_data")
                 raise InvalidInput(f"{self.path}: a detection on {picture!r}, which is no keyframe of {table}")
 
-    def sights(self, cameras: Sequence[RecordedCamera], pictures: Sequence[Row], annotations: Annotations) -> Sights:
+    def seen(
+        self, cameras: Sequence[RecordedCamera], pictures: Sequence[Row], annotations: Annotations
+    ) -> IdentifiedDetections:
         """The detections on the pictures of a keyframe, one a camera, each with the object that it lies on."""
         rows, objects = [np.empty((0, len(ImageDetections.COLUMNS)))], [np.empty(0, np.int64)]
         for number, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
@@ -69,7 +71,7 @@ class DetectionFile:
             zeros = np.zeros(len(found))
             rows.append(np.column_stack([classes, [c for _, c, _ in found], boxes, zeros + number, zeros, zeros]))
             objects.append(_behind(boxes, classes, projected(camera, annotations.boxes), annotations))
-        return Sights(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
+        return IdentifiedDetections(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
 
 
 def _rows(path: Path) -> list[Row]:

@@ -15,14 +15,14 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Ego
 from care_sim.loops.film import Film, Shot
-from care_sim.sensors.annotated import Annotations, Sights
+from care_sim.sensors.annotated import Annotations, IdentifiedDetections
 from care_sim.sources.car_motion import motions
 from care_sim.sources.nuscenes.cameras import (
     CHANNELS,
     PICTURE,
     VISIBLE_SHARES,
     RecordedCamera,
-    projected_sights,
+    projected_detections,
     recorded_camera,
 )
 from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
@@ -79,8 +79,8 @@ class _Stage:
         annotations = _annotations(self.database, boxes, self.numbers, sensor)
         points = read_points(self.database.root / recordings[LIDAR]["filename"])
         cloud = recorded_cloud(points, self.grid, annotations, sensor)
-        sights = self._sights(recordings, boxes, annotations)
-        return Shot(time_s, sample["token"], sensor, ego, annotations, sights, cloud)
+        identified = self._seen(recordings, boxes, annotations)
+        return Shot(time_s, sample["token"], sensor, ego, annotations, identified, cloud)
 
     def hidden(self, sample: Row, car: Frame) -> Annotations:
         """What is annotated without a point."""
@@ -92,10 +92,10 @@ class _Stage:
         boxes = self.database.annotations(sample["token"])
         return [box for box in boxes if _has_points(box) == seen and _class_name(self.database, box) is not None]
 
-    def _sights(self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations) -> Sights:
+    def _seen(self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations) -> IdentifiedDetections:
         if self.detections is None:
-            return projected_sights(self.cameras, annotations, _shares(self.database, boxes))
-        return self.detections.sights(self.cameras, [recordings[channel] for channel in CHANNELS], annotations)
+            return projected_detections(self.cameras, annotations, _shares(self.database, boxes))
+        return self.detections.seen(self.cameras, [recordings[channel] for channel in CHANNELS], annotations)
 
 
 def _stage(

@@ -12,9 +12,9 @@ from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, Sights
+from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, look_around, numbers_of
+from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.sources.streets.draft import KEYFRAME_S
 from care_sim.sources.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
@@ -76,16 +76,16 @@ class _Stage:
         labelled, boxes = near[reported], everything[reported]
         numbers = {self._bodies[number]: number for number in labelled.tolist()}
         labels = {body: int(self._classes[number]) for body, number in numbers.items()}
-        seen = look_around(self._world, cameras, sensor, labels, boxes)
+        seen = surround_detections(self._world, cameras, sensor, labels, boxes)
         swept = full_sweep(self._world, grid, sensor, everything, LIDAR_POSITION[2])
-        sights = Sights(seen.detections, numbers_of(seen.objects, numbers))
+        identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
-        shown = np.isin(labelled, np.concatenate([cloud.objects, sights.objects]))
+        shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept]) for kept in (shown, ~shown)
         )
         token, motion = f"{street.name}/{keyframe:02d}", street.motion[keyframe]
-        return Shot(keyframe * KEYFRAME_S, token, sensor, motion, annotations, sights, cloud), hidden
+        return Shot(keyframe * KEYFRAME_S, token, sensor, motion, annotations, identified, cloud), hidden
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Cells:
         """Put every body that is near where it is now; returns their numbers, ascending."""

@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw
 
 from care_sim.core.frames import Floats, box_corners
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.loops.open_loop import Exposure, OpenLoop
+from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.sensors.annotated import Cloud
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
@@ -35,7 +35,7 @@ LEGEND = (
 def draw_plan(
     loop: OpenLoop,
     index: int,
-    exposure: Exposure | None,
+    record: OpenLoopKeyframe | None,
     found: NDArray[np.bool_],
     scored: NDArray[np.bool_],
     appearing: NDArray[np.bool_],
@@ -43,17 +43,17 @@ def draw_plan(
     """A picture (HEIGHT, WIDTH, 3) of keyframe `index` of a film from above, the car driving to the right.
 
     The annotated objects (n,): found, not found, or beyond the range that is `scored`; those `appearing` have a double
-    line. The returns of the fired cells, and below the angular grid with their ranges. `exposure` is None before the
+    line. The returns of the fired cells, and below the angular grid with their ranges. `record` is None before the
     first scan. The episode is left as it was.
     """
     shot = loop.film.shots[index]
-    returned = _returned(shot.cloud, exposure)
+    returned = _returned(shot.cloud, record)
     canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
     draw = ImageDraw.Draw(canvas)
     colours = [FOUND if one else MISSED if near else OUT_OF_RANGE for one, near in zip(found, scored, strict=True)]
     canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
-    _write_words(draw, loop, shot.time_s, exposure, int(found[scored].sum()), int(scored.sum()))
-    draw_grid(canvas, draw, loop.rig.grid, _ranges(loop, returned, exposure))
+    _write_words(draw, loop, shot.time_s, record, int(found[scored].sum()), int(scored.sum()))
+    draw_grid(canvas, draw, loop.rig.grid, _ranges(loop, returned, record))
     return np.asarray(canvas)
 
 
@@ -75,13 +75,13 @@ def _map(boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np
 
 
 def _write_words(
-    draw: ImageDraw.ImageDraw, loop: OpenLoop, time_s: float, exposure: Exposure | None, found: int, objects: int
+    draw: ImageDraw.ImageDraw, loop: OpenLoop, time_s: float, record: OpenLoopKeyframe | None, found: int, objects: int
 ) -> None:
     budget = loop.rig.budget
     fired = (
         f"nothing fired yet, budget {budget} cells"
-        if exposure is None
-        else f"{len(exposure.fired)} of {budget} cells fired"
+        if record is None
+        else f"{len(record.fired)} of {budget} cells fired"
     )
     for x, text in ((12, f"{time_s:.1f} s"), (110, f"{found} of {objects} objects found"), (420, fired)):
         draw.text((x, 8), text, INK, drawing.font(20))
@@ -103,16 +103,16 @@ def _pixels(places: Floats) -> Floats:
     return pixels
 
 
-def _returned(cloud: Cloud, exposure: Exposure | None) -> Cloud:
+def _returned(cloud: Cloud, record: OpenLoopKeyframe | None) -> Cloud:
     """The returns of the cells that fired."""
-    fired = np.empty(0, np.int64) if exposure is None else exposure.fired
+    fired = np.empty(0, np.int64) if record is None else record.fired
     return cloud.take(np.isin(cloud.cells, fired))
 
 
-def _ranges(loop: OpenLoop, returned: Cloud, exposure: Exposure | None) -> NDArray[np.float64]:
+def _ranges(loop: OpenLoop, returned: Cloud, record: OpenLoopKeyframe | None) -> NDArray[np.float64]:
     grid = loop.rig.grid
     ranges = np.zeros(grid.size)
-    if exposure is not None:
-        ranges[exposure.fired] = grid.range_m
+    if record is not None:
+        ranges[record.fired] = grid.range_m
         np.minimum.at(ranges, returned.cells, np.linalg.norm(returned.points, axis=1))
     return ranges.reshape(grid.shape)

@@ -11,7 +11,7 @@ from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.loops.records import Keyframe
-from care_sim.loops.watcher import Moment
+from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.viewer.recording import entities as looks
 from care_sim.viewer.recording.lane import Lane
 
@@ -38,11 +38,11 @@ class Curves:
             values = list(colours)
             lane.fix(entity, rr.StateConfiguration(values=values, labels=values, colors=list(colours.values())))
 
-    def log(self, moment: Moment, state: str) -> None:
+    def log(self, watched: WatchedKeyframe, state: str) -> None:
         """A keyframe, with the state of the first-sighting actor."""
-        frame = moment.frame
+        frame = watched.frame
         self._frames.append(frame)
-        self._counts.append(np.bincount(moment.shares.ravel(), minlength=len(SHARES)))
+        self._counts.append(np.bincount(watched.shares.ravel(), minlength=len(SHARES)))
         brake = "on" if frame.braking else "off"
         self._change("states/actor", state, f"actor {state}, {frame.distance_m:.1f} m from the sensor")
         self._change("states/brake", brake, f"brake {brake} at {frame.speed_mps:.1f} m/s")

@@ -10,7 +10,7 @@ from care_sim.core.frames import Floats
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.loops.watcher import Moment, Stance
+from care_sim.loops.watcher import Situation, WatchedKeyframe
 from care_sim.viewer.recording import entities as looks
 from care_sim.viewer.recording.lane import THIN, Lane
 from care_sim.viewer.recording.outlines import outlines
@@ -44,27 +44,27 @@ class Pictures:
         for entity, colour in OUTLINES.items():
             lane.fix(f"grid/{entity}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]))
 
-    def log(self, moment: Moment, photo: bytes) -> None:
+    def log(self, watched: WatchedKeyframe, photo: bytes) -> None:
         """A keyframe and the JPEG of its camera."""
         self._lane.log(CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
-        self._log_detections(moment.stance)
-        self._log_grid(moment)
+        self._log_detections(watched.situation)
+        self._log_grid(watched)
 
-    def _log_detections(self, stance: Stance) -> None:
-        seen = stance.belief.detections
-        names = [f"false {name}" if false else name for name, false in zip(_names(seen), stance.false, strict=True)]
-        for kind, chosen in (("explained", stance.known), ("residual", ~stance.known)):
+    def _log_detections(self, situation: Situation) -> None:
+        seen = situation.belief.detections
+        names = [f"false {name}" if false else name for name, false in zip(_names(seen), situation.false, strict=True)]
+        for kind, chosen in (("explained", situation.known), ("residual", ~situation.known)):
             self._log_named(kind, seen.boxes[chosen], list(compress(names, chosen)))
-        self._log_named("missed", stance.missed.boxes, [f"missed {name}" for name in _names(stance.missed)])
+        self._log_named("missed", situation.missed.boxes, [f"missed {name}" for name in _names(situation.missed)])
 
     def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:
         """Boxes, and their names as those of points, which the viewer does not break into lines."""
         below = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, 3]])
         self._lane.log_list(f"{CAMERA}/{kind}", len(boxes), lambda: (_boxes(boxes), rr.Points2D(below, labels=names)))
 
-    def _log_grid(self, moment: Moment) -> None:
-        belief, known, rig = moment.stance.belief, moment.stance.known, self._rig
-        cells = np.repeat(moment.shares[:, ::-1], looks.ROW_PIXELS, axis=0)
+    def _log_grid(self, watched: WatchedKeyframe) -> None:
+        belief, known, rig = watched.situation.belief, watched.situation.known, self._rig
+        cells = np.repeat(watched.shares[:, ::-1], looks.ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
         sectors = wedges(belief.detections, rig)
         for entity, chosen in (

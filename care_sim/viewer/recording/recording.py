@@ -11,7 +11,7 @@ from care_sim.base.errors import InvalidInput, unknown
 from care_sim.base.files import RERUN, replacing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.watcher import Moment
+from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.viewer.recording.camera_photo import photograph
 from care_sim.viewer.recording.curves import Curves
 from care_sim.viewer.recording.entities import ABOUT, LANES, about
@@ -62,7 +62,7 @@ class Recording(AbstractContextManager["Recording"]):
 
 
 class Episode:
-    """Logs one episode, moment by moment."""
+    """Logs one episode, keyframe by keyframe."""
 
     def __init__(self, lane: Lane, rig: Rig, ego_width_m: float, colour: tuple[int, int, int]):
         self._lane = lane
@@ -74,14 +74,14 @@ class Episode:
         """Take the camera's picture of the keyframe that is about to be played."""
         self._photo = photograph(loop)
 
-    def keep(self, moment: Moment) -> None:
+    def keep(self, watched: WatchedKeyframe) -> None:
         """Log a keyframe that was played."""
-        frame = moment.frame
+        frame = watched.frame
         self._lane.at(frame.index, frame.time_s)
         state = "detected" if frame.detected else "in view" if frame.in_view else "out of view"
-        self._space.log(moment, state)
-        self._pictures.log(moment, self._photo)
-        self._curves.log(moment, state)
+        self._space.log(watched, state)
+        self._pictures.log(watched, self._photo)
+        self._curves.log(watched, state)
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Log how it ended."""

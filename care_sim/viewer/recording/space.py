@@ -7,11 +7,11 @@ import rerun as rr
 from rerun.components import FillMode
 
 from care_sim.core.frames import Floats
-from care_sim.core.residual import bundles
+from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.driving.braking import BrakingRules
-from care_sim.loops.watcher import Moment, Stance
+from care_sim.loops.watcher import Situation, WatchedKeyframe
 from care_sim.viewer.recording import entities as looks
 from care_sim.viewer.recording.lane import THIN, Lane, boxes
 
@@ -44,40 +44,42 @@ class Space:
         for kind, colour in (("residual", (*looks.RESIDUAL, 200)), ("explained", (*looks.EXPLAINED, 50))):
             lane.fix(f"world/lidar/wedges/{kind}", rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]))
 
-    def log(self, moment: Moment, state: str) -> None:
+    def log(self, watched: WatchedKeyframe, state: str) -> None:
         """A keyframe, with the state of the first-sighting actor."""
-        stance = moment.stance
-        self._log_bodies(stance, state)
-        self._log_ego(stance)
-        self._log_returns(moment)
-        self._log_tracks(stance)
-        for kind, chosen in (("residual", ~stance.known), ("explained", stance.known)):
-            self._log_wedges(kind, bundles(stance.belief.detections, self._rig)[chosen][:, CORNERS])
+        situation = watched.situation
+        self._log_bodies(situation, state)
+        self._log_ego(situation)
+        self._log_returns(watched)
+        self._log_tracks(situation)
+        for kind, chosen in (("residual", ~situation.known), ("explained", situation.known)):
+            self._log_wedges(kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, CORNERS])
 
-    def _log_bodies(self, stance: Stance, state: str) -> None:
-        colours = [looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]] for label in stance.labels]
-        self._lane.log("world/bodies", boxes(stance.bodies, colors=colours, labels=stance.names))
-        if stance.target is not None:
-            around = stance.bodies[[stance.target]] + np.array([0, 0, 0, *[2 * MARGIN_M] * 3, 0])
-            text = [f"{stance.names[stance.target]}: {state}"]
+    def _log_bodies(self, situation: Situation, state: str) -> None:
+        colours = [
+            looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]] for label in situation.labels
+        ]
+        self._lane.log("world/bodies", boxes(situation.bodies, colors=colours, labels=situation.names))
+        if situation.target is not None:
+            around = situation.bodies[[situation.target]] + np.array([0, 0, 0, *[2 * MARGIN_M] * 3, 0])
+            text = [f"{situation.names[situation.target]}: {state}"]
             self._lane.log("world/first_sighting", boxes(around, colors=looks.ACTOR_COLOURS[state], labels=text))
 
-    def _log_ego(self, stance: Stance) -> None:
-        self._lane.log("world/ego", boxes(stance.ego[None]))
-        self._driven.append(np.array([*stance.ego[:2], 0.03]))
+    def _log_ego(self, situation: Situation) -> None:
+        self._lane.log("world/ego", boxes(situation.ego[None]))
+        self._driven.append(np.array([*situation.ego[:2], 0.03]))
         self._lane.log("world/driven", rr.LineStrips3D([self._driven]))
-        sensor = stance.sensor
+        sensor = situation.sensor
         turn = rr.Quaternion(xyzw=sensor.rotation.as_quat())
         self._lane.log("world/lidar", rr.Transform3D(translation=sensor.origin, quaternion=turn))
 
-    def _log_returns(self, moment: Moment) -> None:
-        cells, points = moment.returned(self._rig.grid)
+    def _log_returns(self, watched: WatchedKeyframe) -> None:
+        cells, points = watched.returned(self._rig.grid)
         step = math.ceil(len(cells) / looks.MOST_POINTS) or 1
-        colours = SHARE_COLOURS[moment.shares.ravel()[cells[::step]]]
+        colours = SHARE_COLOURS[watched.shares.ravel()[cells[::step]]]
         self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
 
-    def _log_tracks(self, stance: Stance) -> None:
-        tracks = stance.belief.tracks
+    def _log_tracks(self, situation: Situation) -> None:
+        tracks = situation.belief.tracks
         colours = [looks.COASTING if misses else looks.EXPLAINED for misses in tracks.misses]
         names = [CLASSES[label] for label in tracks.classes]
         moves = np.column_stack([tracks.velocities, np.zeros(len(tracks))])

@@ -19,7 +19,7 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.policies.base import Policy
 from care_sim.policies.paper.care import Care
 from care_sim.sensors.camera import Picture
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 from tests.helpers.places import ROOT
 

@@ -10,7 +10,7 @@ from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.scanning.casters import PEERS, casters
 from care_sim.measure.bench.scanning.scans import REFERENCE, agreement, drawn_cells, scans
 from care_sim.measure.bench.scanning.street import NEAREST_M, SENSOR, SWAY_M, street
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import CATALOGUE
 
 BUS = CATALOGUE["bus"]

@@ -171,8 +171,8 @@ def moved_by_a_millimetre(monkeypatch):
 def one_box_a_pixel_wider(monkeypatch):
     detect = CameraDetector.detect
 
-    def widened(self, sights, heading, ranges, time_s):
-        seen = detect(self, sights, heading, ranges, time_s)
+    def widened(self, identified, heading, ranges, time_s):
+        seen = detect(self, identified, heading, ranges, time_s)
         boxes = seen.boxes.copy()
         boxes[:1, 2] += time_s > 0.15
         return replace(seen, boxes=boxes)

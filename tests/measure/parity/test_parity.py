@@ -15,11 +15,11 @@ from care_sim.measure.parity.outcomes import Outcomes
 from care_sim.measure.parity.pictures import Pictures
 from care_sim.measure.parity.run import agree, unexplained
 from care_sim.measure.parity.scenes import GRIDS, draw_bodies, draw_scene
-from care_sim.measure.parity.tally import GROUPS, Tally, groups
+from care_sim.measure.parity.tally import GROUPS, AgreementCounts, groups
 from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
 from care_sim.scenarios import SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.world.bodies import CATALOGUE
 
@@ -80,7 +80,7 @@ def test_a_ray_grazes_within_a_micrometre_of_an_edge(bullet, above, grazes):
 
 
 def test_rays_count_where_they_end(street):
-    compared, tally = compare(street, SENSOR, CELLS), Tally()
+    compared, tally = compare(street, SENSOR, CELLS), AgreementCounts()
     frames = [Frame(20.0, 0.0, 0.0, 0.0)]
     tally.add(compared, groups([CATALOGUE["bus"]], frames), {"scene": 3})
     counts = tally.figures()["references"]["Bullet in millimetres"]
@@ -90,7 +90,7 @@ def test_rays_count_where_they_end(street):
 
 
 def test_a_difference_is_listed_with_its_scene(street):
-    tally = Tally()
+    tally = AgreementCounts()
     askew = compare(replace(street, fast=Askew(street.fast)), SENSOR, np.array([6 * 180 + 90]))
     tally.add(askew, groups([CATALOGUE["bus"]], [Frame(20.0, 0.0, 0.0, 0.0)]), {"scene": 3})
     (line,) = tally.listed

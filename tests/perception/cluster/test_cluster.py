@@ -40,13 +40,16 @@ def test_two_sides_of_a_car_give_its_class_and_box(detector, yaw):
 
 
 def test_of_a_car_ahead_only_the_back_is_seen_and_the_rest_is_completed(detector):
-    found = detector.detect(np.concatenate([road(), face((10, 0.97), (10, -0.97), 0.3, 1.7)]), HEIGHT)
+    found = detector.detect(
+        np.concatenate([road(), face((10, 0.97), (10, -0.97), 0.3, 1.7)]), HEIGHT
+    )
     assert names(found) == ["car"]
     assert found.boxes[0, [0, 1, 3, 4]] == pytest.approx([10 + 4.61 / 2, 0, 4.61, 1.95], abs=0.15)
 
 
 @pytest.mark.parametrize(
-    ("name", "size"), [("pedestrian", PERSON), ("bicycle", (1.68, 0.6, 1.27)), ("bus", (11.19, 2.94, 3.47))]
+    ("name", "size"),
+    [("pedestrian", PERSON), ("bicycle", (1.68, 0.6, 1.27)), ("bus", (11.19, 2.94, 3.47))],
 )
 def test_classes_by_size(detector, name, size):
     found = detector.detect(np.concatenate([road(), shell(12, -5, 1.0, *size)]), HEIGHT)
@@ -71,7 +74,10 @@ def test_two_people_a_metre_apart_are_two(detector):
 
 
 def test_a_wall_is_no_object(detector):
-    assert len(detector.detect(np.concatenate([road(), face((-20, 9), (20, 9), 0.3, 6.0)]), HEIGHT)) == 0
+    assert (
+        len(detector.detect(np.concatenate([road(), face((-20, 9), (20, 9), 0.3, 6.0)]), HEIGHT))
+        == 0
+    )
 
 
 def test_a_slope_is_no_object_and_hides_none(detector):
@@ -128,7 +134,10 @@ PLACED = st.tuples(st.floats(8, 40), st.floats(-np.pi, np.pi), st.floats(-np.pi,
 @st.composite
 def scenes(draw):
     bodies = draw(st.lists(PLACED, min_size=1, max_size=3))
-    shells = [shell(r * np.cos(bearing), r * np.sin(bearing), yaw, *size) for r, bearing, yaw, size in bodies]
+    shells = [
+        shell(r * np.cos(bearing), r * np.sin(bearing), yaw, *size)
+        for r, bearing, yaw, size in bodies
+    ]
     return np.concatenate([road(step=3.0), *shells])
 
 
@@ -148,4 +157,6 @@ def test_a_turn_by_whole_columns_turns_the_boxes(detector, grid, points, columns
     assert names(again) == names(found)
     assert again.boxes[:, :3] == pytest.approx(turned(found.boxes[:, :3], angle), abs=1e-4)
     assert again.boxes[:, 3:6] == pytest.approx(found.boxes[:, 3:6], abs=1e-4)
-    assert np.cos(again.boxes[:, 6] - found.boxes[:, 6] - angle) == pytest.approx(np.ones(len(found)), abs=1e-4)
+    assert np.cos(again.boxes[:, 6] - found.boxes[:, 6] - angle) == pytest.approx(
+        np.ones(len(found)), abs=1e-4
+    )

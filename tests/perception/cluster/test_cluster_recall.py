@@ -11,7 +11,13 @@ from care_sim.perception.cluster.detector import ClusterDetector
 from care_sim.world.bodies import CATALOGUE
 from tests.helpers.made_points import HEIGHT
 
-STREET = [("terrace", 0, 18), ("car", 9, 3.5), ("car", 22, 3.2), ("truck", -15, 3.4), ("pedestrian", 14, -6)]
+STREET = [
+    ("terrace", 0, 18),
+    ("car", 9, 3.5),
+    ("car", 22, 3.2),
+    ("truck", -15, 3.4),
+    ("pedestrian", 14, -6),
+]
 HEADINGS = 8
 
 
@@ -23,8 +29,8 @@ def scan(world, grid):
 
 
 def share_found(world, grid, kind, ranges):
-    """The share of places and headings at which `kind`, alone on the road, is found within 2 m in its class, and how
-    many other detections there are, a scan.
+    """The share of places and headings at which `kind`, alone on the road, is found within 2 m in
+    its class, and how many other detections there are, a scan.
     """
     detector, body = ClusterDetector(grid), world.add(CATALOGUE[kind], (0.0, 50.0, 0.0))
     found, others = [], []
@@ -59,7 +65,9 @@ def test_the_share_found_at_full_scan(open3d, bullet, grid, kind, ranges, least)
 
 
 def test_the_limit_of_the_grid_is_reported_not_hidden(open3d, bullet, grid):
-    """A person at 40 m is half a metre wide where columns are half a metre apart: one or two returns."""
+    """A person at 40 m is half a metre wide where columns are half a metre apart: one or two
+    returns.
+    """
     assert share_found(bullet, grid, "pedestrian", (40, 45))[0] == 0
 
 

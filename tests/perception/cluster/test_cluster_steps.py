@@ -38,14 +38,18 @@ def test_two_points_make_no_road():
     assert road_plane(stone, HEIGHT).tolist() == [0, 0, -HEIGHT]
 
 
-@pytest.mark.parametrize(("range_m", "radius"), [(3, NEAR_RADIUS_M), (12, NEAR_RADIUS_M), (40, 0.982)])
+@pytest.mark.parametrize(
+    ("range_m", "radius"), [(3, NEAR_RADIUS_M), (12, NEAR_RADIUS_M), (40, 0.982)]
+)
 def test_the_radius_grows_with_the_range_once_columns_are_far_apart(grid, range_m, radius):
     assert cluster_radius(grid, range_m) == pytest.approx(radius, abs=1e-3)
 
 
 @given(range_m=st.floats(3, 50), bearing=st.floats(-np.pi, np.pi), way=st.floats(-np.pi, np.pi))
 def test_two_points_belong_together_up_to_the_radius(open3d, grid, range_m, bearing, way):
-    """Whichever way the second lies, also across the seam of the azimuths, within what the bend leaves open."""
+    """Whichever way the second lies, also across the seam of the azimuths, within what the bend
+    leaves open.
+    """
     first = range_m * np.array([np.cos(bearing), np.sin(bearing)])
     step = cluster_radius(grid, range_m) * np.array([np.cos(way), np.sin(way)])
     assert len(clusters_of(np.array([first, first + 0.93 * step]), grid)) == 1
@@ -72,7 +76,9 @@ def test_the_long_side_decides_whichever_end_is_shown_beside_it(degrees, end):
     """Forty points on one side, three off a ragged end that leads to its left or right."""
     side = np.column_stack([np.linspace(0, 4.6, 40), np.zeros(40)])
     ragged = np.array([[0.0, 0.3], [-0.05, 0.6], [0.05, 0.9]]) * [1, end]
-    sides = fit_sides(turned(np.concatenate([side, ragged]), np.deg2rad(degrees)) + np.array([12.0, 4.0]))
+    sides = fit_sides(
+        turned(np.concatenate([side, ragged]), np.deg2rad(degrees)) + np.array([12.0, 4.0])
+    )
     assert np.rad2deg(np.arctan2(*sides.axes[0][::-1])) == pytest.approx(degrees, abs=1.0)
 
 
@@ -83,7 +89,9 @@ def test_one_point_is_a_rectangle_without_extent():
 
 
 def test_a_ramp_alone_does_not_become_the_road():
-    ramp = np.column_stack([np.linspace(4, 6, 50), np.linspace(-1, 1, 50), np.linspace(-0.3, 0.3, 50) - HEIGHT])
+    ramp = np.column_stack(
+        [np.linspace(4, 6, 50), np.linspace(-1, 1, 50), np.linspace(-0.3, 0.3, 50) - HEIGHT]
+    )
     assert np.abs(road_plane(ramp, HEIGHT)[:2]).max() <= STEEPEST
 
 
@@ -106,7 +114,9 @@ def test_a_last_bit_does_not_choose_between_two_headings_that_fit_alike(span, bi
     low = np.array([8.0, 8.0])
 
     def guess(moved):
-        return best_guess(Sides(np.eye(2), low, low + span + [0.0, moved]), 1.7, -HEIGHT, HEIGHT, AngularGrid())
+        return best_guess(
+            Sides(np.eye(2), low, low + span + [0.0, moved]), 1.7, -HEIGHT, HEIGHT, AngularGrid()
+        )
 
     assert guess(bit).label == guess(0.0).label
     assert guess(bit).box == pytest.approx(guess(0.0).box)

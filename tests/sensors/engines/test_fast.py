@@ -10,8 +10,16 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.measure.parity.answers import Millimetres
 from care_sim.measure.parity.random_scenes import random_scenes
-from care_sim.measure.parity.verdicts import GRAZING, LOST, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.measure.parity.verdicts import (
+    GRAZING,
+    LOST,
+    SAME,
+    TOLERANCE,
+    UNEXPLAINED,
+    Engines,
+    compare,
+)
+from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.engines.fast import Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
@@ -21,9 +29,15 @@ SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 GREY = (0.5, 0.5, 0.5)
 KINDS = {
     **CATALOGUE,
-    "pole": BodyKind("pole", None, (0.3, 0.3, 4.0), (Part("cylinder", (0.3, 0.3, 4.0), (0.0, 0.0, 2.0), GREY),)),
-    "drum": BodyKind("drum", None, (3.0, 3.0, 1.0), (Part("cylinder", (3.0, 3.0, 1.0), (1.0, 0.0, 0.5), GREY),)),
-    "ball": BodyKind("ball", None, (2.0, 2.0, 2.0), (Part("sphere", (2.0, 2.0, 2.0), (0.0, 0.5, 1.0), GREY),)),
+    "pole": BodyKind(
+        "pole", None, (0.3, 0.3, 4.0), (Part("cylinder", (0.3, 0.3, 4.0), (0.0, 0.0, 2.0), GREY),)
+    ),
+    "drum": BodyKind(
+        "drum", None, (3.0, 3.0, 1.0), (Part("cylinder", (3.0, 3.0, 1.0), (1.0, 0.0, 0.5), GREY),)
+    ),
+    "ball": BodyKind(
+        "ball", None, (2.0, 2.0, 2.0), (Part("sphere", (2.0, 2.0, 2.0), (0.0, 0.5, 1.0), GREY),)
+    ),
 }
 
 
@@ -39,12 +53,16 @@ def cast(world, sensor, grid=COARSE, cells=None):
 def ahead(world, sensor):
     """Range and body of the level ray along the heading of a frame."""
     grid = AngularGrid(columns=4, rows=3, top=0.5, bottom=-0.5)
-    ranges, ids = cast(world, replace(sensor, yaw=sensor.yaw - np.pi / 4), grid, np.array([grid.columns + 2]))
+    ranges, ids = cast(
+        world, replace(sensor, yaw=sensor.yaw - np.pi / 4), grid, np.array([grid.columns + 2])
+    )
     return float(ranges[0]), int(ids[0])
 
 
 def assert_parity(kinds, frames, sensor, lost=0):
-    """Every cell of a grid answered as Bullet does, asked in millimetres, but for rays that graze or that it lost."""
+    """Every cell of a grid answered as Bullet does, asked in millimetres, but for rays that graze
+    or that it lost.
+    """
     with closing(BulletWorld()) as world, closing(Millimetres(kinds, COARSE)) as exact:
         for kind, frame in zip(kinds, frames, strict=True):
             world.add(kind, frame)
@@ -136,14 +154,24 @@ def test_some_cells_in_any_order_answer_as_in_the_full_scan(bullet):
 
 def test_whole_numbers_in_a_frame_do_no_harm(bullet):
     bullet.add(CATALOGUE["bus"], (10.0, 0.0, 0.3))
-    assert np.array_equal(cast(bullet, Frame(0, 0, 2, 0))[0], cast(bullet, Frame(0.0, 0.0, 2.0, 0.0))[0])
+    assert np.array_equal(
+        cast(bullet, Frame(0, 0, 2, 0))[0], cast(bullet, Frame(0.0, 0.0, 2.0, 0.0))[0]
+    )
 
 
 @pytest.mark.parametrize("shape", ["box", "cylinder", "sphere"])
 def test_from_within_a_solid_its_surface_is_not_met(bullet, shape):
-    bullet.add(BodyKind("hull", None, (6.0, 6.0, 6.0), (Part(shape, (6.0, 6.0, 6.0), (0.0, 0.0, 3.0), GREY),)), SENSOR)
+    bullet.add(
+        BodyKind(
+            "hull", None, (6.0, 6.0, 6.0), (Part(shape, (6.0, 6.0, 6.0), (0.0, 0.0, 3.0), GREY),)
+        ),
+        SENSOR,
+    )
     bus = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
-    assert ahead(bullet, replace(SENSOR, x=0.7, z=2.0)) == (pytest.approx(20 - 0.7 - 11.19 / 2), bus)
+    assert ahead(bullet, replace(SENSOR, x=0.7, z=2.0)) == (
+        pytest.approx(20 - 0.7 - 11.19 / 2),
+        bus,
+    )
 
 
 @pytest.mark.parametrize(("aside", "met"), [(1e-9, False), (-1e-9, True)])
@@ -155,4 +183,6 @@ def test_an_edge_is_exact_to_a_nanometre(bullet, aside, met):
 @pytest.mark.parametrize("cells", [[-1, 3], [3, 180 * 24]])
 def test_cells_that_the_grid_does_not_have_are_refused(bullet, cells):
     with pytest.raises(IndexError, match=r"cells must lie in 0\.\.4319"):
-        Fast(bullet, AngularGrid(columns=180, rows=24)).cast(Frame(0.0, 0.0, 1.84, 0.0), np.array(cells))
+        Fast(bullet, AngularGrid(columns=180, rows=24)).cast(
+            Frame(0.0, 0.0, 1.84, 0.0), np.array(cells)
+        )

@@ -7,11 +7,11 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA, Picture
-from care_sim.sensors.engines.engine import Bullet
+from care_sim.sensors.engines.bullet import Bullet
 from care_sim.sensors.engines.fast import Fast
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
-from care_sim.world.bullet_shapes import directions, polyhedron
+from care_sim.world.polyhedra import directions, polyhedron
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
 CROOKED = PinholeCamera(400, 220, 1.2, (0.5, 0.1, -0.2), 0.3, 0.05, 0.1)
@@ -35,14 +35,20 @@ def crowd(seed, bodies=14):
     kinds = list(CATALOGUE.values())
     for _ in range(bodies):
         kind = kinds[rng.integers(len(kinds))]
-        x, y, z, yaw, roll, pitch = rng.uniform((-10, -20, 0, -3, -0.3, -0.3), (60, 20, 1, 3, 0.3, 0.3))
+        x, y, z, yaw, roll, pitch = rng.uniform(
+            (-10, -20, 0, -3, -0.3, -0.3), (60, 20, 1, 3, 0.3, 0.3)
+        )
         world.add(kind, Frame(x, y, z, yaw, roll, pitch) if rng.random() < 0.3 else (x, y, yaw))
     upright = rng.random() < 0.5
-    return world, SENSOR if upright else Frame(0, 0, 1.84, rng.uniform(-3, 3), *rng.normal(0, 0.1, 2))
+    return world, SENSOR if upright else Frame(
+        0, 0, 1.84, rng.uniform(-3, 3), *rng.normal(0, 0.1, 2)
+    )
 
 
 def test_pictures_of_crowds_are_the_same():
-    """All but single pixels on outlines, where PyBullet's single precision decides; every box to one pixel."""
+    """All but single pixels on outlines, where PyBullet's single precision decides; every box to
+    one pixel.
+    """
     shown, different = 0, 0
     for seed in range(60):
         world, sensor = crowd(seed)
@@ -55,7 +61,9 @@ def test_pictures_of_crowds_are_the_same():
             assert np.abs(expected.boxes - found.boxes).max(initial=0) <= 1
         else:
             odd = np.setxor1d(expected.bodies, found.bodies)
-            assert all(np.isin(seen.bodies, odd) @ seen.pixels <= 1 for seen in (expected, found)), seed
+            assert all(
+                np.isin(seen.bodies, odd) @ seen.pixels <= 1 for seen in (expected, found)
+            ), seed
     assert shown > 1_000_000
     assert different / shown < 1e-5
 
@@ -64,7 +72,9 @@ def test_pictures_of_crowds_are_the_same():
 @pytest.mark.parametrize("x", [1.2, 3.0, 15.0])
 def test_a_primitive_near_and_far(bullet, shape, x):
     size = (1.0, 1.0, 1.4 if shape != "sphere" else 1.0)
-    bullet.add(BodyKind("one", None, size, (Part(shape, size, (0.0, 0.0, 1.5), (1, 0, 0)),)), (x, 0.3, 0.7))
+    bullet.add(
+        BodyKind("one", None, size, (Part(shape, size, (0.0, 0.0, 1.5), (1, 0, 0)),)), (x, 0.3, 0.7)
+    )
     reference, picture = drawn(bullet)
     assert np.count_nonzero(reference != NO_BODY) > 50
     assert np.count_nonzero(reference != picture) <= 1
@@ -84,7 +94,10 @@ def test_transparent_bodies_backdrops_and_the_road_have_no_look(bullet):
 
 
 def test_a_camera_inside_a_body_looks_through_it(bullet):
-    inside, beyond = bullet.add(CATALOGUE["building"], (0.0, 0.0, 0.0)), bullet.add(CATALOGUE["car"], (20.0, 0.0, 0.0))
+    inside, beyond = (
+        bullet.add(CATALOGUE["building"], (0.0, 0.0, 0.0)),
+        bullet.add(CATALOGUE["car"], (20.0, 0.0, 0.0)),
+    )
     reference, picture = drawn(bullet)
     assert np.array_equal(reference, picture)
     assert beyond in picture
@@ -113,7 +126,11 @@ def test_a_window_is_cut_out_of_the_picture(bullet):
 
 def test_polyhedra_are_closed():
     """Euler: corners - edges + faces = 2."""
-    for shape, size in (("box", (1.0, 2.0, 3.0)), ("cylinder", (0.2, 0.2, 0.8)), ("sphere", (0.3, 0.3, 0.3))):
+    for shape, size in (
+        ("box", (1.0, 2.0, 3.0)),
+        ("cylinder", (0.2, 0.2, 0.8)),
+        ("sphere", (0.3, 0.3, 0.3)),
+    ):
         corners, faces, edges = polyhedron(shape, size)
         assert len(corners) - len(edges) + len(faces) == 2
         assert np.allclose(np.linalg.norm(faces[:, :3], axis=1), 1)

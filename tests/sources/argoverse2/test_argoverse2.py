@@ -23,10 +23,10 @@ def test_a_car_ahead_is_annotated_hit_and_seen_where_it_stands(tmp_path):
     assert points[:, 0].min() == pytest.approx(15 - 2 - UP_LIDAR[0], abs=1e-6)
     assert np.all(np.abs(points - centre) <= np.array([2.0, 1.0, 0.75]) + 1e-6)
 
-    assert shot.sights.objects.tolist() == [0]
-    left, _, right, _ = shot.sights.detections.boxes[0]
+    assert shot.seen.objects.tolist() == [0]
+    left, _, right, _ = shot.seen.detections.boxes[0]
     assert (left + right) / 2 == pytest.approx(160, abs=1)
-    assert shot.sights.detections.cameras.tolist() == [0]
+    assert shot.seen.detections.cameras.tolist() == [0]
 
 
 def test_the_road_returns_the_rays_that_nothing_stopped(tmp_path):
@@ -76,7 +76,7 @@ def test_only_the_five_classes_are_annotated_and_everything_occludes(tmp_path):
     (shot,) = film(parked(tmp_path, wall, CAR_AHEAD)).shots
     assert len(shot.annotations) == 1
     assert len(returns_of(shot, 0)) == 0
-    assert len(shot.sights.objects) == 0
+    assert len(shot.seen.objects) == 0
     assert returns_of(shot, NOBODY)[:, 2].max() > 0
 
 
@@ -106,7 +106,7 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
 
 def test_a_keyframe_in_which_nobody_is_seen_shows_the_road_alone(tmp_path):
     (shot,) = film(parked(tmp_path, CAR_AHEAD | {"num_interior_pts": 0})).shots
-    assert (len(shot.annotations), len(shot.sights.objects)) == (0, 0)
+    assert (len(shot.annotations), len(shot.seen.objects)) == (0, 0)
     assert set(shot.cloud.objects.tolist()) == {NOBODY}
 
 
@@ -168,8 +168,8 @@ def test_the_six_cameras_cover_the_whole_circle(tmp_path):
         for n, a in enumerate(np.linspace(-np.pi, np.pi, 24, endpoint=False))
     ]
     (shot,) = film(parked(tmp_path, *ring)).shots
-    assert set(shot.sights.objects.tolist()) == set(range(24))
-    assert set(shot.sights.detections.cameras.tolist()) == set(range(6))
+    assert set(shot.seen.objects.tolist()) == set(range(24))
+    assert set(shot.seen.detections.cameras.tolist()) == set(range(6))
 
 
 def test_a_log_with_sensor_recordings_loads_and_either_name_of_the_annotations(tmp_path):

@@ -79,7 +79,7 @@ def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
 
 def test_a_keyframe_without_annotations_plays(tmp_path):
     (shot,) = first(database(tmp_path, [([], pose(), as_recorded(WORLD))])).shots
-    assert (len(shot.annotations), len(shot.sights.objects), len(shot.cloud)) == (0, 0, 4)
+    assert (len(shot.annotations), len(shot.seen.objects), len(shot.cloud)) == (0, 0, 4)
 
 
 def test_the_car_turns_and_drives_and_the_object_stays(tmp_path):
@@ -104,17 +104,17 @@ def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
     ]
     (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
     assert shot.annotations.objects.tolist() == [0, 1, 2, 3]
-    assert shot.sights.objects.tolist() == [0, 1, 3]
-    surest = shot.sights.detections.confidences
+    assert shot.seen.objects.tolist() == [0, 1, 3]
+    surest = shot.seen.detections.confidences
     assert surest[1] < surest[0] < surest[2]
-    assert set(shot.sights.detections.cameras.tolist()) == {0}
+    assert set(shot.seen.detections.cameras.tolist()) == {0}
 
 
 def test_an_object_too_small_for_a_picture_has_no_box(tmp_path):
     boxes = [annotated("human.pedestrian.adult", (d, 0.0, 0.9), (0.7, 0.7, 1.8), instance=f"{d}") for d in (20, 130)]
     (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
     assert len(shot.annotations) == 2
-    assert len(shot.sights.objects) == 1
+    assert len(shot.seen.objects) == 1
 
 
 @pytest.mark.parametrize("channel", [name for name in SENSORS if name.startswith("CAM")])

@@ -20,7 +20,7 @@ def whole_box(root):
     shot, front = movie.shots[0], movie.cameras[0]
     _, _, (_, u, v) = SENSORS["CAM_FRONT"]
     shift = np.tile(np.array([front.width, front.height]) / 2 - (u, v), 2)
-    return (shot.sights.detections.boxes[0] - shift).tolist(), shot
+    return (shot.seen.detections.boxes[0] - shift).tolist(), shot
 
 
 def forms(box):
@@ -44,10 +44,10 @@ def test_detections_come_from_a_file_in_either_form(tmp_path, form):
     path = tmp_path / "found.json"
     path.write_text(json.dumps(forms(box)[form]))
     (detected,) = first(root, detections=DetectionFile(path)).shots
-    found = detected.sights.detections
+    found = detected.seen.detections
     assert found.confidences.tolist() == [0.6]
-    assert found.boxes[0] == pytest.approx(shot.sights.detections.boxes[0])
-    assert detected.sights.objects.tolist() == [0]
+    assert found.boxes[0] == pytest.approx(shot.seen.detections.boxes[0])
+    assert detected.seen.objects.tolist() == [0]
 
 
 def test_a_detection_elsewhere_or_of_another_class_lies_on_nobody(tmp_path):
@@ -62,7 +62,7 @@ def test_a_detection_elsewhere_or_of_another_class_lies_on_nobody(tmp_path):
     path = tmp_path / "found.json"
     path.write_text(json.dumps(rows))
     (shot,) = first(root, detections=DetectionFile(path)).shots
-    assert shot.sights.objects.tolist() == [NOBODY, NOBODY]
+    assert shot.seen.objects.tolist() == [NOBODY, NOBODY]
 
 
 COCO = {"image_id": "t", "bbox": [0, 0, 5, 5], "category_id": 3, "score": 1}

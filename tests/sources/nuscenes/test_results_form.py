@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Shot
-from care_sim.sensors.annotated import Annotations, Cloud, Sights
+from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sources.nuscenes.films import film
 from care_sim.sources.nuscenes.results_form import MOST_BOXES, attribute, boxes, confidences
 from care_sim.sources.nuscenes.splits import scenes
@@ -21,8 +21,8 @@ CAR = [10.0, 2.0, -1.0, 4.6, 1.9, 1.7, 0.3]
 
 def shot(sensor):
     nobody = Annotations(NOTHING, NOTHING, np.empty((0, 7)))
-    sights = Sights(ImageDetections.from_rows(np.empty((0, 9))), NOTHING)
-    return Shot(0.0, "sample", sensor, Ego(), nobody, sights, Cloud(NOTHING, np.empty((0, 3)), NOTHING))
+    identified = IdentifiedDetections(ImageDetections.from_rows(np.empty((0, 9))), NOTHING)
+    return Shot(0.0, "sample", sensor, Ego(), nobody, identified, Cloud(NOTHING, np.empty((0, 3)), NOTHING))
 
 
 def detections(*names, box=CAR, returns=None, scores=None):

@@ -97,19 +97,19 @@ def test_boxes_stand_where_the_street_has_them(street, film):
 
 def test_whatever_is_seen_is_annotated_and_nothing_else(film):
     for shot in film.shots:
-        seen = {*shot.cloud.objects.tolist(), *shot.sights.objects.tolist()} - {NOBODY}
+        seen = {*shot.cloud.objects.tolist(), *shot.seen.objects.tolist()} - {NOBODY}
         assert seen == set(shot.annotations.objects.tolist())
 
 
 def test_camera_boxes_are_of_their_objects_and_confident_by_pixels(film):
     for shot in film.shots:
-        sights = shot.sights.detections
+        identified = shot.seen.detections
         classes = dict(zip(shot.annotations.objects.tolist(), shot.annotations.classes.tolist(), strict=True))
-        assert [classes[number] for number in shot.sights.objects.tolist()] == sights.classes.tolist()
-        assert sights.confidences.min() >= MIN_PIXELS / (MIN_PIXELS + FULL_CONFIDENCE)
-        assert set(sights.cameras.tolist()) <= set(range(6))
-        assert not sights.ages.any()
-        assert not sights.yaw_changes.any()
+        assert [classes[number] for number in shot.seen.objects.tolist()] == identified.classes.tolist()
+        assert identified.confidences.min() >= MIN_PIXELS / (MIN_PIXELS + FULL_CONFIDENCE)
+        assert set(identified.cameras.tolist()) <= set(range(6))
+        assert not identified.ages.any()
+        assert not identified.yaw_changes.any()
 
 
 def test_the_same_street_gives_the_same_film_to_the_last_bit(street, film):
@@ -120,8 +120,8 @@ def test_the_same_street_gives_the_same_film_to_the_last_bit(street, film):
             (shot.cloud.objects, again.cloud.objects),
             (shot.annotations.boxes, again.annotations.boxes),
             (shot.annotations.objects, again.annotations.objects),
-            (shot.sights.objects, again.sights.objects),
-            (shot.sights.detections.rows(), again.sights.detections.rows()),
+            (shot.seen.objects, again.seen.objects),
+            (shot.seen.detections.rows(), again.seen.detections.rows()),
         ):
             assert np.array_equal(first, second)
 
@@ -158,7 +158,7 @@ def test_who_stands_hidden_at_the_first_keyframe_was_present_and_is_annotated_no
 
 def test_a_car_beyond_the_lidar_is_annotated_where_a_camera_shows_it():
     shot = shot_of(("car", 55.0, 0.0))
-    assert shot.sights.objects.tolist() == [0]
+    assert shot.seen.objects.tolist() == [0]
     assert shot.annotations.objects.tolist() == [0]
     assert (shot.cloud.objects == NOBODY).all()
     assert len(shot_of(("car", SIGHT_M + 3.0, 0.0)).annotations) == 0
@@ -166,7 +166,7 @@ def test_a_car_beyond_the_lidar_is_annotated_where_a_camera_shows_it():
 
 @pytest.mark.parametrize(("place", "camera"), [((15, 0), 0), ((9, 13), 1), ((9, -13), 2), ((-5, 14), 3), ((-15, 0), 5)])
 def test_the_ring_of_cameras_sees_all_around(place, camera):
-    assert camera in shot_of(("car", *place)).sights.detections.cameras.tolist()
+    assert camera in shot_of(("car", *place)).seen.detections.cameras.tolist()
 
 
 def test_a_body_that_comes_near_later_is_where_it_then_is():
@@ -179,7 +179,7 @@ def test_a_body_that_comes_near_later_is_where_it_then_is():
 
 def test_an_empty_street_shows_its_road():
     shot = shot_of()
-    assert (len(shot.annotations), len(shot.sights.objects)) == (0, 0)
+    assert (len(shot.annotations), len(shot.seen.objects)) == (0, 0)
     assert shot.cloud.points[:, 2] == pytest.approx(-LIDAR_POSITION[2])
 
 

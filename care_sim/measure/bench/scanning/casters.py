@@ -11,7 +11,7 @@ from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.bench.scanning.embree import Embree
 from care_sim.measure.bench.scanning.mujoco import MuJoCo
-from care_sim.sensors.engines.engine import ENGINES
+from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet import BulletWorld
 

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
-from care_sim.world.footprints import Footprints
 
 BUS, EGO = CATALOGUE["bus"], CATALOGUE["ego"]
 
@@ -28,21 +28,32 @@ def test_a_box_stands_on_the_ground_and_turns_with_its_body():
 @pytest.mark.parametrize("side", [1, -1])
 def test_near_is_told_by_the_gap_along_the_road(side, gap, near):
     ahead = side * (EGO.size[0] / 2 + gap + BUS.size[0] / 2)
-    assert footprints((EGO, (5.0, 1.0, 0.0)), (BUS, (5.0 + ahead, 1.0, 0.0))).near(1, 0.5).tolist() == near
+    assert (
+        footprints((EGO, (5.0, 1.0, 0.0)), (BUS, (5.0 + ahead, 1.0, 0.0))).near(1, 0.5).tolist()
+        == near
+    )
 
 
 @pytest.mark.parametrize(("gap", "near"), [(0.49, [2]), (0.51, [])])
 def test_a_body_across_the_road_presents_its_width(gap, near):
     ahead = EGO.size[0] / 2 + gap + BUS.size[1] / 2
-    assert footprints((EGO, (0.0, 0.0, 0.0)), (BUS, (ahead, 0.0, np.pi / 2))).near(1, 0.5).tolist() == near
+    assert (
+        footprints((EGO, (0.0, 0.0, 0.0)), (BUS, (ahead, 0.0, np.pi / 2))).near(1, 0.5).tolist()
+        == near
+    )
     beside = EGO.size[1] / 2 + gap + BUS.size[0] / 2
-    assert footprints((EGO, (0.0, 0.0, 0.0)), (BUS, (0.0, beside, np.pi / 2))).near(1, 0.5).tolist() == near
+    assert (
+        footprints((EGO, (0.0, 0.0, 0.0)), (BUS, (0.0, beside, np.pi / 2))).near(1, 0.5).tolist()
+        == near
+    )
 
 
 POSES = st.tuples(st.floats(-9, 9), st.floats(-6, 6), st.floats(-4, 4))
 
 
-@given(POSES, st.lists(st.tuples(st.sampled_from(sorted(CATALOGUE)), POSES), min_size=1, max_size=6))
+@given(
+    POSES, st.lists(st.tuples(st.sampled_from(sorted(CATALOGUE)), POSES), min_size=1, max_size=6)
+)
 def test_whatever_touches_is_near(pose, others):
     placed = [(EGO, pose), *((CATALOGUE[name], other) for name, other in others)]
     near, world = footprints(*placed).near(1, 0.5).tolist(), BulletWorld()

@@ -41,9 +41,10 @@ class Polyhedra:
 
     @property
     def tables(self) -> Tables:
-        """All parts in one: corners (c, 3) in metres; faces (f, 4) outward unit normals and distances from the body's
-        origin in metres; edges (e, 2) the two faces that meet in each, counted within the part; (k + 1, 3) where the
-        rows of each part begin in these three; (k,) body ids.
+        """All parts in one: corners (c, 3) in metres; faces (f, 4) outward unit normals and
+        distances from the body's origin in metres; edges (e, 2) the two faces that meet in each,
+        counted within the part; (k + 1, 3) where the rows of each part begin in these three; (k,)
+        body ids.
         """
         if self._tables is None:
             meshes = [_NOTHING, *map(_mesh, self._parts)]
@@ -57,7 +58,11 @@ def _mesh(part: Part) -> Mesh:
     """A part's polyhedron in the frame of its body."""
     corners, faces, edges = polyhedron(part.shape, part.size)
     centre = np.array(part.centre)
-    return corners + centre, np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre]), edges
+    return (
+        corners + centre,
+        np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre]),
+        edges,
+    )
 
 
 @lru_cache(maxsize=256)
@@ -66,7 +71,9 @@ def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
     corners = _corners(shape, np.array(size))
     hull = ConvexHull(corners)
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
-    meets = np.stack([np.repeat(number, hull.neighbors.shape[1]), number[hull.neighbors].ravel()], axis=1)
+    meets = np.stack(
+        [np.repeat(number, hull.neighbors.shape[1]), number[hull.neighbors].ravel()], axis=1
+    )
     edges = np.unique(meets[meets[:, 0] < meets[:, 1]], axis=0)
     return corners, equations * (1, 1, 1, -1), edges
 
@@ -77,7 +84,10 @@ def _corners(shape: str, size: Floats) -> Floats:
     if shape == "sphere":
         return np.multiply(directions(), size / 2)
     angles = 2 * np.pi * np.arange(RING) / RING
-    rims = [np.column_stack([np.sin(angles), np.cos(angles), np.full(RING, side)]) for side in (1.0, -1.0)]
+    rims = [
+        np.column_stack([np.sin(angles), np.cos(angles), np.full(RING, side)])
+        for side in (1.0, -1.0)
+    ]
     points = np.concatenate(rims) * size / 2
     furthest = np.argmax(np.round(directions() @ points.T, SAME_FACE), axis=1)
     drawn: Floats = points[furthest] + RIM_M * directions()
@@ -86,8 +96,8 @@ def _corners(shape: str, size: Floats) -> Floats:
 
 @cache
 def directions() -> Floats:
-    """(42, 3) the unit vectors in which Bullet's `btShapeHull` feels for the surface of a round shape: the corners of
-    an icosahedron that stands on one of them, and the middles of its edges.
+    """(42, 3) the unit vectors in which Bullet's `btShapeHull` feels for the surface of a round
+    shape: the corners of an icosahedron that stands on one of them, and the middles of its edges.
     """
     azimuths = np.deg2rad(np.arange(0, 360, 72))
     rings = [_ring(azimuths + np.deg2rad(36), -1.0), _ring(azimuths, 1.0)]
@@ -100,5 +110,7 @@ def directions() -> Floats:
 
 
 def _ring(azimuths: Floats, side: float) -> Floats:
-    points: Floats = np.column_stack([2 * np.cos(azimuths), 2 * np.sin(azimuths), np.full(len(azimuths), side)])
+    points: Floats = np.column_stack(
+        [2 * np.cos(azimuths), 2 * np.sin(azimuths), np.full(len(azimuths), side)]
+    )
     return points / math.sqrt(5)

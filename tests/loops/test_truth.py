@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from care_sim.perception.track_objects import Identities
+from care_sim.loops.truth import TrackObjects
 from care_sim.sensors.annotated import NOBODY
 
 PRESENT = {30: np.full(7, 100.0), 7: np.full(7, 200.0)}
@@ -13,16 +13,19 @@ def present(objects):
 
 
 def noted(*pairs):
-    identities = Identities()
+    track_objects = TrackObjects()
     for tracks, objects in pairs:
-        identities.note(np.array(tracks), np.array(objects))
-    return identities
+        track_objects.note(np.array(tracks), np.array(objects))
+    return track_objects
 
 
-def places(identities, tracks):
+def places(track_objects, tracks):
     """Where the objects behind the tracks are; -1 where the forecast was kept."""
-    boxes = identities.boxes(tracks, present)
-    return [-1 if np.array_equal(box, kept) else box[0] for box, kept in zip(boxes, tracks.boxes, strict=True)]
+    boxes = track_objects.boxes(tracks, present)
+    return [
+        -1 if np.array_equal(box, kept) else box[0]
+        for box, kept in zip(boxes, tracks.boxes, strict=True)
+    ]
 
 
 def test_a_track_is_where_its_object_is_and_one_without_stays(tracks_at):

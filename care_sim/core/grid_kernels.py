@@ -1,0 +1,127 @@
+"""The cells of dilated angular rectangles, compiled: hulls and wedges are such (paper, Remark 2)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.compiled import compiled
+from care_sim.core.frames import Floats, Integers
+
+
+class GridSpacing(NamedTuple):
+    """What of a grid tells the cell of a direction: its numbers of `columns` and `rows`, the
+    `column_width` and `row_height` in radians, and the elevation `top` of row 0.
+    """
+
+    columns: int
+    rows: int
+    column_width: float
+    top: float
+    row_height: float
+
+
+@compiled()
+def silhouettes(boxes: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """What of boxes (n, 7) bounds their hulls, seen from the origin, and which of them surround it.
+
+    Returns x and y (n, 5, 2) of the centre and the four corners. Then (n, 2, 2) the heights of
+    bottom and top, each with the distance in the x, y plane at which it appears lowest or highest.
+    Then (n,) whether a box stands around the origin.
+    """
+    planar, upright = np.empty((len(boxes), 5, 2)), np.empty((len(boxes), 2, 2))
+    around = np.empty(len(boxes), np.bool_)
+    for n, (x, y, z, length, width, height, yaw) in enumerate(boxes):
+        # How far the origin lies beyond the sides, in the axes of the box: the distance to the
+        # nearest point follows, 0 for an origin inside the footprint.
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        beyond = abs(cos * x + sin * y) - length / 2, abs(sin * x - cos * y) - width / 2
+        near, far = math.hypot(max(beyond[0], 0.0), max(beyond[1], 0.0)), 0.0
+
+        # Azimuths are extreme at corners; the farthest point is a corner, too.
+        planar[n, 0] = x, y
+        for k, (front, left) in enumerate(((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))):
+            along, across = front * length, left * width
+            corner = x + (cos * along - sin * across), y + (sin * along + cos * across)
+            planar[n, k + 1] = corner
+            far = max(far, math.hypot(corner[0], corner[1]))
+
+        # A bottom below the horizon appears lowest where it is nearest, one above it where it is
+        # farthest; a top the other way round.
+        bottom, top = z - height / 2, z + height / 2
+        upright[n, 0] = bottom, near if bottom < 0 else far
+        upright[n, 1] = top, near if top > 0 else far
+        around[n] = near <= 0.0
+    return planar, upright, around
+
+
+@compiled()
+def rectangle_cells(
+    azimuths: Floats,
+    elevations: Floats,
+    azimuth_margins: Integers,
+    elevation_margin: int,
+    grid: GridSpacing,
+) -> tuple[Integers, Integers]:
+    """The cells of n rectangles one after the other, each ascending, and (n,) where each ends.
+
+    A rectangle holds the `azimuths` (n, j) of its row, which lie within half a turn of the first,
+    and the `elevations` (n, k), dilated by `azimuth_margins` (n,) columns and `elevation_margin`
+    rows.
+    """
+    # Bounds first, so that the table of cells is made once and of the right size.
+    bounds, ends = np.empty((len(azimuths), 4), np.int64), np.empty(len(azimuths), np.int64)
+    size = 0
+    for n in range(len(azimuths)):
+        first, stop = bounds[n, 0], bounds[n, 1] = _columns(azimuths[n], azimuth_margins[n], grid)
+        upper, lower = bounds[n, 2], bounds[n, 3] = _rows(elevations[n], elevation_margin, grid)
+        size += (stop - first) * (lower - upper)
+        ends[n] = size
+
+    cells = np.empty(size, np.int64)
+    place = 0
+    for bound in bounds:
+        place = _lay(cells, place, bound, grid.columns)
+    return cells, ends
+
+
+@compiled()
+def _columns(azimuths: Floats, margin: int, grid: GridSpacing) -> tuple[int, int]:
+    """First column, on the grid, and the one after the last, up to a turn beyond it."""
+    # Offsets from the middle are within half a turn, so that the seam at -pi does not matter.
+    middle, right, left = azimuths[0], math.inf, -math.inf
+    for azimuth in azimuths:
+        offset = (azimuth - middle + math.pi) % (2 * math.pi) - math.pi
+        right, left = min(right, offset), max(left, offset)
+    first = math.floor((middle + right + math.pi) / grid.column_width) - margin
+    last = math.floor((middle + left + math.pi) / grid.column_width) + margin
+    start = first % grid.columns
+    return start, start + max(0, min(last - first + 1, grid.columns))
+
+
+@compiled()
+def _rows(elevations: Floats, margin: int, grid: GridSpacing) -> tuple[int, int]:
+    """First row and the one after the last; equal where the rectangle misses the grid."""
+    # A row reaches half a step above and below its ray, hence the 0.5.
+    upper = math.floor((grid.top - elevations.max()) / grid.row_height + 0.5) - margin
+    lower = math.floor((grid.top - elevations.min()) / grid.row_height + 0.5) + margin
+    first = min(max(upper, 0), grid.rows)
+    return first, max(first, min(lower + 1, grid.rows))
+
+
+@compiled()
+def _lay(cells: Integers, place: int, bounds: Integers, columns: int) -> int:
+    """Write the cells of a rectangle from `place` on; the place after them.
+
+    In every row those beyond the seam come first: their columns, and so their indices, are lower.
+    """
+    first, stop, upper, lower = bounds
+    for row in range(upper, lower):
+        for column in range(columns, stop):
+            cells[place] = row * columns + column - columns
+            place += 1
+        for column in range(first, min(stop, columns)):
+            cells[place] = row * columns + column
+            place += 1
+    return place

@@ -1,0 +1,23 @@
+"""The engine `bullet`: PyBullet's own rays and renderer, the reference for every other engine."""
+
+from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.world.bullet import BulletWorld, PixelWindow
+
+
+class Bullet:
+    """Rays and pictures of the bodies of a world where they are at the moment."""
+
+    def __init__(self, world: BulletWorld, grid: AngularGrid):
+        self._world = world
+        self._grid = grid
+
+    def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
+        """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        directions = sensor.vectors_to_world(self._grid.directions[cells])
+        return self._world.cast(sensor.origin, directions, self._grid.range_m)
+
+    def body_ids(self, camera: PinholeCamera, sensor: Frame, window: PixelWindow) -> Integers:
+        """Body ids of pixels; see `care_sim.sensors.engines.Engine`."""
+        return self._world.body_ids(camera, sensor, window)

@@ -1,0 +1,77 @@
+"""The bodies of a world as tables, a row per body: their boxes, and the parts that rays can hit.
+
+Who asks about many bodies at once, such as a compiled engine, reads these instead of PyBullet.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from care_sim.core.frames import Floats, Integers, Pose
+from care_sim.world.bodies import Part, Shape, Triple
+
+SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")
+"""Round parts stand along their own z; a shape's number is its place here."""
+
+
+class Footprints:
+    """`boxes` (m, 7) in the world frame, one row per body id: centre x, y, z, length, width, height
+    and yaw; NaN where there is no such body.
+    """
+
+    def __init__(self) -> None:
+        self.boxes = np.empty((0, 7))
+        self._halves = np.empty((0, 2))
+
+    def add(self, body: int, size: Triple, pose: Pose) -> None:
+        """Take in a body of a size on the ground plane."""
+        missing = body + 1 - len(self.boxes)
+        self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
+        self._halves = np.vstack([self._halves, np.full((missing, 2), np.nan)])
+        self.boxes[body, 2:6] = size[2] / 2, *size
+        self.move_all(np.array([body]), np.array([pose]))
+
+    def move_all(self, bodies: Integers, poses: Floats) -> None:
+        """Put bodies (n,) at poses (n, 3): x, y, heading."""
+        boxes = self.boxes[bodies]
+        boxes[:, :2], boxes[:, 6] = poses[:, :2], poses[:, 2]
+        self.boxes[bodies] = boxes
+        length, width = boxes[:, 3:5].T
+        cos, sin = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
+        extents = [length * cos + width * sin, length * sin + width * cos]
+        self._halves[bodies] = np.stack(extents, axis=1) / 2
+
+    def near(self, body: int, within: float) -> Integers:
+        """Ids of the other bodies that may be within `within` metres of one. None that is so near is
+        missing; some may be further away, since rectangles along x and y stand for the footprints.
+        """
+        gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (
+            self._halves + self._halves[body]
+        )
+        close = (gaps[:, 0] <= within) & (gaps[:, 1] <= within)
+        close[body] = False
+        return np.flatnonzero(close)
+
+
+class Primitives:
+    """Every part of the opaque bodies of one world, and where the bodies are.
+
+    `shapes` (k,) places in SHAPES, `halves` (k, 3) half extents and `offsets` (k, 3) centres of the
+    parts in the body frame, metres; `owners` (k,) body ids. `poses` (m, 7), one row per body id: x,
+    y, z in metres and the quaternion x, y, z, w, world frame.
+    """
+
+    def __init__(self) -> None:
+        self.shapes = np.empty(0, np.int64)
+        self.owners = np.empty(0, np.int64)
+        self.halves, self.offsets = np.empty((0, 3)), np.empty((0, 3))
+        self.poses = np.empty((0, 7))
+
+    def add(self, body: int, parts: Sequence[Part]) -> None:
+        """Take in a body, its parts in its own frame; a body that nothing can hit has none."""
+        self.poses = np.vstack([self.poses, np.zeros((body + 1 - len(self.poses), 7))])
+        if parts:
+            self.shapes = np.append(self.shapes, [SHAPES.index(part.shape) for part in parts])
+            self.owners = np.append(self.owners, [body] * len(parts))
+            self.halves = np.vstack([self.halves, np.array([part.size for part in parts]) / 2])
+            self.offsets = np.vstack([self.offsets, [part.centre for part in parts]])
