@@ -127,17 +127,20 @@ class ClosedLoop:
         self.picture = self._photograph(nominal, sensor, boxes)
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
         self.seen = faultless_detections([taken], self._labels)
-        """What the camera as it stands shows, before misses, false boxes and delay. Truth: for
+        """What the camera as it is mounted shows, before misses, false boxes and delay. Truth: for
         people and scoring.
         """
-        self.belief = self._limits.belief(
-            self._odometry.reading(self.world.ego_motion),
-            self._camera.detect(
-                self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time
-            ),
-            self._memory.tracks(sensor),
-            ranges,
+        arrived = self._camera.detect(
+            self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time
         )
+        ego = self._odometry.reading(self.world.ego_motion)
+        tracks = self._memory.tracks(sensor)
+        self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
+        # A rendered box lies in the picture, so the limits leave out none but the last, too many.
+        self.detected_bodies = arrived.objects[: len(self.belief.detections)]
+        """(n,) the body behind each camera detection of the belief, NOBODY behind a false one.
+        Truth: for people and scoring.
+        """
 
     def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
         window = window_on(camera, boxes)

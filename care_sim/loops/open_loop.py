@@ -121,12 +121,12 @@ class OpenLoop:
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
-        self.belief = self._limits.belief(
-            self._odometry.reading(shot.ego),
-            self._camera.detect(shot.seen, shot.sensor.yaw, self._distances(shot), shot.time_s),
-            self._memory.tracks(shot.sensor),
-            ranges,
+        arrived = self._camera.detect(
+            shot.seen, shot.sensor.yaw, self._distances(shot), shot.time_s
         )
+        ego = self._odometry.reading(shot.ego)
+        tracks = self._memory.tracks(shot.sensor)
+        self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
 
     def _distances(self, shot: Shot) -> Floats:
         """(n,) metres to every object of the film, 0 for those that are not annotated now: else

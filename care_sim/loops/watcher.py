@@ -1,5 +1,6 @@
-"""Keyframes of the closed loop as told by somebody who sees all; gathered only while somebody
-watches.
+"""The closed loop with all that is true about it, for people who watch an episode.
+
+It is gathered only while somebody watches.
 """
 
 from dataclasses import dataclass
@@ -15,14 +16,15 @@ from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
+from care_sim.sensors.annotated import NOBODY
 from care_sim.sensors.camera import faultless_detections
 
 
 @dataclass(frozen=True)
 class Situation:
-    """What is there when the cells of a keyframe are chosen. Truth: for people and scoring, never
-    for a policy.
+    """What is there when the cells of a keyframe are chosen.
+
+    Truth: for people and scoring, never for a policy.
 
     `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n,
     7) of all actors, with `names` and `labels` (n), an index into `CLASSES` or None; `target` is
@@ -46,9 +48,9 @@ class Situation:
 
 @dataclass(frozen=True)
 class WatchedKeyframe:
-    """A keyframe: how things stood, `shares` (E, A) of the fired cells (see
-    `care_sim.core.actions`), what the scan returned as `ranges` (E, A) in metres (0 not fired,
-    maximum range no return), and the record for the scoring.
+    """A keyframe: the situation before it, `shares` (E, A) of the fired cells (see
+    `care_sim.core.actions`), `ranges` (E, A) of the scan in metres (0 not fired, maximum range no
+    return), and the record for the scoring.
     """
 
     situation: Situation
@@ -64,25 +66,23 @@ class WatchedKeyframe:
 
 
 class EpisodeWatcher:
-    """Follows the running episode of a loop from its start: one `situation` before every keyframe,
-    one `watched` after.
+    """Follows the running episode of a loop: `situation` is asked before every keyframe, `watched`
+    after it.
 
     `confidence` is the threshold of the camera's detector.
     """
 
     def __init__(self, loop: ClosedLoop, confidence: float):
-        self._loop, self._confidence = loop, confidence
+        self._loop = loop
+        self._confidence = confidence
         self._labels = {
             actor.body: actor.label for actor in loop.world.actors if actor.label is not None
         }
-        self._seen: list[IdentifiedDetections] = []
 
     def situation(self) -> Situation:
         """How things stand before the next keyframe."""
         loop, world = self._loop, self._loop.world
-        self._seen[loop.index :] = [loop.seen]
         shown = loop.belief.detections
-        objects = self._objects(shown)
         return Situation(
             time_s=world.time,
             sensor=loop.sensor,
@@ -93,35 +93,21 @@ class EpisodeWatcher:
             target=world.actors.index(world.first_sighting) if world.first_sighting else None,
             belief=loop.belief,
             known=explained(shown, loop.belief.tracks, loop.rig),
-            false=objects == NOBODY,
-            missed=self._missed(objects),
+            false=loop.detected_bodies == NOBODY,
+            missed=self._missed(loop.detected_bodies),
         )
 
     def watched(
         self, situation: Situation, action: Action, demand: Demand | None, frame: Keyframe
     ) -> WatchedKeyframe:
-        """What became of it: the loop has played the keyframe."""
+        """The keyframe that the loop has played since the situation."""
         loop = self._loop
         return WatchedKeyframe(
             situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame
         )
 
-    def _objects(self, shown: ImageDetections) -> Cells:
-        """(n,) the bodies behind detections, NOBODY behind false ones: a box is that of its
-        picture, unchanged.
-        """
-        if not len(shown):
-            return np.empty(0, np.int64)
-        taken = self._seen[-1 - round(shown.ages[0] / self._loop.rig.keyframe_s)]
-        drawn = slice(ImageDetections.COLUMNS.index("age"))
-        same = (shown.rows()[:, None, drawn] == taken.detections.rows()[None, :, drawn]).all(axis=2)
-        bodies = np.append(taken.objects, NOBODY)
-        return bodies[
-            np.where(same.any(axis=1), same.argmax(axis=1) if same.size else NOBODY, NOBODY)
-        ]
-
     def _missed(self, given: Cells) -> ImageDetections:
-        """What a camera without faults shows now, less the objects that were given."""
+        """What a camera without faults would report now, less the bodies that were `given`."""
         clear = faultless_detections([self._loop.picture], self._labels)
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence

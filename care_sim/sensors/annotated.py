@@ -56,9 +56,12 @@ class Cloud:
 
 @dataclass(frozen=True)
 class IdentifiedDetections:
-    """What the unimpaired cameras see: `detections`, age 0, and `objects` (n,) the annotated object
-    behind each box or NOBODY.
+    """Camera detections, with `objects` (n,) the annotated object or the body behind each box, or
+    NOBODY.
     """
 
     detections: ImageDetections
     objects: Cells
+
+    def __len__(self) -> int:
+        return len(self.objects)

@@ -7,10 +7,11 @@ import numpy as np
 
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Floats, Integers
+from care_sim.core.grid import Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.picture_kernels import tally
@@ -18,7 +19,7 @@ from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool, FalseBoxes
 from care_sim.world.bullet import PixelWindow
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
-"""Metres in the sensor frame: CAM_FRONT of nuScenes stands this far before and below LIDAR_TOP."""
+"""Metres in the sensor frame: CAM_FRONT of nuScenes is this far before and below LIDAR_TOP."""
 CAMERA_HEIGHT = 180
 CAMERA_WIDTH = 320
 FRONT_CAMERA = PinholeCamera(CAMERA_WIDTH, CAMERA_HEIGHT, np.deg2rad(90.0), CAMERA_FROM_LIDAR)
@@ -35,7 +36,7 @@ def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
 
 @dataclass(frozen=True)
 class Picture:
-    """What the unimpaired camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,)
+    """What a camera shows: `bodies` (n,) ids, image `boxes` (n, 4) and `pixels` (n,)
     visible.
     """
 
@@ -62,8 +63,10 @@ class Picture:
 def faultless_detections(
     pictures: Sequence[Picture], labels: Mapping[int, int]
 ) -> IdentifiedDetections:
-    """What the unimpaired camera detector reports of pictures, one a camera of the rig: a box for
-    every body that `labels` maps to a class and that shows enough pixels.
+    """What the camera detector reports without faults: a box for every body that `labels` maps to a
+    class and that shows enough pixels.
+
+    `pictures` are one per camera of the rig, in its order.
     """
     rows, bodies = [], []
     for camera, picture in enumerate(pictures):
@@ -77,7 +80,7 @@ def faultless_detections(
 
 
 class CameraDetector:
-    """Detections as they arrive: they err and lag as `sensing` says.
+    """Makes of faultless detections those that arrive: they err and lag as `sensing` says.
 
     `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows.
     False boxes are made from `pool`.
@@ -92,38 +95,45 @@ class CameraDetector:
         cameras: Sequence[PinholeCamera],
         pool: BoxPool = EMPTY_POOL,
     ):
-        ghosts, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
-        self._objects, self._sensing = np.asarray(objects, np.int64), sensing
+        # Every fault has a random stream of its own: switching one on leaves the others as they are.
+        false_boxes, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
+        self._objects = np.asarray(objects, np.int64)
+        self._sensing = sensing
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
-        self._ghosts = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), ghosts)
+        self._false_boxes = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), false_boxes)
         self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
 
     def detect(
-        self, identified: IdentifiedDetections, heading: float, ranges: Floats, time_s: float
-    ) -> ImageDetections:
-        """The newest detections that are due, the surest first; `identified` are the latest, taken
-        at `heading`.
+        self, seen: IdentifiedDetections, heading: float, ranges: Floats, time_s: float
+    ) -> IdentifiedDetections:
+        """The newest detections that are due, the surest first, each with the object behind it.
 
+        `seen` are the faultless ones of this keyframe, at `time_s` and with the car's `heading`;
         `ranges` (n,) are the distances of the objects in metres, in their order.
         """
-        rows = identified.detections.rows()
-        missed, ghosts = self._misses.draw(ranges), self._ghosts.draw(rows, time_s)
+        rows, objects = seen.detections.rows(), seen.objects
+        missed = self._misses.draw(ranges)
+        false = self._false_boxes.draw(rows, time_s)
         if missed.any():
-            rows = rows[~np.isin(identified.objects, self._objects[missed])]
-        if len(ghosts):
-            rows = _mingled(rows, ghosts)
-        kept = rows[
-            (rows[:, 1] >= self._sensing.camera_confidence) & (not self._sensing.black_at(time_s))
-        ]
-        surest_first = kept[np.lexsort((kept[:, 2], -kept[:, 1]))]
-        return self._delay.newest(ImageDetections.from_rows(surest_first), heading)
+            left = ~np.isin(objects, self._objects[missed])
+            rows, objects = rows[left], objects[left]
+        if len(false):
+            rows, objects = _with_false_boxes(rows, objects, false)
+        sure = rows[:, 1] >= self._sensing.camera_confidence
+        reported = np.flatnonzero(sure & (not self._sensing.black_at(time_s)))
+        # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
+        order = reported[np.lexsort((rows[reported, 2], -rows[reported, 1]))]
+        detections = ImageDetections.from_rows(rows[order])
+        return self._delay.newest(IdentifiedDetections(detections, objects[order]), heading)
 
 
-def _mingled(rows: Floats, others: Floats) -> Floats:
-    """Both tables in an order of their numbers, so that of boxes that sort alike none says where it
-    came from.
+def _with_false_boxes(rows: Floats, objects: Cells, false: Floats) -> tuple[Floats, Cells]:
+    """True and `false` boxes in an order of their numbers alone.
+
+    Boxes of equal confidence and left edge keep this order, so it must not tell which are false.
     """
-    together = np.concatenate([rows, others])
-    return together[np.lexsort(together.T)]
+    together = np.concatenate([rows, false])
+    order = np.lexsort(together.T)
+    return together[order], np.append(objects, np.full(len(false), NOBODY))[order]

@@ -12,58 +12,81 @@ from care_sim.core.conditions import CameraFaults
 from care_sim.core.frames import Floats
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
+from care_sim.sensors.annotated import IdentifiedDetections
 
-NOTHING_SEEN = ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS))))
+NOTHING_SEEN = IdentifiedDetections(
+    ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
+)
 
 
 class Misses:
-    """Which objects the camera misses: in the long run the stated share, for a burst of keyframes
-    at a time.
+    """Which objects the camera misses: in the long run the stated share, in bursts of keyframes.
 
-    One number is drawn for every object in every frame, seen or not, so that every policy meets the
-    same misses.
+    One number is drawn for every object at every keyframe, seen or not, so that every policy meets
+    the same misses.
     """
 
     def __init__(self, objects: int, faults: CameraFaults, rng: np.random.Generator):
-        self._faults, self._rng = faults, rng
+        self._faults = faults
+        self._rng = rng
         self._lasting = np.zeros(objects, np.int64)
+        """(n,) keyframes for which each object's burst still lasts."""
         self._started = False
 
     def draw(self, ranges: Floats) -> NDArray[np.bool_]:
-        """(n,) who is missed in this frame; `ranges` (n,) are distances in metres."""
-        if not (self._faults.false_negative_rate or self._faults.false_negative_per_m):
+        """(n,) who is missed at this keyframe; `ranges` (n,) are distances in metres."""
+        faults = self._faults
+        if not (faults.false_negative_rate or faults.false_negative_per_m):
             return np.zeros(len(ranges), bool)
-        burst = self._faults.false_negative_burst
-        rates = np.minimum(
-            self._faults.false_negative_rate + self._faults.false_negative_per_m * ranges, 1.0
-        )
+        rates = faults.false_negative_rate + faults.false_negative_per_m * ranges
+        rates = np.minimum(rates, 1.0)
         draws = self._rng.random(len(rates))
         if self._started:
-            begins = (self._lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
-            self._lasting = np.where(begins, burst, self._lasting)
+            self._continue(rates, draws)
         else:
-            hit = draws < rates
-            served = np.floor(
-                burst * np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
-            ).astype(np.int64)
-            self._lasting = np.where(hit, burst - served, 0)
-            self._started = True
+            self._start(rates, draws)
         missed = self._lasting > 0
         self._lasting -= missed
         return missed
 
+    def _start(self, rates: Floats, draws: Floats) -> None:
+        """The first keyframe shows the long run: an object is missed at its rate, and whoever is
+        missed is at any keyframe of its burst with equal chance.
+        """
+        burst = self._faults.false_negative_burst
+        hit = draws < rates
+        # A draw below the rate, divided by it, is again evenly distributed from 0 to 1.
+        share = np.divide(draws, rates, out=np.zeros_like(draws), where=hit)
+        served = np.floor(burst * share).astype(np.int64)
+        self._lasting = np.where(hit, burst - served, 0)
+        self._started = True
 
-class _Taken(NamedTuple):
-    detections: ImageDetections
+    def _continue(self, rates: Floats, draws: Floats) -> None:
+        """Bursts begin among the objects that are in none."""
+        burst = self._faults.false_negative_burst
+        # With the chance p that a burst of L keyframes begins, (1 - p) / p keyframes without one
+        # lie between two bursts on the mean. The share of missed keyframes is
+        # L / (L + (1 - p) / p); it is the rate r for p = r / (L - (L - 1) r).
+        begins = (self._lasting == 0) & (draws < rates / (burst - (burst - 1) * rates))
+        self._lasting = np.where(begins, burst, self._lasting)
+
+
+class _SentPicture(NamedTuple):
+    """The detections of a picture on their way: taken at `keyframe` with the car's `heading`, they
+    arrive at the keyframe `due`.
+    """
+
+    seen: IdentifiedDetections
     heading: float
-    frame: int
+    keyframe: int
     due: int
 
 
 @dataclass
 class Delay:
-    """Hands out the newest picture that has arrived; each is late by the latency and its own
-    jitter.
+    """Hands out the newest picture that has arrived.
+
+    Each is late by `latency` keyframes, and by 0 to `jitter` more that are drawn for it.
     """
 
     latency: int
@@ -72,29 +95,32 @@ class Delay:
     rng: np.random.Generator
 
     def __post_init__(self) -> None:
-        self._pictures: list[_Taken] = []
-        self._frame = -1
+        self._sent: list[_SentPicture] = []
+        self._keyframe = -1
 
-    def newest(self, detections: ImageDetections, heading: float) -> ImageDetections:
+    def newest(self, seen: IdentifiedDetections, heading: float) -> IdentifiedDetections:
         """Take in this keyframe's detections; return the newest that are due, with age and yaw
         change.
         """
-        self._frame += 1
+        self._keyframe += 1
         late = self.latency + (int(self.rng.integers(self.jitter + 1)) if self.jitter else 0)
-        self._pictures.append(_Taken(detections, heading, self._frame, self._frame + late))
-        due = [
-            number for number, picture in enumerate(self._pictures) if picture.due <= self._frame
-        ]
-        if not due:
+        self._sent.append(_SentPicture(seen, heading, self._keyframe, self._keyframe + late))
+        arrived = [n for n, picture in enumerate(self._sent) if picture.due <= self._keyframe]
+        if not arrived:
             return NOTHING_SEEN
-        self._pictures = self._pictures[due[-1] :]
-        newest = self._pictures[0]
-        count = len(newest.detections)
-        return replace(
-            newest.detections,
-            ages=np.full(count, (self._frame - newest.frame) * self.keyframe_s),
-            yaw_changes=np.full(count, heading - newest.heading),
+        # Jitter lets a picture overtake the ones before it, which are then never handed out.
+        self._sent = self._sent[arrived[-1] :]
+        return self._aged(self._sent[0], heading)
+
+    def _aged(self, picture: _SentPicture, heading: float) -> IdentifiedDetections:
+        count = len(picture.seen)
+        age_s = (self._keyframe - picture.keyframe) * self.keyframe_s
+        detections = replace(
+            picture.seen.detections,
+            ages=np.full(count, age_s),
+            yaw_changes=np.full(count, heading - picture.heading),
         )
+        return replace(picture.seen, detections=detections)
 
 
 def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:

@@ -29,12 +29,9 @@ class Detector(CameraDetector):
 
     def detect(self, picture, heading):
         self.frame += 1
-        return super().detect(
-            faultless_detections([picture], self.labels),
-            heading,
-            self.ranges,
-            self.frame * self.keyframe_s,
-        )
+        seen = faultless_detections([picture], self.labels)
+        time_s = self.frame * self.keyframe_s
+        return super().detect(seen, heading, self.ranges, time_s).detections
 
 
 def detector(labels, keyframe_s=0.1, seed=0, **faults):

@@ -10,6 +10,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import CAMERA_FAULTS, CameraFaults, Conditions, Sensing
 from care_sim.core.types import ImageDetections
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 
@@ -68,12 +69,17 @@ def test_misses_grow_with_the_distance_up_to_all():
 
 def tagged(number):
     """One detection that says which picture it is of."""
-    return ImageDetections.from_rows(np.array([[0, 0.9, number, 0, number + 1, 1, 0, 0, 0]], float))
+    row = [0, 0.9, number, 0, number + 1, 1, 0, 0, 0]
+    return IdentifiedDetections(
+        ImageDetections.from_rows(np.array([row], float)), np.array([number])
+    )
 
 
 def delivered(latency, jitter, frames, seed=0):
     delay = Delay(latency, jitter, 0.1, np.random.default_rng(seed))
-    return [delay.newest(tagged(n), 0.01 * n) for n in range(frames)]
+    handed_out = [delay.newest(tagged(n), 0.01 * n) for n in range(frames)]
+    assert all(seen.objects.tolist() == seen.detections.boxes[:, 0].tolist() for seen in handed_out)
+    return [seen.detections for seen in handed_out]
 
 
 def test_jitter_hands_out_the_newest_picture_that_has_arrived():

@@ -17,7 +17,7 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.scenarios.dense import Dense
-from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -400,14 +400,17 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
     either order.
     """
     boxes = high, low = table((10, 20, 30, 40)), table((10, 60, 30, 80))
-    orders = []
+    orders, behind = [], []
     for true, false in (boxes, boxes[::-1]):
         lent = pool(false)
         lent.__dict__["varied"] = lambda rows, draws, lent=lent: lent.rows[rows]
         camera = CameraDetector([], Sensing(false_positive_rate=9), 0.1, SEED, [FRONT_CAMERA], lent)
         identified = IdentifiedDetections(ImageDetections.from_rows(true), np.array([0]))
-        orders.append(camera.detect(identified, 0.0, np.empty(0), 0.0).boxes.tolist())
+        arrived = camera.detect(identified, 0.0, np.empty(0), 0.0)
+        orders.append(arrived.detections.boxes.tolist())
+        behind.append(arrived.objects.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
+    assert behind == [[0, NOBODY], [NOBODY, 0]]
 
 
 @pytest.fixture(scope="module")

@@ -171,11 +171,11 @@ def moved_by_a_millimetre(monkeypatch):
 def one_box_a_pixel_wider(monkeypatch):
     detect = CameraDetector.detect
 
-    def widened(self, identified, heading, ranges, time_s):
-        seen = detect(self, identified, heading, ranges, time_s)
-        boxes = seen.boxes.copy()
+    def widened(self, seen, heading, ranges, time_s):
+        arrived = detect(self, seen, heading, ranges, time_s)
+        boxes = arrived.detections.boxes.copy()
         boxes[:1, 2] += time_s > 0.15
-        return replace(seen, boxes=boxes)
+        return replace(arrived, detections=replace(arrived.detections, boxes=boxes))
 
     monkeypatch.setattr(CameraDetector, "detect", widened)
 
