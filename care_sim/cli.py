@@ -47,9 +47,9 @@ class Detectors:
 
     def __call__(self) -> int:
         """Run it."""
-        from care_sim.perception.listing import listing
+        from care_sim.perception.detectors import detector_lines
 
-        print(*listing(), sep="\n")
+        print(*detector_lines(), sep="\n")
         return 0
 
 

@@ -43,3 +43,8 @@ def shown(value: object) -> str:
 def shortened(text: str, most: int) -> str:
     """The text, its middle left out where it is longer than `most` characters."""
     return text if len(text) <= most else f"{text[: most - 20]}...{text[-17:]}"
+
+
+def error_line(error: BaseException) -> str:
+    """The type of an error and what it says, on one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

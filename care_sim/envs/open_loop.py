@@ -22,7 +22,7 @@ from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
-from care_sim.perception.listing import PROXY, check_detector, make_detector
+from care_sim.perception.detectors import PROXY, check_detector, make_detector
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.recordings import film_of, recordings
@@ -63,7 +63,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     ### Arguments
     `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in the closed loop;
-    `detector` by name (`care_sim.perception.listing.detector_names`) and `detector_parameters`; `presence`
+    `detector` by name (`care_sim.perception.detectors.detector_names`) and `detector_parameters`; `presence`
     "annotated" or "visible", who is present at scene start and so never a first sighting
     (`care_sim.evaluation.sightings`); any field of
     `care_sim.core.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the

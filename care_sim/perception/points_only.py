@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.text import error_line
 from care_sim.core.frames import Floats, turned
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Detections
@@ -60,9 +61,8 @@ class PointsOnly:
         except MissingExtra:
             raise
         except (Exception, SystemExit) as error:
-            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             raise BrokenDetector(
-                f"detector {self._name} fails on {len(cloud)} points: {reason}"
+                f"detector {self._name} fails on {len(cloud)} points: {error_line(error)}"
             ) from error
         detections = checked(self._name, found, len(cloud))
         return detections, _objects_behind(detections.boxes, cloud)

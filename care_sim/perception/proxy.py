@@ -3,7 +3,7 @@ fired rays hit it.
 
 The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is
 made a `Detector` by `care_sim.perception.points_only.PointsOnly`;
-`care_sim.perception.listing.make_detector` gives either by name.
+`care_sim.perception.detectors.make_detector` gives either by name.
 """
 
 from collections.abc import Callable, Mapping

@@ -13,7 +13,7 @@ from care_sim.core.conditions import DEFAULTS, Conditions
 from care_sim.envs.open_loop import UNFILMED, FilmEnv
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.loops.film import Film
-from care_sim.perception.listing import PROXY
+from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest

@@ -11,8 +11,7 @@ from uuid import uuid4
 import care_sim
 from care_sim.base import package_files
 from care_sim.base.digests import combined_digest, content_digest, file_digest
-from care_sim.perception.listing import BUILT_IN as BUILT_IN_DETECTORS
-from care_sim.perception.listing import entries as detector_entries
+from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import BUILT_IN
 from care_sim.policies.installed import entries
 
@@ -44,7 +43,7 @@ def policy_digest(policy: str) -> str | None:
 
 def detector_digest(detector: str) -> str | None:
     """The same of a detector."""
-    return "" if detector in BUILT_IN_DETECTORS else _entry_digest(detector_entries()[detector])
+    return "" if detector in DETECTORS.built_in else _entry_digest(DETECTORS.entries()[detector])
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:

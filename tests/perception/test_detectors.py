@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.perception.listing import ENTRY_POINTS, detector_names, make_detector
+from care_sim.perception.detectors import DETECTORS, detector_names, make_detector
 from care_sim.perception.points_only import BrokenDetector, PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Annotations, Cloud
@@ -68,7 +68,9 @@ def installed(install):
         "lost": "Nowhere",
     }
     things |= {"listed": "listed", "loose": "loose", "quits": "quits"}
-    install("own_detectors", MODULE, ENTRY_POINTS, returns="Middle", torchscript="Middle", **things)
+    install(
+        "own_detectors", MODULE, DETECTORS.group, returns="Middle", torchscript="Middle", **things
+    )
 
 
 def test_ours_are_known():
@@ -76,7 +78,7 @@ def test_ours_are_known():
     assert isinstance(make_detector("returns", HEIGHT, min_returns=5), ReturnsProxy)
 
 
-def test_the_cluster_detector_finds_a_car_and_names_the_object(open3d):
+def test_the_cluster_detector_finds_a_car_and_names_the_object():
     found, objects = make_detector("cluster", HEIGHT).detect(CLOUD, CAR)
     assert (found.classes.tolist(), objects.tolist()) == ([0], [3])
 
@@ -114,13 +116,13 @@ def test_a_built_in_name_is_taken(installed):
 
 
 def test_of_two_with_one_name_the_first_on_the_path_counts(install):
-    install("behind", MODULE, ENTRY_POINTS, twin="Stubborn")
-    install("ahead", MODULE, ENTRY_POINTS, twin="Middle")
+    install("behind", MODULE, DETECTORS.group, twin="Stubborn")
+    install("ahead", MODULE, DETECTORS.group, twin="Middle")
     assert len(make_detector("twin", HEIGHT).detect(CLOUD, CAR)[0]) == 1
 
 
 def test_a_package_that_ends_the_program_gets_one_line(install):
-    install("rude_detectors", "raise SystemExit('no device')", ENTRY_POINTS, rude="Any")
+    install("rude_detectors", "raise SystemExit('no device')", DETECTORS.group, rude="Any")
     with pytest.raises(
         BrokenDetector, match=r"^detector rude cannot be loaded: SystemExit: no device$"
     ):

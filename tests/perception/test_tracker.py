@@ -122,7 +122,7 @@ def test_an_undetected_track_dies_after_a_second_and_a_half(keyframe_s, kept):
 
 
 def test_an_update_names_the_track_of_every_detection():
-    """A track that goes on, one that dies in the same keyframe, and two that begin, in any order."""
+    """One goes on, one dies in the same keyframe, and two begin, in any order."""
     memory = TrackMemory(DT)
     follow(memory, [[("car", 10, 0)], *[[("truck", 30, 0)]] * 14])
     memory.predict()

@@ -382,7 +382,7 @@ def configuration(case):
 
 def detector(case):
     """Detectors by name."""
-    from care_sim.perception.listing import detector_names, make_detector
+    from care_sim.perception.detectors import detector_names, make_detector
 
     name = case.rng.choice([*detector_names(), some(case)])
     known = dict.fromkeys(("min_returns", "file", "grid", "unknown"))

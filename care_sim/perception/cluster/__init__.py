@@ -1,1 +1,1 @@
-"""The detector that sees points only: road removed, points grouped, boxes fitted, classes by size."""
+"""The detector that sees points only: remove the road, group points, fit boxes, tell classes."""

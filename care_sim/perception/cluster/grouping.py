@@ -5,8 +5,10 @@ apart (1 m at 45 m), then need no bridging, only the columns, 0.012 rad apart, d
 """
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from care_sim.base.extras import import_open3d
 from care_sim.core.frames import Floats
 from care_sim.core.grid import AngularGrid, Cells
 
@@ -27,15 +29,18 @@ def cluster_radius(grid: AngularGrid, range_m: float) -> float:
 def clusters_of(plan: Floats, grid: AngularGrid) -> list[Cells]:
     """The clusters of points (P, 2) x, y in the sensor frame, as indices; every point is in one.
 
-    Connected parts at `cluster_radius`: DBSCAN with one point as the least, so that no border point
-    can fall to either of two clusters and the order of the points does not matter. Needs Open3D.
-    Raises MissingExtra.
+    Two points nearer than `cluster_radius` belong together, and so do those that others connect.
+    This is DBSCAN with one point as the least (Ester, Kriegel, Sander, Xu, KDD 1996): every point
+    is a core point, so no border point can fall to either of two clusters, and the order of the
+    points does not matter. Clusters come in the order of their first points.
     """
-    open3d = import_open3d()
     if not len(plan):
         return []
-    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(_even(plan, grid)))
-    labels = np.asarray(cloud.cluster_dbscan(eps=1.0, min_points=1), np.int64)
+    points = _even(plan, grid)
+    # The tree finds pairs up to its radius; neighbours are nearer than 1, and not at it.
+    pairs = cKDTree(points).query_pairs(np.nextafter(1.0, 0.0), output_type="ndarray")
+    near = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(points), len(points)))
+    _, labels = connected_components(near, directed=False)
     order = np.argsort(labels, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
 

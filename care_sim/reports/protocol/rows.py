@@ -14,7 +14,7 @@ from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import Ratio, RatioLevel, Tallies, averaged, ratio_level
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.evaluation.strata import thirds
-from care_sim.perception.listing import PROXY
+from care_sim.perception.detectors import PROXY
 from care_sim.study.row_reading import policy_of, tags_of_row, with_parameters
 from care_sim.study.task import FULL, REFERENCE, Row
 

@@ -1,4 +1,4 @@
-"""How much the cluster detector finds on clouds cast at bodies of the catalogue, every cell fired."""
+"""What the cluster detector finds on clouds cast at bodies of the catalogue, every cell fired."""
 
 import time
 
@@ -58,20 +58,20 @@ def share_found(world, grid, kind, ranges):
         ("pedestrian", (25, 30), 0.4),
     ],
 )
-def test_the_share_found_at_full_scan(open3d, bullet, grid, kind, ranges, least):
+def test_the_share_found_at_full_scan(bullet, grid, kind, ranges, least):
     found, others = share_found(bullet, grid, kind, ranges)
     assert found >= least
     assert others <= 0.75
 
 
-def test_the_limit_of_the_grid_is_reported_not_hidden(open3d, bullet, grid):
+def test_the_limit_of_the_grid_is_reported_not_hidden(bullet, grid):
     """A person at 40 m is half a metre wide where columns are half a metre apart: one or two
     returns.
     """
     assert share_found(bullet, grid, "pedestrian", (40, 45))[0] == 0
 
 
-def test_a_street_is_detected_within_a_keyframe(open3d, bullet, grid):
+def test_a_street_is_detected_within_a_keyframe(bullet, grid):
     """The open loop has 0.5 s between keyframes; the bound is loose, machines differ."""
     for kind, x, y in STREET:
         bullet.add(CATALOGUE[kind], (x, y, 0.0))

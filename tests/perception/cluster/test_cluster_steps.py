@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from care_sim.core.frames import turned
 from care_sim.core.grid import AngularGrid
 from care_sim.perception.cluster.box_fitting import Sides, _closeness, fit_sides
-from care_sim.perception.cluster.grouping import NEAR_RADIUS_M, cluster_radius, clusters_of
+from care_sim.perception.cluster.grouping import NEAR_RADIUS_M, _even, cluster_radius, clusters_of
 from care_sim.perception.cluster.road import STEEPEST, heights_above, road_plane
 from care_sim.perception.cluster.size_classes import best_guess
 from tests.helpers.made_points import HEIGHT, face, road, shell
@@ -46,7 +46,7 @@ def test_the_radius_grows_with_the_range_once_columns_are_far_apart(grid, range_
 
 
 @given(range_m=st.floats(3, 50), bearing=st.floats(-np.pi, np.pi), way=st.floats(-np.pi, np.pi))
-def test_two_points_belong_together_up_to_the_radius(open3d, grid, range_m, bearing, way):
+def test_two_points_belong_together_up_to_the_radius(grid, range_m, bearing, way):
     """Whichever way the second lies, also across the seam of the azimuths, within what the bend
     leaves open.
     """
@@ -56,9 +56,29 @@ def test_two_points_belong_together_up_to_the_radius(open3d, grid, range_m, bear
     assert len(clusters_of(np.array([first, first + 1.07 * step]), grid)) == 2
 
 
-def test_clusters_hold_every_point_once(open3d, grid):
+def test_clusters_hold_every_point_once(grid):
     plan = np.random.default_rng(0).uniform(-40, 40, (500, 2))
     assert np.array_equal(np.sort(np.concatenate(clusters_of(plan, grid))), np.arange(500))
+
+
+def dbscan(open3d, plan, grid):
+    """The clusters by Open3D."""
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(_even(plan, grid)))
+    labels = np.asarray(cloud.cluster_dbscan(eps=1.0, min_points=1))
+    return [np.flatnonzero(labels == label).tolist() for label in range(labels.max() + 1)]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_clusters_are_those_of_dbscan_in_its_order(open3d, grid, seed):
+    """Crowded and sparse clouds; on a lattice of the radius whole rows of points tie."""
+    rng = np.random.default_rng(seed)
+    for plan in (
+        rng.uniform(-40, 40, (2000, 2)),
+        rng.normal(0, 5, (2000, 2)),
+        NEAR_RADIUS_M * rng.integers(-15, 15, (300, 2)),
+    ):
+        clusters = [rows.tolist() for rows in clusters_of(plan, grid)]
+        assert clusters == dbscan(open3d, plan, grid)
 
 
 @pytest.mark.parametrize("degrees", [0, 38, 60, 80, 121])

@@ -1,0 +1,91 @@
+"""Things that a user asks for by name: the built-in ones, and those that installed packages add.
+
+A package adds one through an entry point: its name is what the user writes, its object is a class
+or another callable that makes the thing. Of two entries with one name the first on the path counts,
+as for modules. A built-in name cannot be taken.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Generic, TypeVar
+
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import error_line
+
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class Plugins(Generic[Made]):
+    """All things of one `kind`, such as "detector": the `built_in` makers by name, and the entries
+    of the entry-point `group`.
+
+    `faults` says in which ways a loaded object makes nothing of the kind; each is the end of a
+    sentence that begins with the object's place.
+    """
+
+    kind: str
+    group: str
+    built_in: Mapping[str, Callable[..., Made]]
+    faults: Callable[[Any], Iterable[str]]
+
+    def names(self) -> list[str]:
+        """The built-in names in their order, then those of installed packages in alphabetical
+        order.
+        """
+        return [*self.built_in, *sorted(set(self.entries()) - set(self.built_in))]
+
+    def check(self, name: object) -> None:
+        """Raise InvalidInput for what is no name of this kind."""
+        # Installed packages are searched only for a name that is not built in.
+        if not (isinstance(name, str) and name in self.built_in):
+            check_known(self.kind, name, self.names())
+
+    def maker(self, name: str) -> Callable[..., Made]:
+        """What makes the thing.
+
+        Raises InvalidInput with the reason for one that cannot be loaded, and for an unknown name.
+        """
+        if name in self.built_in:
+            return self.built_in[name]
+        self.check(name)
+        return self.load(self.entries()[name])
+
+    def all_entries(self) -> list[EntryPoint]:
+        """Every entry of installed packages in order of name; of one name in order of the path."""
+        return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
+
+    def entries(self) -> dict[str, EntryPoint]:
+        """The entry that counts, by name."""
+        return {entry.name: entry for entry in reversed(self.all_entries())}
+
+    def hidden_entries(self) -> Iterator[tuple[EntryPoint, EntryPoint | None]]:
+        """The entries that do not count, each with the one that does; None for a built-in thing."""
+        counting: dict[str, EntryPoint] = {}
+        for entry in self.all_entries():
+            first = counting.setdefault(entry.name, entry)
+            if entry.name in self.built_in:
+                yield entry, None
+            elif first is not entry:
+                yield entry, first
+
+    def load(self, entry: EntryPoint) -> Callable[..., Made]:
+        """What an entry names. Raises InvalidInput with the reason, in one line, when it is of no
+        use.
+        """
+        try:
+            made = entry.load()
+        # Foreign code may fail in any way; some leaves by `sys.exit`.
+        except (Exception, SystemExit) as error:
+            raise InvalidInput(error_line(error)) from error
+        for fault in self.faults(made):
+            raise InvalidInput(f"{entry.value} {fault}")
+        maker: Callable[..., Made] = made
+        return maker
+
+
+def package_of(entry: EntryPoint) -> str:
+    """The distribution with its version, or the module of an entry that belongs to none."""
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.module

@@ -1,0 +1,78 @@
+"""Things by name: built-in ones and those of installed packages."""
+
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.base.plugins import Plugins, package_of
+
+MODULE = """
+import sys
+
+
+def ours():
+    return "ours"
+
+
+def theirs():
+    return "theirs"
+
+
+number = 3
+
+
+def __getattr__(name):
+    sys.exit("leaves\\nin two lines")
+"""
+
+
+def faults(made):
+    if not callable(made):
+        yield f"is the number {made}"
+
+
+THINGS = Plugins("thing", "care_sim.things", {"usual": lambda: "usual"}, faults)
+
+
+@pytest.fixture
+def installed(install):
+    """Two packages; `ahead` comes first on the path."""
+    install("behind", MODULE, THINGS.group, twin="theirs", usual="theirs", rude="missing")
+    install("ahead", MODULE, THINGS.group, twin="ours", number="number")
+
+
+def test_built_in_names_come_first_and_others_in_alphabetical_order(installed):
+    assert THINGS.names() == ["usual", "number", "rude", "twin"]
+
+
+def test_a_built_in_name_is_taken_and_of_two_the_first_on_the_path_counts(installed):
+    assert (THINGS.maker("usual")(), THINGS.maker("twin")()) == ("usual", "ours")
+
+
+def test_what_does_not_count_is_told_with_what_does(installed):
+    hidden = [
+        (package_of(entry), entry.name, winner and package_of(winner))
+        for entry, winner in THINGS.hidden_entries()
+    ]
+    assert hidden == [("behind 1.5", "twin", "ahead 1.5"), ("behind 1.5", "usual", None)]
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("number", "ahead:number is the number 3"),
+        ("rude", "SystemExit: leaves in two lines"),
+        ("nobody", "unknown thing 'nobody'"),
+    ],
+)
+def test_what_cannot_be_made_is_one_line(installed, name, reason):
+    with pytest.raises(InvalidInput) as error:
+        THINGS.maker(name)
+    assert str(error.value).startswith(reason)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["nobody", 3, None])
+def test_only_names_are_known(installed, name):
+    THINGS.check("twin")
+    with pytest.raises(InvalidInput, match="unknown thing"):
+        THINGS.check(name)
