@@ -2,13 +2,19 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim.core.frames import turned
 from care_sim.core.grid import AngularGrid
 from care_sim.perception.cluster.box_fitting import Sides, _closeness, fit_sides
-from care_sim.perception.cluster.grouping import NEAR_RADIUS_M, _even, cluster_radius, clusters_of
+from care_sim.perception.cluster.grouping import (
+    COLUMNS_APART,
+    NEAR_RADIUS_M,
+    _even,
+    cluster_radius,
+    clusters_of,
+)
 from care_sim.perception.cluster.road import STEEPEST, heights_above, road_plane
 from care_sim.perception.cluster.size_classes import best_guess
 from tests.helpers.made_points import HEIGHT, face, road, shell
@@ -45,15 +51,21 @@ def test_the_radius_grows_with_the_range_once_columns_are_far_apart(grid, range_
     assert cluster_radius(grid, range_m) == pytest.approx(radius, abs=1e-3)
 
 
+@example(range_m=12.0, bearing=0.0, way=0.0)
 @given(range_m=st.floats(3, 50), bearing=st.floats(-np.pi, np.pi), way=st.floats(-np.pi, np.pi))
 def test_two_points_belong_together_up_to_the_radius(grid, range_m, bearing, way):
-    """Whichever way the second lies, also across the seam of the azimuths, within what the bend
-    leaves open.
+    """Whichever way the second lies, also across the seam of the azimuths.
+
+    Where the radius begins to grow the plane is bent at a right angle: a step across the bend is as
+    short there as the hypotenuse of its two parts, at the least 1 / sqrt(2) of it.
     """
     first = range_m * np.array([np.cos(bearing), np.sin(bearing)])
     step = cluster_radius(grid, range_m) * np.array([np.cos(way), np.sin(way)])
     assert len(clusters_of(np.array([first, first + 0.93 * step]), grid)) == 1
-    assert len(clusters_of(np.array([first, first + 1.07 * step]), grid)) == 2
+    bend = NEAR_RADIUS_M / (COLUMNS_APART * grid.column_width)
+    is_beyond = np.hypot(*np.array([first, first + 1.07 * step]).T) > bend
+    apart = 1.07 if is_beyond[0] == is_beyond[1] else 1.5
+    assert len(clusters_of(np.array([first, first + apart * step]), grid)) == 2
 
 
 def test_clusters_hold_every_point_once(grid):
