@@ -228,7 +228,7 @@ def _command(arguments: list[str]) -> int:
     if arguments and arguments[0] in MEASURES:
         return _measure(*arguments)
     if arguments[:1] == ["train"]:
-        commands = importlib.import_module("care_sim.training").COMMANDS
+        commands = importlib.import_module("care_sim.commands.train").LEARNERS
         return _chosen_of(commands, "care-sim train", Train.__doc__, arguments[1:])
     return _chosen_of(COMMANDS, "care-sim", ABOUT, arguments)
 

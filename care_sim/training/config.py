@@ -105,12 +105,6 @@ class AgentConfig:
             if before.get(name) != value:
                 raise InvalidInput(f"{self.out}: trained with {name} {before.get(name)!r}, asked is {value!r}")
 
-    def __call__(self) -> int:
-        """Train it."""
-        from care_sim.training.run import train
-
-        return train(self)
-
 
 @dataclass(frozen=True, kw_only=True)
 class OnPolicy(AgentConfig):

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 
 from care_sim.policies import tags_of
 from care_sim.reports.figures.styles import FULL, styles
-from care_sim.training.curves import Run
+from care_sim.training.curves import TrainingRun
 
 
-def curves_figure(groups: Sequence[Sequence[Run]]) -> Figure:
-    """A panel a task: a line a training seed, their mean where there are several, rules as lines across."""
+def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
+    """A panel per recipe: a line per training seed, their mean where there are several, rules as lines across."""
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9), layout="constrained")
     panels = figure.subplots(1, len(groups), squeeze=False)[0]
     for axes, runs in zip(panels, groups, strict=True):
@@ -22,7 +22,7 @@ def curves_figure(groups: Sequence[Sequence[Run]]) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, runs: Sequence[Run]) -> None:
+def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config, marks = runs[0].config, runs[0].marks
     learner = config["algorithm"]
     drawn = styles((name, tags_of(name)) for name in (*marks, learner)) | {"full": FULL}
@@ -30,9 +30,17 @@ def _draw(axes: Axes, runs: Sequence[Run]) -> None:
     for name, height in marks.items():
         axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)
     for run in runs:
-        axes.plot(run.steps, run.values, color=colours[learner], linewidth=0.9, alpha=0.5 if len(runs) > 1 else 1.0)
+        axes.plot(
+            run.steps,
+            run.values,
+            color=colours[learner],
+            linewidth=0.9,
+            alpha=0.5 if len(runs) > 1 else 1.0,
+        )
     _mean(axes, runs, colours[learner])
-    axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))  # a run is evaluated before its first step, too
+    axes.set_xlim(
+        0, max(1, *(run.steps[-1] for run in runs))
+    )  # a run is evaluated before its first step, too
     if runs[0].closed_loop:
         axes.set_ylim(bottom=0)
     _name_lines(axes, marks | {learner: float(np.mean([run.values[-1] for run in runs]))}, colours)
@@ -41,7 +49,9 @@ def _draw(axes: Axes, runs: Sequence[Run]) -> None:
 
 def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     axes.set_title(
-        f"{config['algorithm']}, {config['env']}, {seeds} training seed{'s' * (seeds > 1)}", loc="left", size=10
+        f"{config['algorithm']}, {config['env']}, {seeds} training seed{'s' * (seeds > 1)}",
+        loc="left",
+        size=10,
     )
     trained = ", ".join(f"{budget:.3g}" for budget in config["budget"])
     axes.set_xlabel(
@@ -53,7 +63,7 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     axes.grid(axis="y", color="0.92")
 
 
-def _mean(axes: Axes, runs: Sequence[Run], colour: str) -> None:
+def _mean(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
     shared = min((run.steps for run in runs), key=len)
     if len(runs) > 1 and all(run.steps[: len(shared)] == shared for run in runs):
         values = np.mean([run.values[: len(shared)] for run in runs], axis=0)

@@ -13,11 +13,11 @@ import tyro
 
 import care_sim.wrappers
 from care_sim import cli
+from care_sim.commands.train import LEARNERS
 from care_sim.envs import IDS
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.certify.config import CertifyConfig
 from care_sim.measure.parity.config import ParityConfig
-from care_sim.training import COMMANDS as LEARNERS
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.places import ROOT
 

@@ -64,9 +64,9 @@ LONG = (
 def commands():
     """Every command line that can begin, with the dataclass of its options."""
     from care_sim.cli import COMMANDS
+    from care_sim.commands.train import LEARNERS
     from care_sim.measure.bench.config import BenchConfig
     from care_sim.measure.parity.config import ParityConfig
-    from care_sim.training import COMMANDS as LEARNERS
 
     measures = {"bench": BenchConfig, "parity": ParityConfig}
     found = {(name,): measures.get(name, kind) for name, kind in COMMANDS.items() if name != "train"}

@@ -1,0 +1,75 @@
+"""`care-sim train`: what can be trained, each a command of its own, and the figure of what was."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from care_sim.base.errors import InvalidInput
+from care_sim.reports.figures.files import check_figure, save
+from care_sim.training.config import Ppo, RecurrentPpo, Sac
+from care_sim.training.curves import read, together
+from care_sim.training.curves_figure import curves_figure
+from care_sim.training.run import train
+from care_sim.training.scorer import TrainScorer
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainPpo(Ppo):
+    """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
+
+    def __call__(self) -> int:
+        """Train it."""
+        return train(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainSac(Sac):
+    """Train an allocator by soft actor-critic."""
+
+    def __call__(self) -> int:
+        """Train it."""
+        return train(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainRecurrentPpo(RecurrentPpo):
+    """Train an allocator with a memory (an LSTM) by proximal policy optimisation."""
+
+    def __call__(self) -> int:
+        """Train it."""
+        return train(self)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Draw the learning curves of training runs, a panel a task, a line a training seed; PNG and SVG."""
+
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDERS")]
+    """The --out of training runs."""
+    out: Path = Path("runs/curves.png")
+    """File to draw; one of the same name with .svg lies beside it."""
+
+    def __call__(self) -> int:
+        """Draw them."""
+        if not self.folders:
+            raise InvalidInput(
+                "curves needs the folder of a training run, the --out of `care-sim train`"
+            )
+        groups = together(map(read, self.folders))
+        check_figure(self.out)
+        save(curves_figure(groups), self.out)
+        print(self.out.with_suffix(".png"))
+        return 0
+
+
+LEARNERS: dict[str, Callable[..., Any]] = {
+    "ppo": TrainPpo,
+    "sac": TrainSac,
+    "recurrent-ppo": TrainRecurrentPpo,
+    "learned-scorer": TrainScorer,
+    "curves": Curves,
+}
+"""What can be trained, by name; and the figure of what was."""
