@@ -3,34 +3,38 @@
 from care_sim.reports.contrasts import GATE_M, GATE_POINTS
 
 READING = (
-    "First detection: planar distance in metres from the sensor to the first-sighting actor at the first keyframe it "
-    "is detected; median [quartiles]. k/n: k of n episodes, one a seed."
+    "First detection: planar distance in metres from the sensor to the first-sighting actor at the "
+    "first keyframe it is detected; median [quartiles]. k/n: k of n episodes, one a seed."
 )
 CENSORING = (
-    "An actor that was never detected (counted under 'never') is neither a zero nor left out. Its detection distance "
-    "is at most that of the nearest scan that passed it by, and at least 0. In medians and quartiles it ranks below "
-    "every detection; one that falls on such episodes, or between them and a detection, reads 'not detected' (n.d.). "
-    "In differences it enters at that most, which favours the policy that missed; the difference is then a bound. ≤: "
-    "the true difference is at most what is printed; ≥: at least; ~: both sides missed actors, and it may lie on "
-    "either side."
+    "An actor that was never detected (counted under 'never') is neither a zero nor left out. Its "
+    "detection distance is at most that of the nearest scan that passed it by, and at least 0. In "
+    "medians and quartiles it ranks below every detection; one that falls on such episodes, or "
+    "between them and a detection, reads 'not detected' (n.d.). In differences it enters at that "
+    "most, which favours the policy that missed; the difference is then a bound. ≤: the true "
+    "difference is at most what is printed; ≥: at least; ~: both sides missed actors, and it may "
+    "lie on either side."
 )
 LEVELS = (
-    "Pass: least distance of the centres, clearance: hull to hull, both from the moment the actor is in view; medians. "
-    "Regret: first detection of the full scan of the same world minus this policy's, mean in metres, 0 at best, and "
-    "its interval; as full: episodes in which the policy detects no later."
+    "Pass: least distance of the centres, clearance: hull to hull, both from the moment the actor "
+    "is in view; medians. Regret: first detection of the full scan of the same world minus this "
+    "policy's, mean in metres, 0 at best, and its interval; as full: episodes in which the policy "
+    "detects no later."
 )
 STATISTICS = (
-    "Differences are means, paired by seed (common random numbers), with 95% percentile bootstrap intervals of 10,000 "
-    "resamples; positive favours the first named. Bold: the interval excludes zero wherever in their range the "
-    "censored distances lie, on five or more seeds. Asterisk: it does, and the mean reaches the gate stated in "
-    f"advance: {GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, 0.3 s) or "
-    f"{GATE_POINTS:.0f} points of a rate. No correction is made for the number of differences in a table."
+    "Differences are means, paired by seed (common random numbers), with 95% percentile bootstrap "
+    "intervals of 10,000 resamples; positive favours the first named. Bold: the interval excludes "
+    "zero wherever in their range the censored distances lie, on five or more seeds. Asterisk: it "
+    f"does, and the mean reaches the gate stated in advance: {GATE_M} m of first detection (the "
+    f"road covered at 30 km/h while the brake builds up, 0.3 s) or {GATE_POINTS:.0f} points of a "
+    "rate. No correction is made for the number of differences in a table."
 )
 COVERAGE = (
-    "The ego covers 0.8 m of road a keyframe, so differences come in such steps. How often the intervals hold the "
-    "truth was measured on synthetic differences: of 30 seeds, 90 to 96 times in 100; of 5 seeds, only about 80 "
-    "times, and about 40 times where one episode in ten differs and most sets of five show no difference at all. An "
-    "interval without width says that all seeds differ alike, not that the estimate is exact."
+    "The ego covers 0.8 m of road a keyframe, so differences come in such steps. How often the "
+    "intervals hold the truth was measured on synthetic differences: of 30 seeds, 90 to 96 times "
+    "in 100; of 5 seeds, only about 80 times, and about 40 times where one episode in ten differs "
+    "and most sets of five show no difference at all. An interval without width says that all "
+    "seeds differ alike, not that the estimate is exact."
 )
 CAPTION = " ".join([READING, CENSORING, LEVELS, STATISTICS, COVERAGE])
 COMPARED = " ".join([READING, CENSORING, STATISTICS, COVERAGE])

@@ -1,6 +1,7 @@
 """What is compared between policies, and from which size on a difference counts.
 
-Policies are compared seed by seed, because a seed fixes world, faults and floor (common random numbers).
+Policies are compared seed by seed, because a seed fixes world, faults and floor (common random
+numbers).
 """
 
 from collections.abc import Callable, Sequence
@@ -11,8 +12,8 @@ from care_sim.study.row_reading import detection
 from care_sim.study.task import Row
 
 GATE_M = 2.5
-"""What the ego covers at 30 km/h (8.33 m/s) while the controller's brake builds up (0.3 s); an earlier detection
-by less buys less than the reaction.
+"""What the ego covers at 30 km/h (8.33 m/s) while the controller's brake builds up (0.3 s); an
+earlier detection by less buys less than the reaction.
 """
 GATE_POINTS = 5.0
 """The gate of the paper (Sec. 5.2), fixed there before the runs."""
@@ -20,7 +21,9 @@ GATE_POINTS = 5.0
 
 @dataclass(frozen=True)
 class Measure:
-    """A quantity of an episode, its unit and decimals, and the `gate`: the smallest mean difference that counts."""
+    """A quantity of an episode, its unit and decimals, and the `gate`: the smallest mean difference
+    that counts.
+    """
 
     name: str
     unit: str
@@ -31,7 +34,9 @@ class Measure:
 
 DETECTION = Measure("First detection", "m", 1, GATE_M, detection)
 BRAKED = Measure("Braked", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
-DETECTED = Measure("Detected", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored)))
+DETECTED = Measure(
+    "Detected", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored))
+)
 
 
 @dataclass(frozen=True)
@@ -53,12 +58,20 @@ class Contrast:
 
     @property
     def counts(self) -> bool:
-        """Whether the interval excludes zero and the mean difference reaches the gate, whatever the censored were."""
+        """Whether the interval excludes zero and the mean difference reaches the gate, whatever the
+        censored were.
+        """
         return self.excludes_zero and abs(self.difference.cautious.mean) >= self.measure.gate
 
 
-def contrast(measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None) -> Contrast | None:
+def contrast(
+    measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
+) -> Contrast | None:
     """`ours` minus `theirs`, paired by seed; None without shared seeds."""
     a, b = ({row["seed"]: measure.read(row) for row in rows or ()} for rows in (ours, theirs))
     seeds = sorted(set(a) & set(b))
-    return Contrast(measure, difference([a[s] for s in seeds], [b[s] for s in seeds])) if seeds else None
+    return (
+        Contrast(measure, difference([a[s] for s in seeds], [b[s] for s in seeds]))
+        if seeds
+        else None
+    )

@@ -37,7 +37,7 @@ def median(values: Quartiles | None) -> str:
 
 
 def quarters(values: Quartiles) -> str:
-    """The quartiles around a median detection distance; nothing where all three are not detected."""
+    """The quartiles around a median detection distance; empty where all three are not detected."""
     if values.high is None:
         return ""
     low, high = ("n.d." if value is None else f"{value:.1f}" for value in (values.low, values.high))
@@ -80,7 +80,8 @@ def _end(end: float, decimals: int) -> str:
 
 
 def _mean(contrast: Contrast) -> str:
-    return f"{contrast.difference.bound}{contrast.mean:+z.{contrast.measure.decimals}f}{'*' if contrast.counts else ''}"
+    star = "*" if contrast.counts else ""
+    return f"{contrast.difference.bound}{contrast.mean:+z.{contrast.measure.decimals}f}{star}"
 
 
 def _weighed(contrast: Contrast, text: str) -> str:

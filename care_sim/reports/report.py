@@ -21,14 +21,20 @@ from care_sim.study.task import Row
 
 
 def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
-    """The rows in a folder of results, their study, and what is missing. Raises InvalidInput where there are none."""
+    """The rows in a folder of results, their study, and what is missing. Raises InvalidInput where
+    there are none.
+    """
     kind = kind_in(folder)
     if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
-        raise InvalidInput(f"{folder} holds an unfinished study; the command that began it goes on there")
+        raise InvalidInput(
+            f"{folder} holds an unfinished study; the command that began it goes on there"
+        )
     path = folder / kind.file
     study = study_of(path)
     if study.kind is not kind:
-        raise InvalidInput(f"{path} holds no rows of the study {study.name}, which are in {study.kind.file}")
+        raise InvalidInput(
+            f"{path} holds no rows of the study {study.name}, which are in {study.kind.file}"
+        )
     return read_rows(path, study.schema), study, read_notes(path)[1]
 
 
@@ -40,13 +46,20 @@ class Report:
     figures: Mapping[str, Figure]
 
     @classmethod
-    def of(cls, rows: Sequence[Row], study: Study = SWEEP, left_out: Sequence[str] = ()) -> "Report":
+    def of(
+        cls, rows: Sequence[Row], study: Study = SWEEP, left_out: Sequence[str] = ()
+    ) -> "Report":
         """The report of a study that lacks what is `left_out`."""
-        tables, closing = study.tables(rows), _closing(rows, study, left_out)
-        statements = "## Statements\n\n" + "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
+        tables = study.tables(rows)
+        closing = _closing(rows, study, left_out)
+        statements = "## Statements\n\n" + "".join(
+            f"- {unmarked(sentence)}\n" for sentence in closing
+        )
         pages = [f"{study.caption}\n", *(table.markdown() for table in tables), statements]
         texts = [PREAMBLE, paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
-        return cls({"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows))
+        return cls(
+            {"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows)
+        )
 
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""
@@ -54,15 +67,23 @@ class Report:
             write_text(folder / name, text)
         for name, figure in self.figures.items():
             save(figure, folder / name)
-        remove_others(folder, (name for known in STUDIES.values() for name in known.figure_names), self.figures)
+        remove_others(
+            folder,
+            (name for known in STUDIES.values() for name in known.figure_names),
+            self.figures,
+        )
 
 
-def write_report(rows: Sequence[Row], folder: Path, study: Study = SWEEP, left_out: Sequence[str] = ()) -> None:
+def write_report(
+    rows: Sequence[Row], folder: Path, study: Study = SWEEP, left_out: Sequence[str] = ()
+) -> None:
     """Make a report and write it into a folder."""
     Report.of(rows, study, left_out).write(folder)
 
 
-def print_report(rows: Sequence[Row], console: Console, study: Study = SWEEP, left_out: Sequence[str] = ()) -> None:
+def print_report(
+    rows: Sequence[Row], console: Console, study: Study = SWEEP, left_out: Sequence[str] = ()
+) -> None:
     """Print the tables, how to read them, and the closing sentences."""
     for table in study.tables(rows):
         if table.terminal:

@@ -32,9 +32,9 @@ from care_sim.study.task import Row
 class Study:
     """How the rows of a study are shown: all pure functions of them.
 
-    `title` names it to readers; `closing` are sentences after the tables; `figure_names` every figure that the study
-    can draw, as patterns in which a * stands for any text; `caption` says how to read its tables; `kind` is what it
-    plays; `columns` are further ones that its tables need.
+    `title` names it to readers; `closing` are sentences after the tables; `figure_names` every
+    figure that the study can draw, as patterns in which a * stands for any text; `caption` says how
+    to read its tables; `kind` is what it plays; `columns` are further ones that its tables need.
     """
 
     name: str
@@ -97,7 +97,15 @@ _ALL = (
         COMPARED,
         columns={COLUMN: COUNT},
     ),
-    Study("ablate", "Ablations of the closed loop", ablation_tables, _no_figures, _sweep_closing, (), COMPARED),
+    Study(
+        "ablate",
+        "Ablations of the closed loop",
+        ablation_tables,
+        _no_figures,
+        _sweep_closing,
+        (),
+        COMPARED,
+    ),
     Study(
         "faults",
         "Faults in the closed loop",

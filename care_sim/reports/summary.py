@@ -1,7 +1,8 @@
 """What the episodes of one cell of a study say together: medians, counts, regret.
 
-Rows of one scenario under the same conditions form a setting; in it, the rows of a policy at a budget
-form a cell. Actors that were never detected are handled as `care_sim.evaluation.censoring` says.
+Rows of one scenario under the same conditions form a setting; in it, the rows of a policy at a
+budget form a cell. Actors that were never detected are handled as `care_sim.evaluation.censoring`
+says.
 """
 
 from collections.abc import Sequence
@@ -9,7 +10,15 @@ from dataclasses import dataclass
 
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.reports.contrasts import DETECTION, Contrast, contrast
-from care_sim.study.row_reading import Groups, Key, Setting, detection, full_of, grouped, tags_of_row
+from care_sim.study.row_reading import (
+    Groups,
+    Key,
+    Setting,
+    detection,
+    full_of,
+    grouped,
+    tags_of_row,
+)
 from care_sim.study.task import Row
 
 
@@ -17,10 +26,11 @@ from care_sim.study.task import Row
 class Cell:
     """A policy at a budget in a setting. Distances in metres.
 
-    `tags` of the policy; `never` counts the episodes without a detection; `closest_pass` and `clearance` are over
-    the episodes in which the actor came into the camera's view, None when there are none. `regret`: detection
-    distance of the full scan of the same world minus this policy's, 0 at best, and `as_full` the episodes in which
-    the policy detects no later; None for `full` and without it.
+    `tags` of the policy; `never` counts the episodes without a detection; `closest_pass` and
+    `clearance` are over the episodes in which the actor came into the camera's view, None when
+    there are none. `regret`: detection distance of the full scan of the same world minus this
+    policy's, 0 at best, and `as_full` the episodes in which the policy detects no later; None for
+    `full` and without it.
     """
 
     setting: Setting
@@ -82,4 +92,6 @@ def _quartiles(rows: Sequence[Row], column: str) -> Quartiles | None:
 def _no_later(rows: Sequence[Row], full: Sequence[Row]) -> int:
     bounds = {row["seed"]: detection(row).value for row in full}
     found = {row["seed"]: detection(row) for row in rows if row["seed"] in bounds}
-    return sum(not reading.censored and reading.value >= bounds[seed] for seed, reading in found.items())
+    return sum(
+        not reading.censored and reading.value >= bounds[seed] for seed, reading in found.items()
+    )

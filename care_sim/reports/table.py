@@ -1,4 +1,6 @@
-"""A table of text, and how it looks on a terminal and in Markdown; `care_sim.reports.latex` sets it in LaTeX."""
+"""A table of text, and how it looks on a terminal and in Markdown; `care_sim.reports.latex` sets it
+in LaTeX.
+"""
 
 import re
 from dataclasses import dataclass
@@ -24,9 +26,10 @@ class Bold(str):
 class Table:
     """Entries of text under a title, with notes below.
 
-    A row of one entry is a heading for the rows after it. A terminal shows no `quotes`, not the columns named in
-    `files_only`, no empty columns, and nothing of a table without `terminal`; of the columns in `whole` it breaks
-    only the headings. Names in its texts may be anybody's: control codes are shown as escapes.
+    A row of one entry is a heading for the rows after it. A terminal shows no `quotes`, not the
+    columns named in `files_only`, no empty columns, and nothing of a table without `terminal`; of
+    the columns in `whole` it breaks only the headings. Names in its texts may be anybody's: control
+    codes are shown as escapes.
     """
 
     title: str
@@ -47,23 +50,40 @@ class Table:
     def rich(self) -> Group:
         """For a terminal of 80 characters."""
         table = RichTable(box=None, padding=(0, 1, 0, 0))
-        shown = [n for n, name in enumerate(self.columns) if name not in self.files_only and self._is_used(n)]
+        shown = [
+            n
+            for n, name in enumerate(self.columns)
+            if name not in self.files_only and self._is_used(n)
+        ]
         for n in shown:
             name = self.columns[n]
             heading = name.replace(" ", "\n") if name in self.whole else name
-            table.add_column(Text(heading), no_wrap=name in self.whole, overflow="fold", vertical="bottom")
+            table.add_column(
+                Text(heading), no_wrap=name in self.whole, overflow="fold", vertical="bottom"
+            )
         for row in self.rows:
             entries = row if len(row) == 1 else [row[n] for n in shown]
             table.add_row(*(_styled(entry, heading=len(row) == 1) for entry in entries))
-        return Group(Text(self.title, style="italic"), table, *(Text(note, style="dim") for note in self.notes))
+        return Group(
+            Text(self.title, style="italic"),
+            table,
+            *(Text(note, style="dim") for note in self.notes),
+        )
 
     def markdown(self) -> str:
         """For a file."""
-        heading, rule = tuple(map(unmarked, self.columns)), tuple("---" for _ in self.columns)
+        heading = tuple(map(unmarked, self.columns))
+        rule = tuple("---" for _ in self.columns)
         body = "\n".join(
-            "| " + " | ".join(line) + " |" for line in [heading, rule, *map(self._markdown_row, self.rows)]
+            "| " + " | ".join(line) + " |"
+            for line in [heading, rule, *map(self._markdown_row, self.rows)]
         )
-        return "\n\n".join([f"## {unmarked(self.title)}", body, *map(unmarked, (*self.notes, *self.quotes))]) + "\n"
+        return (
+            "\n\n".join(
+                [f"## {unmarked(self.title)}", body, *map(unmarked, (*self.notes, *self.quotes))]
+            )
+            + "\n"
+        )
 
     def _is_used(self, column: int) -> bool:
         return any(row[column] for row in self.rows if len(row) > 1)
@@ -71,7 +91,10 @@ class Table:
     def _markdown_row(self, row: Row) -> Row:
         if len(row) == 1:
             return (f"*{unmarked(row[0])}*", *("" for _ in self.columns[1:]))
-        return tuple(f"**{unmarked(entry)}**" if isinstance(entry, Bold) else unmarked(entry) for entry in row)
+        return tuple(
+            f"**{unmarked(entry)}**" if isinstance(entry, Bold) else unmarked(entry)
+            for entry in row
+        )
 
 
 def unmarked(text: str) -> str:

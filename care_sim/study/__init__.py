@@ -1,1 +1,3 @@
-"""Studies: episodes by the hundred, one tidy row each; tables and figures are pure functions of rows."""
+"""Studies: episodes by the hundred, one tidy row each; tables and figures are pure functions of
+rows.
+"""

@@ -33,9 +33,10 @@ ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 class EpisodeConfig(Conditions, Task):
     """Everything that decides an episode.
 
-    The fields are the arguments of the environments (see `care_sim.envs.closed_loop.ClosedLoopEnv`);
-    `scenario_parameters` and `policy_parameters` are pairs of name and value. Raises InvalidInput for
-    anything that scenario, environment or policy does not accept.
+    The fields are the arguments of the environments (see
+    `care_sim.envs.closed_loop.ClosedLoopEnv`); `scenario_parameters` and `policy_parameters` are
+    pairs of name and value. Raises InvalidInput for anything that scenario, environment or policy
+    does not accept.
     """
 
     scenario: str
@@ -55,7 +56,9 @@ class EpisodeConfig(Conditions, Task):
         super().__post_init__()
 
     def with_seed(self, seed: int) -> Self:
-        """The same of another seed; what is sound for one is for all, so that only the seed is checked."""
+        """The same of another seed; what is sound for one is for all, so that only the seed is
+        checked.
+        """
         check_seed(seed)
         return self.changed(seed=int(seed))
 
@@ -70,16 +73,24 @@ class EpisodeConfig(Conditions, Task):
         )
 
     def row(self) -> Row:
-        """Every parameter flat; those of scenario and policy as `scenario.NAME` and `policy.NAME`."""
+        """All parameters, flat; those of scenario and policy as `scenario.NAME`, `policy.NAME`."""
         plain = {name: getattr(self, name) for name in PLAIN_FIELDS}
-        return plain | flat("scenario", self.scenario_parameters) | flat("policy", self.policy_parameters)
+        return (
+            plain
+            | flat("scenario", self.scenario_parameters)
+            | flat("policy", self.policy_parameters)
+        )
 
     @property
     def label(self) -> str:
-        """A short name for people: scenario, policy, budget, seed and what departs from the defaults."""
+        """A short name for people: scenario, policy, budget, seed and what departs from the
+        defaults.
+        """
         main = ("scenario", "policy", "budget", "seed")
         changes = departures(self, main)
-        return " ".join([f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes])
+        return " ".join(
+            [f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes]
+        )
 
     @property
     def order(self) -> int:
@@ -115,17 +126,30 @@ def grid(
 
     `common` are further fields of `EpisodeConfig`.
     """
-    axes: list[Sequence[Any]] = [[*scenarios], [*policies], budgets, false_negative_rates, camera_latencies]
+    axes: list[Sequence[Any]] = [
+        [*scenarios],
+        [*policies],
+        budgets,
+        false_negative_rates,
+        camera_latencies,
+    ]
     check_size(prod(map(len, axes)))
     configs = (
-        _config(scenario, policy, budget, {"false_negative_rate": rate, "camera_latency": latency} | common)
+        _config(
+            scenario,
+            policy,
+            budget,
+            {"false_negative_rate": rate, "camera_latency": latency} | common,
+        )
         for scenario, policy, budget, rate, latency in product(*axes)
     )
     return of_seeds([*dict.fromkeys(configs)], seeds)
 
 
 def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[EpisodeConfig]:
-    """The configurations with each of the seeds. Raises InvalidInput for too many, before they are made."""
+    """The configurations with each of the seeds. Raises InvalidInput for too many, before they are
+    made.
+    """
     check_size(len(configs) * len(seeds))
     return [config.with_seed(seed) for config in configs for seed in dict.fromkeys(seeds)]
 

@@ -36,8 +36,8 @@ def attempt(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
 
 
 def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
-    """What `play` returns, or in one line why it returns nothing: an exception stays in the worker, which alone may
-    know its class.
+    """What `play` returns, or in one line why it returns nothing: an exception stays in the worker,
+    which alone may know its class.
     """
     try:
         return play(*arguments)
@@ -50,9 +50,9 @@ def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
 def run_episode(config: EpisodeConfig) -> Row:
     """Play an episode and return its row.
 
-    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields of
-    `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far; and
-    `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`).
+    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields
+    of `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
+    and `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`).
     """
     return trace(config)[0]
 
@@ -65,8 +65,8 @@ def trace(
 ) -> tuple[Row, list[Keyframe]]:
     """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
 
-    `begin` is called before the first keyframe, `watchers` after every one; `wrap` puts wrappers that watch around the
-    environment.
+    `begin` is called before the first keyframe, `watchers` after every one; `wrap` puts wrappers
+    that watch around the environment.
     """
     started = time.perf_counter()
     seal = Seal()
@@ -106,7 +106,9 @@ class Seal:
     def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
         """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
         poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
-        self._content.update(portable_bytes(np.asarray(fired, np.int64), observation["ranges"], poses))
+        self._content.update(
+            portable_bytes(np.asarray(fired, np.int64), observation["ranges"], poses)
+        )
 
     def hexdigest(self) -> str:
         """The hash so far."""
@@ -121,7 +123,9 @@ def _place(error: BaseException) -> str:
 
 def peak_rss_mb() -> float:
     """The most memory this process has held, in MB."""
-    status = Path("/proc/self/status")  # getrusage would count what the parent held when it started this process
+    status = Path(
+        "/proc/self/status"
+    )  # getrusage would count what the parent held when it started this process
     lines = status.read_text().splitlines() if status.exists() else []
     peaks = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
     if peaks:

@@ -4,7 +4,13 @@ import asyncio
 import logging
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import (
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
@@ -33,8 +39,8 @@ class ClusterLost(OSError):
 
 
 def processes(workers: int) -> Executor:
-    """Worker processes on this machine, forked from a clean server that has imported the simulator. They and the server
-    end with this process.
+    """Worker processes on this machine, forked from a clean server that has imported the simulator.
+    They and the server end with this process.
     """
     context = get_context("forkserver")
     context.set_forkserver_preload(
@@ -44,7 +50,8 @@ def processes(workers: int) -> Executor:
 
 
 def cluster(address: str) -> ExecutorFactory:
-    """The workers behind a dask scheduler, which need this package too; the scheduler says how many there are.
+    """The workers behind a dask scheduler, which need this package too; the scheduler says how many
+    there are.
 
     Raises MissingExtra without dask, InvalidInput when nobody answers at `address`.
     """
@@ -53,12 +60,14 @@ def cluster(address: str) -> ExecutorFactory:
 
 
 def places(executor: Executor, workers: int) -> int:
-    """How many batches are played at the same time: `workers`, or as many as a cluster has threads now."""
+    """How many batches are played at the same time: `workers`, or as many as a cluster has threads
+    now.
+    """
     return executor.threads() if isinstance(executor, ClusterExecutor) else workers
 
 
 class Processes(ProcessPoolExecutor):
-    """A pool whose processes, which a call may start, leave interrupts to this one and end with it."""
+    """A pool of processes that leave interrupts to this one and end with it."""
 
     def __init__(self, workers: int, context: BaseContext):
         with starting():
@@ -96,7 +105,9 @@ class ClusterExecutor(Executor):
         """Hand a call over. Raises ClusterLost."""
         ours: Future[T] = Future()
         with self._answering():
-            self._executor.submit(fn, *args, **kwargs).add_done_callback(partial(self._hand_on, ours))
+            self._executor.submit(fn, *args, **kwargs).add_done_callback(
+                partial(self._hand_on, ours)
+            )
         return ours
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -105,7 +116,7 @@ class ClusterExecutor(Executor):
 
     @contextmanager
     def _answering(self) -> Iterator[None]:
-        """Whatever a client raises that has lost its scheduler, and that is much, is ClusterLost."""
+        """Turn whatever a client raises that has lost its scheduler into ClusterLost."""
         try:
             yield
         except Exception as error:
@@ -129,20 +140,28 @@ def _connect(address: str) -> "Client":
     try:
         from dask.distributed import Client
     except ImportError as error:
-        raise MissingExtra("a cluster needs the extra 'cluster': pip install 'care-sim[cluster]'") from error
+        raise MissingExtra(
+            "a cluster needs the extra 'cluster': pip install 'care-sim[cluster]'"
+        ) from error
     for logger in ("distributed", "distributed.client"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         with ThreadPoolExecutor(1) as aside:
             aside.submit(asyncio.run, _knock(address)).result()
         return Client(address, timeout=PATIENCE_S)
-    except Exception as error:  # of each protocol its own, those of libraries that are not there among them
+    except (
+        Exception
+    ) as error:  # of each protocol its own, those of libraries that are not there among them
         told = one_line(str(address))
-        raise InvalidInput(f"no dask scheduler answers at {told}; one looks like tcp://HOST:8786") from error
+        raise InvalidInput(
+            f"no dask scheduler answers at {told}; one looks like tcp://HOST:8786"
+        ) from error
 
 
 async def _knock(address: str) -> None:
-    """Raise what speaks against a connection: a client that fails at it leaves a thread that nobody can end."""
+    """Raise what speaks against a connection: a client that fails at it leaves a thread that nobody
+    can end.
+    """
     from dask.distributed import Security
     from distributed.comm import connect
 

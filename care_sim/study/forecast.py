@@ -10,13 +10,15 @@ from care_sim.study.task import Likeness, Task
 class Forecast:
     """Predicts the time that the waiting tasks of a run still need.
 
-    A task is expected to take as long as the mean of those most like it (`Task.likenesses`). What this run has
-    measured comes before what an `earlier` run did, perhaps on another machine: pairs of task and seconds.
+    A task is expected to take as long as the mean of those most like it (`Task.likenesses`). What
+    this run has measured comes before what an `earlier` run did, perhaps on another machine: pairs
+    of task and seconds.
     """
 
     def __init__(self, waiting: Iterable[Task], earlier: Iterable[tuple[Task, float]] = ()):
         self._waiting = Counter(task.likenesses for task in waiting)
-        self._now, self._earlier = _Means(), _Means()
+        self._now = _Means()
+        self._earlier = _Means()
         for task, seconds in earlier:
             self._earlier.add(task.likenesses, seconds)
 
@@ -32,14 +34,18 @@ class Forecast:
 
     def remaining_s(self, workers: int) -> float:
         """Seconds until the last task ends, with so many workers; NaN while nothing is known."""
-        expected = {kind: self._expected_s(kind) for kind, number in self._waiting.items() if number > 0}
+        expected = {
+            kind: self._expected_s(kind) for kind, number in self._waiting.items() if number > 0
+        }
         if not expected:
             return 0.0
         total = sum(self._waiting[kind] * seconds for kind, seconds in expected.items())
         return max(total / max(workers, 1), max(expected.values()))
 
     def _expected_s(self, kind: tuple[Likeness, ...]) -> float:
-        candidates = (means.get(likeness) for likeness in kind for means in (self._now, self._earlier))
+        candidates = (
+            means.get(likeness) for likeness in kind for means in (self._now, self._earlier)
+        )
         return next((seconds for seconds in candidates if seconds is not None), math.nan)
 
 

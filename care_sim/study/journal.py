@@ -16,7 +16,8 @@ from care_sim.base.json_text import check_size, parsed
 from care_sim.study.rows import with_tuples
 from care_sim.study.task import Row
 
-STUDY, CHECK = "study", "check"
+STUDY = "study"
+CHECK = "check"
 LARGEST_JOURNAL = 2**32
 """Bytes of a journal: the plays of the largest study (100,000 of 10 kB), four times over."""
 _LINE = re.compile(rf'(\{{.*), "{CHECK}": "([0-9a-f]{{16}})"\}}')
@@ -25,10 +26,11 @@ _LINE = re.compile(rf'(\{{.*), "{CHECK}": "([0-9a-f]{{16}})"\}}')
 class Journal:
     """Finished rows by digest, in a file of JSON lines that only ever grows.
 
-    Opening it reads the rows of earlier runs. A line that was torn by a crash, or whose checksum is not that of its
-    text, is passed over, so that its task runs again; `damaged` counts them. `studies` are those of the rows, `study`
-    is the one whose rows are added. Raises OSError when the folder cannot be written, InvalidInput while another study
-    writes there, and for a journal larger than `LARGEST_JOURNAL`.
+    Opening it reads the rows of earlier runs. A line that was torn by a crash, or whose checksum is
+    not that of its text, is passed over, so that its task runs again; `damaged` counts them.
+    `studies` are those of the rows, `study` is the one whose rows are added. Raises OSError when
+    the folder cannot be written, InvalidInput while another study writes there, and for a journal
+    larger than `LARGEST_JOURNAL`.
     """
 
     def __init__(self, path: Path, study: str = "sweep"):
@@ -66,7 +68,10 @@ class Journal:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._file.close()
 

@@ -1,4 +1,6 @@
-"""The parameters of a task: what values they may have, so that journals and columns hold them as they are."""
+"""The parameters of a task: what values they may have, so that journals and columns hold them as
+they are.
+"""
 
 import ast
 import os
@@ -24,10 +26,13 @@ _WHOLE = 2**63
 def settled(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
     """The parameters with values of Python's own types, lists as tuples, paths as texts.
 
-    Raises InvalidInput for a value or a name that a journal and a column of a results file would not give back: sets,
-    maps, bytes, None, which a column reads as not given, NaN, halves of characters, lists of several kinds.
+    Raises InvalidInput for a value or a name that a journal and a column of a results file would
+    not give back: sets, maps, bytes, None, which a column reads as not given, NaN, halves of
+    characters, lists of several kinds.
     """
-    return tuple((_name(name, whose), _settled(f"{whose} parameter {name}", value)) for name, value in given)
+    return tuple(
+        (_name(name, whose), _settled(f"{whose} parameter {name}", value)) for name, value in given
+    )
 
 
 def _settled(what: str, value: Any) -> Any:
@@ -43,11 +48,13 @@ def _name(name: Any, whose: str) -> str:
     try:
         return _text(name)
     except (ValueError, TypeError) as error:
-        raise InvalidInput(f"the name of a {whose} parameter must be a text, got {shown(name)}") from error
+        raise InvalidInput(
+            f"the name of a {whose} parameter must be a text, got {shown(name)}"
+        ) from error
 
 
 def _plain(value: Any, levels: int = DEEPEST) -> Any:
-    """The value in Python's own types. Raises ValueError or TypeError for one that is not allowed."""
+    """The value in Python's own types. Raises ValueError or TypeError where it is not allowed."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple) and levels:
@@ -83,7 +90,9 @@ LONGEST = 8192
 
 
 def parameters(texts: Sequence[str]) -> "Parameters":
-    """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is given twice."""
+    """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is
+    given twice.
+    """
     pairs = tuple(_pair(text) for text in texts)
     for name, count in Counter(name for name, _ in pairs).items():
         if count > 1:
@@ -96,7 +105,9 @@ def _pair(text: str) -> tuple[str, Any]:
     if not (name and equals):
         raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
     if len(text) > LONGEST:
-        raise InvalidInput(f"a parameter must be at most {LONGEST} characters long, got {shown(text)}")
+        raise InvalidInput(
+            f"a parameter must be at most {LONGEST} characters long, got {shown(text)}"
+        )
     with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
         try:
             literal = ast.literal_eval(value)

@@ -36,11 +36,11 @@ _FILMED = [name for name in CONDITIONS if name not in UNFILMED]
 
 @dataclass(frozen=True)
 class PlayConfig(Conditions, Task):
-    """Everything that decides a play: the scene of a source, the policy, the detector, who counts as present at scene
-    start (`care_sim.evaluation.sightings`), the conditions.
+    """Everything that decides a play: the scene of a source, the policy, the detector, who counts
+    as present at scene start (`care_sim.evaluation.sightings`), the conditions.
 
-    Raises InvalidInput for anything that environment, detector or policy does not accept; whether the scene can be
-    read shows when it is played.
+    Raises InvalidInput for anything that environment, detector or policy does not accept; whether
+    the scene can be read shows when it is played.
     """
 
     source: Source
@@ -56,8 +56,12 @@ class PlayConfig(Conditions, Task):
         self.settle("detector_parameters", "policy_parameters")
         for name in UNFILMED:
             if getattr(self, name) != DEFAULTS[name]:
-                raise InvalidInput(f"{name} cannot be changed in the open loop: its films are made without")
-        with gymnasium.make("care_sim:CARE-Street-v0", disable_env_checker=True, **self._arguments()) as env:
+                raise InvalidInput(
+                    f"{name} cannot be changed in the open loop: its films are made without"
+                )
+        with gymnasium.make(
+            "care_sim:CARE-Street-v0", disable_env_checker=True, **self._arguments()
+        ) as env:
             self.make_policy(env)
         super().__post_init__()
 
@@ -70,8 +74,8 @@ class PlayConfig(Conditions, Task):
         return FilmEnv(film, **self._arguments())
 
     def row(self) -> Row:
-        """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`. `presence` is a
-        column where it is not the rule.
+        """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`.
+        `presence` is a column where it is not the rule.
         """
         plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
         own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
@@ -80,7 +84,11 @@ class PlayConfig(Conditions, Task):
 
     def installed(self) -> list[str | None]:
         """Of the detector too, and of the files that it is given."""
-        return [*super().installed(), detector_digest(self.detector), *files_in(self.detector_parameters)]
+        return [
+            *super().installed(),
+            detector_digest(self.detector),
+            *files_in(self.detector_parameters),
+        ]
 
     @property
     def label(self) -> str:
@@ -92,7 +100,9 @@ class PlayConfig(Conditions, Task):
             "budget",
             *(() if self.detector != PROXY else ("detector",)),
         )
-        return " ".join([f"{self.scene.name} {self.policy} {self.budget:.4g}", *departures(self, main)])
+        return " ".join(
+            [f"{self.scene.name} {self.policy} {self.budget:.4g}", *departures(self, main)]
+        )
 
     @property
     def order(self) -> int:
@@ -107,7 +117,12 @@ class PlayConfig(Conditions, Task):
     @property
     def likenesses(self) -> tuple[Likeness, ...]:
         """Policy, budget and detector; policy and detector; the detector; nothing."""
-        return (self.policy, self.budget, self.detector), (self.policy, self.detector), (self.detector,), ()
+        return (
+            (self.policy, self.budget, self.detector),
+            (self.policy, self.detector),
+            (self.detector,),
+            (),
+        )
 
     def _arguments(self) -> dict[str, Any]:
         conditions = {name: getattr(self, name) for name in _FILMED}
@@ -128,7 +143,8 @@ def play_grid(
     camera_latencies: Sequence[int] = (0,),
     **common: Any,
 ) -> list[PlayConfig]:
-    """All combinations, scene by scene and without repeats; `full` plays once for all that it does not feel.
+    """All combinations, scene by scene and without repeats; `full` plays once for all that it does
+    not feel.
 
     `common` are further fields of `PlayConfig`.
     """
@@ -141,23 +157,33 @@ def play_grid(
     floors = {config: floor_seeds if config.policy != FULL else (0,) for config in made}
     check_size(len(scenes) * sum(map(len, floors.values())))
     return [
-        config.of_scene(scene, floor_seed) for scene in scenes for config, own in floors.items() for floor_seed in own
+        config.of_scene(scene, floor_seed)
+        for scene in scenes
+        for config, own in floors.items()
+        for floor_seed in own
     ]
 
 
-def _config(source: Source, scene: Scene, policy: str, budget: float, given: dict[str, Any]) -> PlayConfig:
+def _config(
+    source: Source, scene: Scene, policy: str, budget: float, given: dict[str, Any]
+) -> PlayConfig:
     return PlayConfig(source, scene, policy, **felt(policy, budget, given))
 
 
 def listed(configs: Sequence[PlayConfig]) -> dict[str, Any]:
-    """The scenes, and the configurations that were played in all of them, as plain data, each once with the list of
-    its floor seeds.
+    """The scenes, and the configurations that were played in all of them, as plain data, each once
+    with the list of its floor seeds.
     """
     scenes = list(dict.fromkeys(config.scene for config in configs))
     plain = [_plain(config) for config in configs if config.scene == scenes[0]]
-    return {"scenes": [scene.name for scene in scenes], "configurations": collected(plain, "floor_seed", "floor_seeds")}
+    return {
+        "scenes": [scene.name for scene in scenes],
+        "configurations": collected(plain, "floor_seed", "floor_seeds"),
+    }
 
 
 def _plain(config: PlayConfig) -> dict[str, Any]:
-    own = {name: value for name, value in asdict(config).items() if name not in (*UNFILMED, "scene")}
+    own = {
+        name: value for name, value in asdict(config).items() if name not in (*UNFILMED, "scene")
+    }
     return own | {"source": config.source.kind}

@@ -27,7 +27,11 @@ Show = Callable[[int, str], None]
 
 
 def run_with_progress(
-    configs: Sequence[Task], journal: Journal, workers: int, make_executor: ExecutorFactory, kind: Kind
+    configs: Sequence[Task],
+    journal: Journal,
+    workers: int,
+    make_executor: ExecutorFactory,
+    kind: Kind,
 ) -> list[Failure]:
     """Run the tasks that the journal does not hold yet, and show on stderr how far they are.
 
@@ -36,7 +40,11 @@ def run_with_progress(
     found = [(config, journal[config.key]["wall_s"]) for config in configs if config.key in journal]
     forecast = Forecast((config for config in configs if config.key not in journal), found)
     unit = kind.unit
-    with bar(len(configs), unit) if sys.stderr.isatty() else nullcontext(Lines(len(configs), unit)) as show:
+    with (
+        bar(len(configs), unit)
+        if sys.stderr.isatty()
+        else nullcontext(Lines(len(configs), unit)) as show
+    ):
         reporter = Reporter(forecast, show, len(configs))
         failures = run_all(configs, journal, workers, make_executor, reporter, kind.attempt)
     if len(found) < len(configs):
@@ -47,7 +55,13 @@ def run_with_progress(
 class Reporter(Audience):
     """Keeps the forecast and shows it."""
 
-    def __init__(self, forecast: Forecast, show: Show, total: int, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        forecast: Forecast,
+        show: Show,
+        total: int,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._forecast = forecast
         self._show = show
         self._total = total
@@ -69,7 +83,10 @@ class Reporter(Audience):
         """Learn how long a task took."""
         self._forecast.finished(config, row["wall_s"] if row else 0.0)
         self._predict()
-        if math.isnan(self._predicted_s) and self._new - self._forecast.waiting >= EARLY * self._new:
+        if (
+            math.isnan(self._predicted_s)
+            and self._new - self._forecast.waiting >= EARLY * self._new
+        ):
             self._predicted_s = self._end - self._started
         self._tell()
 
@@ -88,16 +105,21 @@ class Reporter(Audience):
         self._end = self._clock() + self._forecast.remaining_s(self._workers)
 
     def _tell(self) -> None:
-        left = "" if math.isnan(self._end) else f"{spoken(max(self._end - self._clock(), 0.0))} left"
+        left = (
+            "" if math.isnan(self._end) else f"{spoken(max(self._end - self._clock(), 0.0))} left"
+        )
         waits = self._workers == 0 and self._forecast.waiting > 0
-        self._show(self._total - self._forecast.waiting, "no worker is connected" if waits else left)
+        self._show(
+            self._total - self._forecast.waiting, "no worker is connected" if waits else left
+        )
 
 
 @contextmanager
 def bar(total: int, unit: str) -> Iterator[Show]:
     """A bar on a terminal."""
     columns = (TextColumn(unit), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    shared, left = sys.stdout.isatty(), TextColumn("{task.fields[left]}")
+    shared = sys.stdout.isatty()
+    left = TextColumn("{task.fields[left]}")
     with Progress(*columns, left, console=Console(stderr=True), redirect_stdout=shared) as progress:
         task = progress.add_task("", total=total, left="")
         yield lambda done, left: progress.update(task, completed=done, left=left)
@@ -107,17 +129,24 @@ class Lines:
     """A line after ten seconds, then every minute, or sooner when another twentieth is done."""
 
     def __init__(self, total: int, unit: str, clock: Callable[[], float] = time.monotonic):
-        self._total, self._unit = total, unit
+        self._total = total
+        self._unit = unit
         self._clock = clock
-        self._last_s, self._last_done = clock(), -total
+        self._last_s = clock()
+        self._last_done = -total
 
     def __call__(self, done: int, left: str) -> None:
         """Print a line when it is due."""
         quiet_s = self._clock() - self._last_s
         much = done - self._last_done >= EARLY * self._total
         if quiet_s >= LINE_S or (quiet_s >= FIRST_LINE_S and much):
-            self._last_s, self._last_done = self._clock(), done
-            print(", ".join(filter(None, (f"{self._unit} {done}/{self._total}", left))), file=sys.stderr, flush=True)
+            self._last_s = self._clock()
+            self._last_done = done
+            print(
+                ", ".join(filter(None, (f"{self._unit} {done}/{self._total}", left))),
+                file=sys.stderr,
+                flush=True,
+            )
 
 
 def spoken(seconds: float) -> str:

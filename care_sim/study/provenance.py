@@ -15,7 +15,16 @@ from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import BUILT_IN
 from care_sim.policies.installed import entries
 
-LIBRARIES = ("gymnasium", "highway-env", "matplotlib", "numba", "numpy", "pyarrow", "pybullet", "scipy")
+LIBRARIES = (
+    "gymnasium",
+    "highway-env",
+    "matplotlib",
+    "numba",
+    "numpy",
+    "pyarrow",
+    "pybullet",
+    "scipy",
+)
 EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
 """Libraries of detectors, policies and measurements that may be there."""
 
@@ -29,14 +38,18 @@ SESSION = uuid4().hex
 
 
 def code_digest() -> str:
-    """Hash of the package's sources and weights, so that no row of an edited program passes for a new one."""
-    return combined_digest([_sources_digest(Path(care_sim.__file__).parent), str(file_digest(SHIPPED))])
+    """Hash of the package's sources and weights, so that no row of an edited program passes for a
+    new one.
+    """
+    return combined_digest(
+        [_sources_digest(Path(care_sim.__file__).parent), str(file_digest(SHIPPED))]
+    )
 
 
 def policy_digest(policy: str) -> str | None:
-    """Hash of the files that decide what an installed policy does: those of its distribution and package, and those
-    that its defaults, constants and code name (`care_sim.base.package_files`). Empty for a built-in policy, None where
-    there are no files to read.
+    """Hash of the files that decide what an installed policy does: those of its distribution and
+    package, and those that its defaults, constants and code name (`care_sim.base.package_files`).
+    Empty for a built-in policy, None where there are no files to read.
     """
     return "" if policy in BUILT_IN else _entry_digest(entries()[policy])
 
@@ -51,7 +64,8 @@ def _entry_digest(entry: EntryPoint) -> str | None:
     if files is None:
         return None
     shipped = [
-        f"{name} {_loaded(file) if file.suffix in CODE else content_digest(file)}" for name, file in files.items()
+        f"{name} {_loaded(file) if file.suffix in CODE else content_digest(file)}"
+        for name, file in files.items()
     ]
     further = package_files.files_named_by(entry) | package_files.files_named_in(files.values())
     named = [(name, file_digest(path)) for name, path in further.items()]
@@ -69,12 +83,16 @@ def _loaded(path: Path) -> str:
 @cache
 def _sources_digest(root: Path) -> str:
     """The hash of all code below a folder, once a process, which has it loaded."""
-    return combined_digest(f"{file.relative_to(root)} {content_digest(file)}" for file in sorted(root.rglob("*.py")))
+    return combined_digest(
+        f"{file.relative_to(root)} {content_digest(file)}" for file in sorted(root.rglob("*.py"))
+    )
 
 
 def versions() -> dict[str, str]:
     """Versions of Python, the package, its code and the libraries that decide an episode."""
-    libraries = {name: metadata.version(name) for name in (*LIBRARIES, *filter(_is_installed, EXTRAS))}
+    libraries = {
+        name: metadata.version(name) for name in (*LIBRARIES, *filter(_is_installed, EXTRAS))
+    }
     return {
         "python": platform.python_version(),
         "care-sim": care_sim.__version__,

@@ -1,4 +1,6 @@
-"""What a study plays: episodes of the closed loop, or plays of the open loop. How both run and are kept."""
+"""What a study plays: episodes of the closed loop, or plays of the open loop. How both run and are
+kept.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -30,9 +32,10 @@ from care_sim.study.task import Row
 
 @dataclass(frozen=True)
 class Kind:
-    """`unit` is what its tasks are called. `attempt` plays a batch; `finish` makes rows side by side into those that
-    are kept; `file` holds them, in columns of the `schema`; `listed` are configurations as plain data.
-    `aside` are further files, as columns by name, made of the rows as they were played.
+    """`unit` is what its tasks are called. `attempt` plays a batch; `finish` makes rows side by
+    side into those that are kept; `file` holds them, in columns of the `schema`; `listed` are
+    configurations as plain data. `aside` are further files, as columns by name, made of the rows as
+    they were played.
     """
 
     unit: str
@@ -48,12 +51,21 @@ _ORIGIN = dict.fromkeys(("version", "digest", "episode_hash", "tags"), with_gaps
 _EPISODES = Schema(
     {name: CONDITIONS.get(name, TEXT) for name in config.PLAIN_FIELDS}
     | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
-    | {name: with_gaps(SUM) for name, kind in Outcome.__annotations__.items() if kind == float | None},
+    | {
+        name: with_gaps(SUM)
+        for name, kind in Outcome.__annotations__.items()
+        if kind == float | None
+    },
     _ORIGIN,
 )
 _PLAYS = Schema(
     {name: CONDITIONS.get(name, TEXT) for name in (*play_config.PLAY_FIELDS, "film_hash")}
-    | {"budget": SHARE, "keyframes": COUNT, "floor_seed": COUNT, "ttfds": Column("lists of whole numbers", least=0)}
+    | {
+        "budget": SHARE,
+        "keyframes": COUNT,
+        "floor_seed": COUNT,
+        "ttfds": Column("lists of whole numbers", least=0),
+    }
     | dict.fromkeys((*plays.SUMS, "tracks", "explained"), SUM)
     | dict.fromkeys(("differing_keyframes", "differing_cells"), with_gaps(COUNT)),
     _ORIGIN
@@ -91,4 +103,6 @@ def is_parameter(name: str) -> bool:
     return name in _PARAMETERS or name.startswith(PARAMETERS)
 
 
-_PARAMETERS = frozenset({*config.PLAIN_FIELDS, *play_config.PLAY_FIELDS, "scene", "camera_detections", "presence"})
+_PARAMETERS = frozenset(
+    {*config.PLAIN_FIELDS, *play_config.PLAY_FIELDS, "scene", "camera_detections", "presence"}
+)

@@ -1,6 +1,7 @@
 """What a row of the closed loop says: its setting, its policy, its first detection.
 
-Rows of one scenario under the same conditions form a setting; in it, the rows of a policy at a budget form a cell.
+Rows of one scenario under the same conditions form a setting; in it, the rows of a policy at a
+budget form a cell.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,11 +39,19 @@ class Setting:
     @property
     def label(self) -> str:
         """A heading."""
-        return ", ".join([self.scenario, *(f"{name.replace('_', ' ')} {value}" for name, value in self.conditions)])
+        return ", ".join(
+            [
+                self.scenario,
+                *(f"{name.replace('_', ' ')} {value}" for name, value in self.conditions),
+            ]
+        )
 
     def for_full(self) -> "Setting":
         """The setting in which the full scan of the same world is found."""
-        return Setting(self.scenario, tuple(pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN))
+        return Setting(
+            self.scenario,
+            tuple(pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN),
+        )
 
 
 Key = tuple[Setting, str, float]
@@ -55,8 +64,14 @@ Groups = Mapping[Key, Sequence[Row]]
 def setting_of(row: Row) -> Setting:
     """The setting a row belongs to."""
     names = [name for name in row if name in PLAIN_FIELDS or name.startswith("scenario.")]
-    changed = [(n, row[n]) for n in names if n not in _AXES and row[n] is not None and row[n] != _USUAL.get(n)]
-    return Setting(row["scenario"], tuple(sorted((n.removeprefix("scenario."), v) for n, v in changed)))
+    changed = [
+        (n, row[n])
+        for n in names
+        if n not in _AXES and row[n] is not None and row[n] != _USUAL.get(n)
+    ]
+    return Setting(
+        row["scenario"], tuple(sorted((n.removeprefix("scenario."), v) for n, v in changed))
+    )
 
 
 def key_of(row: Row) -> Key:
@@ -70,9 +85,17 @@ def policy_of(row: Row) -> str:
 
 
 def with_parameters(row: Row, kind: str) -> str:
-    """The name in the column `kind`, with the parameters in the columns whose names begin with it and a dot."""
-    given = [(name.removeprefix(f"{kind}."), value) for name, value in row.items() if name.startswith(f"{kind}.")]
-    return " ".join([row[kind], *(f"{name}={_text(value)}" for name, value in given if value is not None)])
+    """The name in the column `kind`, with the parameters in the columns whose names begin with it
+    and a dot.
+    """
+    given = [
+        (name.removeprefix(f"{kind}."), value)
+        for name, value in row.items()
+        if name.startswith(f"{kind}.")
+    ]
+    return " ".join(
+        [row[kind], *(f"{name}={_text(value)}" for name, value in given if value is not None)]
+    )
 
 
 def _text(value: Any) -> str:
@@ -103,10 +126,11 @@ def detection(row: Row) -> Reading:
 
     Raises InvalidInput for a row that has neither.
     """
-    distance, most = row["detection_distance_m"], row["undetected_to_m"]
+    distance = row["detection_distance_m"]
+    most = row["undetected_to_m"]
     if distance is None and most is None:
         raise InvalidInput(
-            f"{row['scenario']} {row['policy']} seed {row['seed']}: one of detection_distance_m and undetected_to_m "
-            "must be given"
+            f"{row['scenario']} {row['policy']} seed {row['seed']}: one of detection_distance_m "
+            "and undetected_to_m must be given"
         )
     return Reading(float(most), censored=True) if distance is None else Reading(float(distance))

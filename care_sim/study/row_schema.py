@@ -1,4 +1,6 @@
-"""What the columns of results must be, so that every report can be made of them: checked where a file is opened."""
+"""What the columns of results must be, so that every report can be made of them: checked where a
+file is opened.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -29,7 +31,12 @@ def _is_list_of(is_kind: Callable[[pa.DataType], bool], kind: pa.DataType) -> bo
 
 
 def _is_parameter(kind: pa.DataType) -> bool:
-    return _is_text(kind) or _is_number(kind) or pa.types.is_boolean(kind) or _is_list_of(_is_parameter, kind)
+    return (
+        _is_text(kind)
+        or _is_number(kind)
+        or pa.types.is_boolean(kind)
+        or _is_list_of(_is_parameter, kind)
+    )
 
 
 _ANY = "text, numbers, flags or lists of them"
@@ -46,7 +53,9 @@ _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": p
 
 @dataclass(frozen=True)
 class Column:
-    """A column of one of `KINDS`, its numbers within `least` and `most`; `gaps` tells whether rows may hold nothing."""
+    """A column of one of `KINDS`, its numbers within `least` and `most`; `gaps` tells whether rows
+    may hold nothing.
+    """
 
     kind: str
     gaps: bool = False
@@ -61,7 +70,9 @@ class Column:
     def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
         """What is wrong with the values of a file, if anything."""
         if self.gaps and values.null_count == len(values):
-            return  # of nothing the type says nothing: pandas and earlier versions write numbers there
+            # The type of an empty column carries no meaning: pandas and earlier versions write
+            # numbers there.
+            return
         if not KINDS[self.kind](values.type):
             yield f"must hold {self.kind}, got {values.type}"
         elif values.null_count and not self.gaps:
@@ -78,11 +89,16 @@ class Column:
             return
         ends = pc.min_max(values).as_py()
         finite = pc.all(pc.is_finite(values)).as_py() in (True, None)
-        if not finite or not self.least <= (ends["min"] or 0) or not (ends["max"] or self.least) <= self.most:
+        if (
+            not finite
+            or not self.least <= (ends["min"] or 0)
+            or not (ends["max"] or self.least) <= self.most
+        ):
             yield f"must hold {self.kind} from {self.least:g} to {self.most:g}"
 
 
-TEXT, FLAG = Column("text"), Column("true or false")
+TEXT = Column("text")
+FLAG = Column("true or false")
 COUNT = Column("whole numbers", least=0)
 SEED = Column("whole numbers", least=0, most=math.inf)
 SUM = Column("numbers", least=0)
@@ -105,9 +121,9 @@ def with_gaps(column: Column) -> Column:
 
 @dataclass(frozen=True)
 class Schema:
-    """The columns of a kind of results: those that are `needed`, `further` ones that are checked where they are, and
-    `sums`, which come again for every stratum as KIND/STRATUM/NAME, all or none. Columns of parameters are known too,
-    all others are not read.
+    """The columns of a kind of results: those that are `needed`, `further` ones that are checked
+    where they are, and `sums`, which come again for every stratum as KIND/STRATUM/NAME, all or
+    none. Columns of parameters are known too, all others are not read.
     """
 
     needed: Mapping[str, Column] = field(default_factory=dict)
@@ -123,7 +139,9 @@ class Schema:
             yield "it is empty"
         else:
             for name in self.known(table):
-                yield from (f"its column {name} {fault}" for fault in self.column(name).faults(table[name]))
+                yield from (
+                    f"its column {name} {fault}" for fault in self.column(name).faults(table[name])
+                )
 
     def known(self, table: pa.Table) -> list[str]:
         """The columns that are read."""
@@ -146,6 +164,8 @@ class Schema:
         """All columns of the strata of which one is there."""
         parts = (name.split("/") for name in names)
         strata = {
-            (kind, label) for kind, label, last in (part for part in parts if len(part) == 3) if last in self.sums
+            (kind, label)
+            for kind, label, last in (part for part in parts if len(part) == 3)
+            if last in self.sums
         }
         return {f"{kind}/{label}/{name}" for kind, label in strata for name in self.sums}

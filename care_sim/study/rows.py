@@ -14,23 +14,34 @@ from care_sim.base.json_text import parsed
 from care_sim.study.row_schema import Schema
 from care_sim.study.task import Row
 
-STUDY, LEFT_OUT = b"care_sim.study", b"care_sim.left_out"
-"""Where the schema of a file names the study that its rows belong to, and what is missing in it."""
+STUDY = b"care_sim.study"
+"""Where the schema of a file names the study that its rows belong to."""
+LEFT_OUT = b"care_sim.left_out"
+"""Where the schema of a file tells what is missing in it."""
 ANY = Schema()
 """Of columns of whatever name and type."""
 
 
 def write_rows(
-    rows: Sequence[Row], path: Path, study: str = "sweep", left_out: Sequence[str] = (), schema: Schema = ANY
+    rows: Sequence[Row],
+    path: Path,
+    study: str = "sweep",
+    left_out: Sequence[str] = (),
+    schema: Schema = ANY,
 ) -> None:
-    """Write rows, the name of their study and what it lacks to a Parquet file; columns of nothing as `schema` says."""
+    """Write rows, the name of their study and what it lacks to a Parquet file; columns of nothing
+    as `schema` says.
+    """
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [row.get(name) for row in rows] for name in names}
     write_columns(columns, path, {STUDY: study, LEFT_OUT: json.dumps([*left_out])}, schema)
 
 
 def write_columns(
-    columns: Mapping[str, Any], path: Path, notes: Mapping[bytes, str] | None = None, schema: Schema = ANY
+    columns: Mapping[str, Any],
+    path: Path,
+    notes: Mapping[bytes, str] | None = None,
+    schema: Schema = ANY,
 ) -> None:
     """Write columns to a Parquet file, whole or not at all."""
     arrays = {name: pa.array(column) for name, column in columns.items()}
@@ -43,7 +54,9 @@ def write_columns(
 
 
 def check_columns(rows: Iterable[Row]) -> None:
-    """Raise InvalidInput where one column cannot hold a parameter of all rows: a number here and a text there."""
+    """Raise InvalidInput where one column cannot hold a parameter of all rows: a number here and a
+    text there.
+    """
     values: dict[str, dict[tuple[type, Any], None]] = {}
     for row in rows:
         for name, value in row.items():
@@ -54,7 +67,9 @@ def check_columns(rows: Iterable[Row]) -> None:
             pa.array([value for _, value in held])
         except pa.ArrowException as error:
             shown = " and ".join(repr(value) for _, value in [*held][:3])
-            raise InvalidInput(f"one column of results must hold all values of {name}, got {shown}") from error
+            raise InvalidInput(
+                f"one column of results must hold all values of {name}, got {shown}"
+            ) from error
 
 
 def with_tuples(row: Row) -> Row:
@@ -67,8 +82,8 @@ def _with_tuples(value: Any) -> Any:
 
 
 def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
-    """Read rows back, of a schema the columns that it knows. Raises InvalidInput for a file that is damaged, is empty,
-    or has not the schema.
+    """Read rows back, of a schema the columns that it knows. Raises InvalidInput for a file that is
+    damaged, is empty, or has not the schema.
     """
     table = _read(path)
     for fault in (schema or ANY).faults(table):
@@ -77,20 +92,25 @@ def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
     try:
         return [with_tuples(row) for row in known.to_pylist()]
     except (pa.ArrowException, ValueError, OverflowError) as error:
-        raise InvalidInput(f"{path} is not a readable Parquet file: {_first_line(error)}") from error
+        raise InvalidInput(
+            f"{path} is not a readable Parquet file: {_first_line(error)}"
+        ) from error
 
 
 def read_notes(path: Path) -> tuple[str | None, list[str]]:
-    """The name of the study that wrote a file, None without one, and what it left out. Raises InvalidInput for a
-    damaged file, or other notes.
+    """The name of the study that wrote a file, None without one, and what it left out. Raises
+    InvalidInput for a damaged file, or other notes.
     """
     notes = _read(path).schema.metadata or {}
     try:
-        study, left_out = notes[STUDY].decode() if STUDY in notes else None, parsed(notes.get(LEFT_OUT, b"[]"))
+        study = notes[STUDY].decode() if STUDY in notes else None
+        left_out = parsed(notes.get(LEFT_OUT, b"[]"))
     except ValueError as error:
         raise InvalidInput(f"{path} has notes that cannot be read: {_first_line(error)}") from error
     if not isinstance(left_out, list) or not all(isinstance(each, str) for each in left_out):
-        raise InvalidInput(f"{path} has notes that cannot be read: what is left out must be a list of texts")
+        raise InvalidInput(
+            f"{path} has notes that cannot be read: what is left out must be a list of texts"
+        )
     return study, left_out
 
 
@@ -103,7 +123,9 @@ def _read(path: Path) -> pa.Table:
         table.column_names  # noqa: B018 (names of broken characters show only now)
         return table
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} is not a readable Parquet file: {_first_line(error)}") from error
+        raise InvalidInput(
+            f"{path} is not a readable Parquet file: {_first_line(error)}"
+        ) from error
 
 
 def _first_line(error: BaseException) -> str:

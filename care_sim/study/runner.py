@@ -19,7 +19,10 @@ Flying = dict[Future[list[Row | str]], Batch]
 """The batches in flight."""
 
 DIED = "the worker process died"
-OTHER_CODE = "the worker runs another version of care-sim or of the policy, or their files changed while the study ran"
+OTHER_CODE = (
+    "the worker runs another version of care-sim or of the policy, or their files changed while "
+    "the study ran"
+)
 DEADLY = 3
 """Workers that a policy may kill before the rest of its tasks is not tried any more."""
 PATIENCE_S = 2.0
@@ -60,9 +63,10 @@ def run_all(
 ) -> list[Failure]:
     """Run every task that the journal does not hold yet, in their order; returns those that failed.
 
-    An interrupt waits for the batches in flight and leaves all that is finished in the journal. When a worker dies,
-    the batches then in flight are run again one by one, and in halves, so that only the guilty task fails; the rest
-    of a policy that has killed DEADLY workers is not tried. Raises ClusterLost when a cluster's scheduler is gone.
+    An interrupt waits for the batches in flight and leaves all that is finished in the journal.
+    When a worker dies, the batches then in flight are run again one by one, and in halves, so that
+    only the guilty task fails; the rest of a policy that has killed DEADLY workers is not tried.
+    Raises ClusterLost when a cluster's scheduler is gone.
     """
     run = _Run(journal, workers, make_executor, audience or Audience(), attempt)
     waiting = deque(batches([config for config in configs if config.key not in journal]))
@@ -74,7 +78,12 @@ def run_all(
 
 class _Run:
     def __init__(
-        self, journal: Journal, workers: int, make_executor: ExecutorFactory, audience: Audience, attempt: Attempt
+        self,
+        journal: Journal,
+        workers: int,
+        make_executor: ExecutorFactory,
+        audience: Audience,
+        attempt: Attempt,
     ):
         self.failures: list[Failure] = []
         self._deaths: Counter[str] = Counter()
@@ -124,7 +133,10 @@ class _Run:
 
     def _tried(self, batch: Batch) -> list[Task]:
         """The tasks of a batch but for those of deadly policies, which fail."""
-        self._fail([task for task in batch if self._deaths[task.policy] >= DEADLY], f"{DIED} {DEADLY} times before")
+        self._fail(
+            [task for task in batch if self._deaths[task.policy] >= DEADLY],
+            f"{DIED} {DEADLY} times before",
+        )
         return [task for task in batch if self._deaths[task.policy] < DEADLY]
 
     def _launch(self, executor: Executor, waiting: "deque[list[Task]]", flying: Flying) -> None:
@@ -173,8 +185,8 @@ class _Run:
             self._audience.finished(config, None)
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
-        """Hand a batch over; a fork server that does not answer at once on a busy machine, or that is killed while it
-        starts a worker, is asked again: another one takes its place.
+        """Hand a batch over; a fork server that does not answer at once on a busy machine, or that
+        is killed while it starts a worker, is asked again: another one takes its place.
         """
         for patience_s in (0.5, 2.0):
             try:

@@ -24,12 +24,23 @@ from care_sim.study.task import FULL, REFERENCE, Row
 SUMS = tuple(field.name for field in fields(Tally))
 EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
 """What is known of an event before any policy plays."""
-_NAMES = ("source", "scene", "policy", "budget", "detector", "floor_seed", "camera_latency", "digest")
+_NAMES = (
+    "source",
+    "scene",
+    "policy",
+    "budget",
+    "detector",
+    "floor_seed",
+    "camera_latency",
+    "digest",
+)
 """Columns by which an event finds its play."""
 
 
 def attempt(batch: Sequence[PlayConfig]) -> list[Row | str]:
-    """What a worker does: the plays of one scene; of each its row, or in one line why there is none."""
+    """What a worker does: the plays of one scene; of each its row, or in one line why there is
+    none.
+    """
     scene = answer(PlayedScene, batch[0])
     if isinstance(scene, str):
         return [scene] * len(batch)
@@ -38,8 +49,8 @@ def attempt(batch: Sequence[PlayConfig]) -> list[Row | str]:
 
 @dataclass(frozen=True)
 class Playback:
-    """What happened in a play. `tracks` and `explained` are means a keyframe: tracks held, and camera detections
-    that a forecast explains.
+    """What happened in a play. `tracks` and `explained` are means a keyframe: tracks held, and
+    camera detections that a forecast explains.
     """
 
     score: SceneScore
@@ -55,7 +66,8 @@ class Playback:
 
 
 class PlayedScene:
-    """Plays policies in one scene; those of the reference are kept, since the others are compared with them.
+    """Plays policies in one scene; those of the reference are kept, since the others are compared
+    with them.
 
     Raises InvalidInput where the film of the scene cannot be made.
     """
@@ -70,12 +82,13 @@ class PlayedScene:
     def row(self, config: PlayConfig, sharers: int = 1) -> Row:
         """The row of a play.
 
-        Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the same film was
-        played, and `episode_hash`, over what was fired and detected; the fields of `Tally`, those of every stratum as
-        `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the events; `emerging`, by how many events the two presences
-        differ (`care_sim.evaluation.sightings`); `tracks` and `explained`;
-        `differing_keyframes` and `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s`
-        with the share of the film's that falls to one of so many plays.
+        Every parameter of `PlayConfig.row`; `version` and `digest`; `film_hash`, equal wherever the
+        same film was played, and `episode_hash`, over what was fired and detected; the fields of
+        `Tally`, those of every stratum as `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the
+        events; `emerging`, by how many events the two presences differ
+        (`care_sim.evaluation.sightings`); `tracks` and `explained`; `differing_keyframes` and
+        `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s` with the
+        share of the film's that falls to one of so many plays.
         """
         playback = self._playback(config)
         score = playback.score
@@ -109,7 +122,9 @@ class PlayedScene:
         reference = _reference(config)
         if config.policy == FULL or config == reference:
             return {"differing_keyframes": None, "differing_cells": None}
-        moved: AllocationDifference = allocation_difference(playback.fired, self._playback(reference).fired)
+        moved: AllocationDifference = allocation_difference(
+            playback.fired, self._playback(reference).fired
+        )
         return {"differing_keyframes": moved.differing, "differing_cells": moved.cells}
 
 
@@ -124,9 +139,15 @@ def play(config: PlayConfig, film: Film) -> Playback:
         counts = []
         while not loop.over:
             belief = loop.belief
-            counts.append((len(belief.tracks), int(explained(belief.detections, belief.tracks, loop.rig).sum())))
+            counts.append(
+                (
+                    len(belief.tracks),
+                    int(explained(belief.detections, belief.tracks, loop.rig).sum()),
+                )
+            )
             observation, *_ = env.step(policy(observation))
-        score, keyframes = env.score, env.keyframes
+        score = env.score
+        keyframes = env.keyframes
     tracks, explanations = np.mean(counts, axis=0).tolist()
     return Playback(score, keyframes, tracks, explanations, time.perf_counter() - started)
 
@@ -137,27 +158,45 @@ def without_events(row: Row) -> Row:
 
 
 def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
-    """The events of all plays as columns of one table: the play's names, then what was seen where, and when found."""
+    """The events of all plays as columns of one table: the play's names, then what was seen where,
+    and when found.
+    """
     counts = [len(row["ttfds"]) for row in rows]
-    names = {name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts) for name in _NAMES}
-    seen = {name: [value for row in rows for value in row["sightings"][name]] for name in EVENT_COLUMNS}
+    names = {
+        name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts)
+        for name in _NAMES
+    }
+    seen = {
+        name: [value for row in rows for value in row["sightings"][name]] for name in EVENT_COLUMNS
+    }
     delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
     return {**names, **seen, "detected": delays == 0, "ttfd": delays}
 
 
 def film_hash(film: Film) -> str:
-    """A hash over what a film shows and who is hidden at its start, measured numbers rounded (`care_sim.base.portable_hash`).
+    """A hash over what a film shows and who is hidden at its start, measured numbers rounded
+    (`care_sim.base.portable_hash`).
 
-    Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a round body by
-    iteration, which makes a millimetre of a last bit.
+    Of a return it holds the cell and the object, not the range: Bullet finds where a ray meets a
+    round body by iteration, which makes a millimetre of a last bit.
     """
     cameras = tuple(astuple(camera) for camera in film.cameras)
-    content = hashlib.sha256(portable_bytes(film.name, cameras, film.sensor_height_m, film.keyframe_s))
+    content = hashlib.sha256(
+        portable_bytes(film.name, cameras, film.sensor_height_m, film.keyframe_s)
+    )
     for shot in film.shots:
-        seen, identified, cloud = shot.annotations, shot.seen, shot.cloud
+        seen = shot.annotations
+        identified = shot.seen
+        cloud = shot.cloud
         content.update(portable_bytes(shot.time_s, shot.token, astuple(shot.ego)))
         content.update(
-            portable_bytes(seen.objects, seen.classes, seen.boxes, identified.detections.rows(), identified.objects)
+            portable_bytes(
+                seen.objects,
+                seen.classes,
+                seen.boxes,
+                identified.detections.rows(),
+                identified.objects,
+            )
         )
         content.update(portable_bytes(cloud.cells, cloud.objects))
     hidden = film.hidden
@@ -183,11 +222,16 @@ def _sightings(score: SceneScore) -> dict[str, list[Any]]:
     """What is known of the events, as columns; metres and radians to three decimals."""
     rows = score.event_rows()
     columns = {name: [row[name] for row in rows] for name in EVENT_COLUMNS}
-    return {name: [round(v, 3) if isinstance(v, float) else v for v in column] for name, column in columns.items()}
+    return {
+        name: [round(v, 3) if isinstance(v, float) else v for v in column]
+        for name, column in columns.items()
+    }
 
 
 def _episode_hash(keyframes: Sequence[OpenLoopKeyframe]) -> str:
     content = hashlib.sha256()
     for record in keyframes:
-        content.update(portable_bytes(record.fired, record.detections.classes, record.detections.boxes))
+        content.update(
+            portable_bytes(record.fired, record.detections.classes, record.detections.boxes)
+        )
     return content.hexdigest()[:16]

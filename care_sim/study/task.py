@@ -30,8 +30,10 @@ MOST_TASKS = 100_000
 """Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
 
 CONDITIONS = [*DEFAULTS]
-REFERENCE, FULL = "care", "full"
-"""The policy that others are compared with, and the full scan."""
+REFERENCE = "care"
+"""The policy that others are compared with."""
+FULL = "full"
+"""The policy that scans everything."""
 
 
 class Task(ABC):
@@ -66,30 +68,36 @@ class Task(ABC):
         """What it shares with tasks that take as long, the closest likeness first."""
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
-        """The policy for the environment; its files are looked at before it plays, which may load more of its code."""
+        """The policy for the environment; its files are looked at before it plays, which may load
+        more of its code.
+        """
         policy = make_policy(self.policy, env, **dict(self.policy_parameters))
         self.installed()
         return policy
 
     def digest(self) -> str:
-        """Hash of the effective configuration; package version, code and what is installed beside it included.
+        """Hash of the effective configuration; package version, code and what is installed beside
+        it included.
 
         It never repeats in another run when an installed policy has no source to read.
         """
-        code = [code_digest(), *(self._session if digest is None else digest for digest in self.installed())]
+        code = [
+            code_digest(),
+            *(self._session if digest is None else digest for digest in self.installed()),
+        ]
         effective = [sorted(self.row().items()), care_sim.__version__, *code]
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
 
     def installed(self) -> list[str | None]:
-        """Hashes of what decides the row beside the package and the parameters: code of others, and the files that
-        parameters name; None of code that has no source to read.
+        """Hashes of what decides the row beside the package and the parameters: code of others, and
+        the files that parameters name; None of code that has no source to read.
         """
         return [policy_digest(self.policy), *files_in(self.policy_parameters)]
 
     @cached_property
     def key(self) -> str:
-        """The digest when this process first asked for it: what a study files the row under, whatever changes while it
-        runs. A worker works out its own.
+        """The digest when this process first asked for it: what a study files the row under,
+        whatever changes while it runs. A worker works out its own.
         """
         return self.digest()
 
@@ -109,11 +117,15 @@ class Task(ABC):
         return other
 
     def settle(self, *names: str) -> None:
-        """Make the parameters in these fields what files can hold. Raises InvalidInput for those that none does."""
+        """Make the parameters in these fields what files can hold. Raises InvalidInput for those
+        that none does.
+        """
         for name in names:
             pairs = getattr(self, name)
             if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
-                raise InvalidInput(f"{name} must be pairs of a name and a value, got {shown(pairs)}")
+                raise InvalidInput(
+                    f"{name} must be pairs of a name and a value, got {shown(pairs)}"
+                )
             object.__setattr__(self, name, settled(pairs, name.removesuffix("_parameters")))
 
 
@@ -123,8 +135,8 @@ def departures(task: Task, without: Sequence[str]) -> list[str]:
 
 
 def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
-    """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither camera nor
-    allocator.
+    """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither
+    camera nor allocator.
     """
     check_policy(policy)
     felt = conditions | {"budget": budget}
@@ -136,7 +148,8 @@ def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, An
 
 
 def own(policy: str, parameters: Parameters) -> Parameters:
-    """Those of a policy among parameters for several: NAME is for all, POLICY.NAME for that policy alone.
+    """Those of a policy among parameters for several: NAME is for all, POLICY.NAME for that policy
+    alone.
 
     Raises InvalidInput for a name before the point that is no policy.
     """
@@ -144,11 +157,15 @@ def own(policy: str, parameters: Parameters) -> Parameters:
     for owner, point, _, _ in parted:
         if point:
             check_policy(owner)
-    return tuple((name, value) for owner, point, name, value in parted if not point or owner == policy)
+    return tuple(
+        (name, value) for owner, point, name, value in parted if not point or owner == policy
+    )
 
 
 def files_in(parameters: Parameters) -> list[str | None]:
-    """Hashes of the files and folders that parameters name; None of a folder with too many files to be read."""
+    """Hashes of the files and folders that parameters name; None of a folder with too many files to
+    be read.
+    """
     return [file_digest(path) for _, value in parameters for path in paths_in(value)]
 
 
@@ -161,8 +178,8 @@ def check_size(tasks: int) -> None:
     """Raise InvalidInput for more tasks than a study can hold; asked before they are made."""
     if tasks > MOST_TASKS:
         raise InvalidInput(
-            f"a study holds the rows of all its tasks in memory, so they are at most {MOST_TASKS:,}, "
-            f"got {shown(tasks)}: play it in parts, each with an --out of its own"
+            "a study holds the rows of all its tasks in memory, so they are at most "
+            f"{MOST_TASKS:,}, got {shown(tasks)}: play it in parts, each with an --out of its own"
         )
 
 
@@ -175,7 +192,9 @@ def batches(tasks: Sequence[Task]) -> list[list[Task]]:
 
 
 def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[dict[str, Any]]:
-    """Configurations as plain data, each once, with the list of all values of an axis under its plural."""
+    """Configurations as plain data, each once, with the list of all values of an axis under its
+    plural.
+    """
     values: dict[str, list[Any]] = {}
     kept: dict[str, dict[str, Any]] = {}
     for one in plain:

@@ -3,7 +3,10 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.row_reading import key_of
 from tests.helpers.made_rows import rows
 
-ROWS = [*rows("care", [15.0, 16.0]), *(row | {"tags": "privileged"} for row in rows("history-oracle", [9.0, 12.0]))]
+ROWS = [
+    *rows("care", [15.0, 16.0]),
+    *(row | {"tags": "privileged"} for row in rows("history-oracle", [9.0, 12.0])),
+]
 
 
 def key(policy, **fields):

@@ -16,7 +16,11 @@ def test_differences_are_paired_by_seed():
     gap = contrast(DETECTION, rows("all-camera", [10.0, 11.0]), rows("care", [15.0, 16.0]))
     assert gap.difference.interval == (-5.0, -5.0, -5.0)
     shuffled = rows("care", [15.0, 16.0])[::-1]
-    assert contrast(DETECTION, shuffled, rows("full", [15.0, 16.0])).difference.interval == (0.0, 0.0, 0.0)
+    assert contrast(DETECTION, shuffled, rows("full", [15.0, 16.0])).difference.interval == (
+        0.0,
+        0.0,
+        0.0,
+    )
     assert contrast(DETECTION, rows("care", [1.0, 9.0]), rows("full", [2.0])).difference.pairs == 1
     assert contrast(DETECTION, rows("care", [1.0]), None) is None
 
@@ -30,7 +34,9 @@ def test_rates_are_compared_in_points():
     assert contrast(DETECTED, ours, theirs).difference.bound == Bound.EXACT
 
 
-@pytest.mark.parametrize(("gain", "excludes", "counts"), [(0.0, False, False), (2.4, True, False), (2.5, True, True)])
+@pytest.mark.parametrize(
+    ("gain", "excludes", "counts"), [(0.0, False, False), (2.4, True, False), (2.5, True, True)]
+)
 def test_a_difference_counts_from_the_gate_on(gain, excludes, counts):
     gap = contrast(DETECTION, rows("care", [10.0 + gain] * 5), rows("history", [10.0] * 5))
     assert (gap.excludes_zero, gap.counts) == (excludes, counts)
@@ -51,7 +57,11 @@ def test_regret_is_what_the_full_scan_has_over_a_policy():
     assert cell("care").regret.mean == pytest.approx(0.1)
     assert cell("care").as_full == 4
     history = cell("history")
-    assert (history.regret.difference.bound, history.as_full, history.never) == (Bound.AT_LEAST, 0, 2)
+    assert (history.regret.difference.bound, history.as_full, history.never) == (
+        Bound.AT_LEAST,
+        0,
+        2,
+    )
     assert history.regret.mean == pytest.approx((11 + 13 + 9 + 12 + 16.5) / 5)
     assert cell("full").regret is None
 

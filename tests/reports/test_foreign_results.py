@@ -1,4 +1,6 @@
-"""Results that something else wrote, or that were damaged, are refused in one line where they are opened."""
+"""Results that something else wrote, or that were damaged, are refused in one line where they are
+opened.
+"""
 
 import io
 import random
@@ -19,7 +21,9 @@ from care_sim.study.rows import STUDY as NAME
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY
 
-PLAYS = made_plays.study({"care": (3, 4), "history": (2, 3), "full": (4, 5)}, scenes=2, budgets=(0.1,), events=5)
+PLAYS = made_plays.study(
+    {"care": (3, 4), "history": (2, 3), "full": (4, 5)}, scenes=2, budgets=(0.1,), events=5
+)
 ROWS = {"sweep": STUDY, "crowding": CROWD, "faults": STUDY, "protocol": PLAYS}
 DEEP = b"[" * 100_000
 
@@ -34,7 +38,9 @@ def put(content, name, folder):
 
 
 def of_value(content, column, value):
-    return content.set_column(content.column_names.index(column), column, pa.array([value] * content.num_rows))
+    return content.set_column(
+        content.column_names.index(column), column, pa.array([value] * content.num_rows)
+    )
 
 
 def shown(folder):
@@ -61,18 +67,48 @@ def complaint(folder):
         ("sweep", "policy", 3, "column policy must hold text, got int64"),
         ("sweep", "policy", None, "column policy must hold text, got null"),
         ("sweep", "braked", 1, "column braked must hold true or false, got int64"),
-        ("sweep", "detection_distance_m", float("nan"), "column detection_distance_m must hold numbers from 0 to"),
-        ("sweep", "detection_distance_m", float("inf"), "column detection_distance_m must hold numbers from 0 to"),
+        (
+            "sweep",
+            "detection_distance_m",
+            float("nan"),
+            "column detection_distance_m must hold numbers from 0 to",
+        ),
+        (
+            "sweep",
+            "detection_distance_m",
+            float("inf"),
+            "column detection_distance_m must hold numbers from 0 to",
+        ),
         ("sweep", "min_distance_m", [3.0], "column min_distance_m must hold numbers, got list"),
-        ("sweep", "lidar_dead_rows", ["a"], "column lidar_dead_rows must hold lists of whole numbers"),
+        (
+            "sweep",
+            "lidar_dead_rows",
+            ["a"],
+            "column lidar_dead_rows must hold lists of whole numbers",
+        ),
         ("sweep", "camera_latency", "late", "column camera_latency must hold whole numbers"),
-        ("crowding", "scenario.vehicles", "many", "column scenario.vehicles must hold whole numbers"),
+        (
+            "crowding",
+            "scenario.vehicles",
+            "many",
+            "column scenario.vehicles must hold whole numbers",
+        ),
         ("protocol", "ttfds", [0.5], "column ttfds must hold lists of whole numbers"),
         ("protocol", "ttfds", [1, None], "column ttfds must hold whole lists"),
         ("protocol", "ttfds", [], "has 0 TTFD of 5 events"),
         ("protocol", "events", None, "column events must hold numbers, got null"),
-        ("protocol", "range/below 20 m/found", "x", "column range/below 20 m/found must hold numbers"),
-        ("protocol", "differing_cells", -1, "column differing_cells must hold whole numbers from 0"),
+        (
+            "protocol",
+            "range/below 20 m/found",
+            "x",
+            "column range/below 20 m/found must hold numbers",
+        ),
+        (
+            "protocol",
+            "differing_cells",
+            -1,
+            "column differing_cells must hold whole numbers from 0",
+        ),
         ("protocol", "tags", 1, "column tags must hold text"),
     ],
 )
@@ -85,8 +121,15 @@ def test_a_column_of_another_type_or_range_is_named(tmp_path, name, column, valu
 
 def test_a_parameter_of_a_structure_is_named(tmp_path):
     content = table("sweep", tmp_path)
-    put(content.append_column("policy.x", pa.array([{"a": 1}] * content.num_rows)), "sweep", tmp_path)
-    assert "column policy.x must hold text, numbers, flags or lists of them, got struct" in complaint(tmp_path)
+    put(
+        content.append_column("policy.x", pa.array([{"a": 1}] * content.num_rows)),
+        "sweep",
+        tmp_path,
+    )
+    assert (
+        "column policy.x must hold text, numbers, flags or lists of them, got struct"
+        in complaint(tmp_path)
+    )
 
 
 @pytest.mark.parametrize("kind", [pa.null(), pa.float64(), pa.string()])
@@ -99,7 +142,9 @@ def test_a_column_of_nothing_is_of_any_type(tmp_path, kind):
     assert {row["differing_cells"] for row in reported(tmp_path)[0]} == {None}
 
 
-@pytest.mark.parametrize("column", ["class/bus/delay", "film_hash", "tracks", "ttfds", "keyframes", "events"])
+@pytest.mark.parametrize(
+    "column", ["class/bus/delay", "film_hash", "tracks", "ttfds", "keyframes", "events"]
+)
 def test_a_missing_column_of_a_play_is_named(tmp_path, column):
     put(table("protocol", tmp_path).drop_columns(column), "protocol", tmp_path)
     assert f"it lacks {column}" in complaint(tmp_path)
@@ -121,7 +166,11 @@ def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_p
     with pytest.raises(InvalidInput, match="not a readable Parquet file"):
         read_rows(path)
     content = table("sweep", tmp_path)
-    put(content.append_column("when", pa.array([2**62] * content.num_rows, pa.timestamp("ms"))), "sweep", tmp_path)
+    put(
+        content.append_column("when", pa.array([2**62] * content.num_rows, pa.timestamp("ms"))),
+        "sweep",
+        tmp_path,
+    )
     assert len(reported(tmp_path)[0]) == content.num_rows
 
 
@@ -153,7 +202,23 @@ def test_notes_of_another_kind_are_one_line(tmp_path, notes, fault):
     assert fault in complaint(tmp_path)
 
 
-VALUES = [None, float("nan"), -1.0, 0.0, 1e300, "text", "$x^$ <b>|`", True, -1, 2**62, [], [1], [None], {"a": 1}, b"x"]
+VALUES = [
+    None,
+    float("nan"),
+    -1.0,
+    0.0,
+    1e300,
+    "text",
+    "$x^$ <b>|`",
+    True,
+    -1,
+    2**62,
+    [],
+    [1],
+    [None],
+    {"a": 1},
+    b"x",
+]
 
 
 def mutated(content, random):
@@ -174,7 +239,9 @@ def mutated(content, random):
                 return content.set_column(place, name, content[random.choice(content.column_names)])
             case _:
                 return content.set_column(
-                    place, name, column.take(pa.array(random.sample(range(len(column)), len(column))))
+                    place,
+                    name,
+                    column.take(pa.array(random.sample(range(len(column)), len(column)))),
                 )
     except (pa.ArrowException, TypeError, ValueError, OverflowError):
         return content
@@ -199,7 +266,9 @@ def test_damaged_results_are_shown_or_refused(tmp_path, name):
 @pytest.mark.parametrize("name", ["sweep", "protocol"])
 def test_a_name_of_signs_is_shown_everywhere(tmp_path, name, capsys):
     odd = "my $x^$ |`<b>_\\ \x1b[31m \u5b66"
-    rows = [row | {"policy": odd if row["policy"] == "history" else row["policy"]} for row in ROWS[name]]
+    rows = [
+        row | {"policy": odd if row["policy"] == "history" else row["policy"]} for row in ROWS[name]
+    ]
     write_rows(rows, tmp_path / STUDIES[name].kind.file, name, ["what \x1b[31m failed"])
     (tmp_path / "config.json").write_text('{"machine": {"system": "\\ud800"}}')
     for command in (
@@ -210,6 +279,10 @@ def test_a_name_of_signs_is_shown_everywhere(tmp_path, name, capsys):
             main(command)
         assert end.value.code == 0, capsys.readouterr().err
     said = capsys.readouterr()
-    for text in (said.out, said.err, *((tmp_path / file).read_text() for file in ("tables.md", "tables.tex"))):
+    for text in (
+        said.out,
+        said.err,
+        *((tmp_path / file).read_text() for file in ("tables.md", "tables.tex")),
+    ):
         assert "\x1b" not in text
     assert "<b>_" not in (tmp_path / "a.html").read_text()

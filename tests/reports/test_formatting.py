@@ -8,7 +8,9 @@ from care_sim.reports.table import Bold
 
 
 def made(measure, bound, *numbers, pairs=30, cautious=None):
-    return Contrast(measure, Difference(Interval(*numbers), bound, pairs, Interval(*(cautious or numbers))))
+    return Contrast(
+        measure, Difference(Interval(*numbers), bound, pairs, Interval(*(cautious or numbers)))
+    )
 
 
 @pytest.mark.parametrize(
@@ -18,8 +20,16 @@ def made(measure, bound, *numbers, pairs=30, cautious=None):
         (made(DETECTION, Bound.EXACT, 0.2, 0.04, 0.4), "+0.2 [0.04,0.4]", True),
         (made(DETECTION, Bound.EXACT, -0.01, -0.04, 0.0), "+0.0 [-0.04,0.0]", False),
         (made(DETECTION, Bound.AT_MOST, -8.0, -9.0, -7.0), "≤-8.0* [-9.0,-7.0]", True),
-        (made(DETECTION, Bound.AT_LEAST, -8.0, -9.0, -7.0, cautious=(-1.0, -2.0, 0.5)), "≥-8.0 [-9.0,-7.0]", False),
-        (made(DETECTION, Bound.OPEN, 8.0, 7.0, 9.0, cautious=(2.0, 1.0, 3.0)), "~+8.0 [7.0,9.0]", True),
+        (
+            made(DETECTION, Bound.AT_LEAST, -8.0, -9.0, -7.0, cautious=(-1.0, -2.0, 0.5)),
+            "≥-8.0 [-9.0,-7.0]",
+            False,
+        ),
+        (
+            made(DETECTION, Bound.OPEN, 8.0, 7.0, 9.0, cautious=(2.0, 1.0, 3.0)),
+            "~+8.0 [7.0,9.0]",
+            True,
+        ),
         (made(DETECTION, Bound.EXACT, 8.0, 8.0, 8.0, pairs=1), "+8.0 [8.0,8.0]", False),
         (made(BRAKED, Bound.EXACT, 4.9, 1.2, 9.0), "+5 [1,9]", True),
         (made(BRAKED, Bound.EXACT, 5.0, 0.3, 9.0), "+5* [0.3,9]", True),

@@ -32,7 +32,9 @@ def test_a_file_that_names_no_study_holds_a_sweep(tmp_path):
 def test_an_unknown_study_is_one_clear_line(tmp_path):
     write_rows(STUDY, tmp_path / "episodes.parquet", "gardening")
     with pytest.raises(
-        InvalidInput, match=r"unknown study in .* 'gardening'; known: ablate, crowding, faults, paper, protocol, sweep"
+        InvalidInput,
+        match=r"unknown study in .* 'gardening'; "
+        "known: ablate, crowding, faults, paper, protocol, sweep",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -51,14 +53,18 @@ def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys)
         *((tmp_path / f).read_text() for f in ("tables.md", "tables.tex")),
     )
     assert "Collisions: 0 in" in printed
-    assert all("Collisions: 0 in" in text and "never detected" in text for text in (markdown, latex))
+    assert all(
+        "Collisions: 0 in" in text and "never detected" in text for text in (markdown, latex)
+    )
     tables = study.tables(rows)
     assert latex.count(r"\begin{table}") == len(tables)
     assert all(f"## {table.title}\n" in markdown for table in tables)
 
 
 def test_a_file_changes_nothing_in_the_tables(tmp_path):
-    """Numbers that differ in type alone, and columns that only some rows have, come back from Parquet changed."""
+    """Numbers that differ in type alone, and columns that only some rows have, come back from
+    Parquet changed.
+    """
     played = {
         "ablate": ablations.configurations(range(2)),
         "faults": faults.configurations(range(2)),

@@ -67,7 +67,9 @@ def test_latex_takes_every_sign_literally(text, written):
     assert escaped(text) == written
 
 
-@pytest.mark.parametrize("table", [TABLE, *sweep_tables(STUDY), *crowding_tables(CROWD)], ids=lambda t: t.title)
+@pytest.mark.parametrize(
+    "table", [TABLE, *sweep_tables(STUDY), *crowding_tables(CROWD)], ids=lambda t: t.title
+)
 def test_latex_is_well_formed(table):
     text = latex(table)
     opened, closed = (re.findall(rf"\\{word}{{(\w+)}}", text) for word in ("begin", "end"))
@@ -86,7 +88,13 @@ HOSTILE = "p|q `r` [a](b) <b>x</b> _y_ &lt; *z* ~s~ \\ \n# t \x1b[31m \u202e"
 
 
 def test_names_of_anybody_are_text_in_markdown_latex_and_on_a_terminal():
-    table = Table(HOSTILE, ("a", HOSTILE), (("1", HOSTILE), ("2", Bold(HOSTILE)), (HOSTILE,)), (HOSTILE,), (HOSTILE,))
+    table = Table(
+        HOSTILE,
+        ("a", HOSTILE),
+        (("1", HOSTILE), ("2", Bold(HOSTILE)), (HOSTILE,)),
+        (HOSTILE,),
+        (HOSTILE,),
+    )
     markdown = table.markdown()
     assert isinstance(table.rows[1][1], Bold)
     rendered = markdown_it.MarkdownIt("commonmark").enable("table").render(markdown)

@@ -3,7 +3,9 @@ from tests.helpers.made_rows import rows
 
 
 def columns(study, policy):
-    return [(row["regret_m"], row["censored"]) for row in annotated(study) if row["policy"] == policy]
+    return [
+        (row["regret_m"], row["censored"]) for row in annotated(study) if row["policy"] == policy
+    ]
 
 
 def test_the_regret_of_every_episode_stands_beside_it():

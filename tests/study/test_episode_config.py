@@ -61,7 +61,12 @@ def test_the_digest_is_that_of_the_values_and_not_of_their_types():
         policy_parameters=(("k_safe", np.float64(1.0)),),
     )
     theirs = EpisodeConfig(
-        "dense", "care-sbf", seed=1, floor_seed=2, lidar_dead_rows=(3,), policy_parameters=(("k_safe", 1.0),)
+        "dense",
+        "care-sbf",
+        seed=1,
+        floor_seed=2,
+        lidar_dead_rows=(3,),
+        policy_parameters=(("k_safe", 1.0),),
     )
     assert (ours, hash(ours), ours.digest()) == (theirs, hash(theirs), theirs.digest())
 
@@ -76,7 +81,9 @@ def test_the_digest_tells_every_parameter_apart():
         {"scenario_parameters": (("vehicles", 4),)},
         {"policy": "care-sbf", "policy_parameters": (("k_safe", 0.0),)},
     ]
-    digests = [config.digest() for config in (GOOD, *(replace(GOOD, **change) for change in changes))]
+    digests = [
+        config.digest() for config in (GOOD, *(replace(GOOD, **change) for change in changes))
+    ]
     assert len(set(digests)) == len(digests)
     assert EpisodeConfig("dense", "care").digest() == GOOD.digest()
 
@@ -95,7 +102,9 @@ def package(tmp_path, monkeypatch):
     (tmp_path / "ours_policy").mkdir()
     info.mkdir()
     (tmp_path / "ours_policy" / "__init__.py").touch()
-    (tmp_path / "ours_policy" / "near.py").write_text("from care_sim.policies.paper.history import History as Near\n")
+    (tmp_path / "ours_policy" / "near.py").write_text(
+        "from care_sim.policies.paper.history import History as Near\n"
+    )
     (tmp_path / "ours_policy" / "table.csv").write_text("1\n")
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: ours\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[care_sim.policies]\nnear = ours_policy.near:Near\n")
@@ -118,8 +127,12 @@ def test_the_digest_covers_the_package_of_an_installed_policy(package, edited):
     assert GOOD.digest() == built_in
 
 
-def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers(package, monkeypatch):
-    monkeypatch.setattr(package_files, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip"))
+def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers(
+    package, monkeypatch
+):
+    monkeypatch.setattr(
+        package_files, "find_spec", lambda name: ModuleSpec(name, None, origin="/nowhere/ours.zip")
+    )
     ours = EpisodeConfig("dense", "near")
     before = ours.digest()
     monkeypatch.setattr("care_sim.study.task.SESSION", "another run")
@@ -135,13 +148,19 @@ def test_the_row_is_flat_and_the_label_names_what_is_unusual():
 
 def test_full_runs_once_for_all_budgets():
     configs = grid(["dense"], ["care", "full"], (0.03, 0.1), (0, 1))
-    assert [(c.policy, c.budget) for c in configs if c.seed == 0] == [("care", 0.03), ("care", 0.1), ("full", 1.0)]
+    assert [(c.policy, c.budget) for c in configs if c.seed == 0] == [
+        ("care", 0.03),
+        ("care", 0.1),
+        ("full", 1.0),
+    ]
     assert [plain["seeds"] for plain in listed(configs)["configurations"]] == [[0, 1]] * 3
 
 
 def test_a_parameter_may_be_one_policys_own():
     given = (("k_safe", 1.0),), (("care-sbf.k_safe", 1.0),)
-    alone, beside = (grid(["dense"], ["care-sbf"], [0.1], [0], policy_parameters=each) for each in given)
+    alone, beside = (
+        grid(["dense"], ["care-sbf"], [0.1], [0], policy_parameters=each) for each in given
+    )
     assert alone == beside
     care, history = grid(["dense"], ["care", "history"], [0.1], [0], policy_parameters=given[1])
     assert care.policy_parameters == history.policy_parameters == ()

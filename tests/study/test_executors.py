@@ -1,4 +1,6 @@
-"""Episodes on a dask cluster of real processes: the same rows as here; deaths cost a retry, and are one line."""
+"""Episodes on a dask cluster of real processes: the same rows as here; deaths cost a retry, and are
+one line.
+"""
 
 import builtins
 import json
@@ -22,7 +24,9 @@ from care_sim.study.runner import Audience, run_all
 MEASURED = {"wall_s", "peak_rss_mb"}
 SHORT = (("duration_s", 0.5),)
 LONG = (("duration_s", 3.0),)
-CONFIGS = [EpisodeConfig("dartout", policy, scenario_parameters=SHORT) for policy in ("care", "history")]
+CONFIGS = [
+    EpisodeConfig("dartout", policy, scenario_parameters=SHORT) for policy in ("care", "history")
+]
 
 THIRD_PARTY = """
 import os
@@ -50,7 +54,9 @@ class Cluster:
     def __init__(self, folder):
         self.processes = []
         self._file = folder / "scheduler.json"
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show", "--no-dashboard")
+        self.scheduler = self._start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show", "--no-dashboard"
+        )
 
     def wait(self):
         until(self._file.exists)
@@ -58,12 +64,23 @@ class Cluster:
 
     def worker(self, *options, **environment):
         usual = ("--nthreads", "1", "--no-nanny")
-        return self._start("worker", *(options or usual), "--no-dashboard", "--death-timeout", "60", **environment)
+        return self._start(
+            "worker", *(options or usual), "--no-dashboard", "--death-timeout", "60", **environment
+        )
 
     def _start(self, role, *options, **environment):
-        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", "--scheduler-file", str(self._file), *options]
+        command = [
+            sys.executable,
+            "-m",
+            f"distributed.cli.dask_{role}",
+            "--scheduler-file",
+            str(self._file),
+            *options,
+        ]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        process = subprocess.Popen(command, env=os.environ | environment, start_new_session=True, **quiet)
+        process = subprocess.Popen(
+            command, env=os.environ | environment, start_new_session=True, **quiet
+        )
         self.processes.append(process)
         return process
 
@@ -140,7 +157,9 @@ def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask
             doomed.kill()
         assert ending == {"failures": []}
         assert len(path.read_text().splitlines()) == len(configs)
-        assert [steady(journal[config.digest()]) for config in configs] == [steady(run_episode(c)) for c in configs]
+        assert [steady(journal[config.digest()]) for config in configs] == [
+            steady(run_episode(c)) for c in configs
+        ]
     assert set(audience.workers) == {1, 2}
 
 
@@ -150,12 +169,22 @@ def test_a_lost_scheduler_is_one_line_and_keeps_what_was_played(dask_cluster, tm
     journal = tmp_path / "out" / JOURNAL
     grid_of_200 = ["--scenarios", "dartout", "--policies", "history", "--seeds", "200"]
     options = ["--out", str(journal.parent), "--cluster", dask_cluster.address]
-    command = [sys.executable, "-c", "from care_sim.cli import main; main()", "sweep", *grid_of_200, *options]
+    command = [
+        sys.executable,
+        "-c",
+        "from care_sim.cli import main; main()",
+        "sweep",
+        *grid_of_200,
+        *options,
+    ]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as sweep:
         until(lambda: journal.exists() and journal.read_text().count("\n") >= 2)
         dask_cluster.scheduler.kill()
         _, complaint = sweep.communicate(timeout=40)
-    gone = f"care-sim: the dask scheduler at {dask_cluster.address} is gone; what is finished is kept, "
+    gone = (
+        f"care-sim: the dask scheduler at {dask_cluster.address} is gone; "
+        "what is finished is kept, "
+    )
     assert complaint.splitlines()[-1] == f"{gone}the same command goes on from there"
     assert all(line.startswith("episodes ") for line in complaint.splitlines()[:-1])
     assert sweep.returncode == 2
@@ -173,7 +202,9 @@ def installed(site):
 
 
 @pytest.mark.slow
-def test_a_policy_that_the_workers_lack_fails_and_one_that_kills_them_does_too(dask_cluster, tmp_path, monkeypatch):
+def test_a_policy_that_the_workers_lack_fails_and_one_that_kills_them_does_too(
+    dask_cluster, tmp_path, monkeypatch
+):
     site = tmp_path / "site"
     installed(site)
     monkeypatch.syspath_prepend(site)

@@ -20,13 +20,17 @@ def sweep():
 
 
 def seconds(config, random):
-    """A street takes half as long again, a full scan ten times as long; a fifth more or less by chance."""
+    """A street takes half as long again, a full scan ten times as long; a fifth more or less by
+    chance.
+    """
     base = (10.0 if config.policy == "full" else 1.0) * (1.5 if config.scenario == "dense" else 1.0)
     return base * random.uniform(0.8, 1.2)
 
 
 def play(configs, workers, forecast=None):
-    """Play on a synthetic clock; the truth and, at every landing, when it was and what was predicted then."""
+    """Play on a synthetic clock; the truth and, at every landing, when it was and what was
+    predicted then.
+    """
     random = np.random.default_rng(0)
     forecast = forecast or Forecast(configs)
     flying, predictions, waiting, now = [], [], list(reversed(configs)), 0.0
@@ -42,7 +46,9 @@ def play(configs, workers, forecast=None):
 
 @pytest.mark.parametrize(("workers", "share"), [(1, 0.05), (2, 0.05), (8, 0.1)])
 def test_soon_the_whole_is_known_to_a_tenth(workers, share):
-    """Many workers still fly the first slow episodes when the quick ones of a twentieth have landed."""
+    """Many workers still fly the first slow episodes when the quick ones of a twentieth have
+    landed.
+    """
     configs = sweep()
     truth, predictions = play(configs, workers)
     for _, predicted in predictions[round(share * len(configs)) :]:
@@ -51,7 +57,9 @@ def test_soon_the_whole_is_known_to_a_tenth(workers, share):
 
 
 def test_the_mean_of_all_would_be_far_off():
-    """The same run when the slow policy comes last and likeness is not looked at: why the forecast looks."""
+    """The same run when the slow policy comes last and likeness is not looked at: why the forecast
+    looks.
+    """
     configs = sorted(sweep(), key=lambda config: config.policy == "full")
     truth, predictions = play(configs, 1)
     now, _ = predictions[len(configs) // 2]
@@ -60,7 +68,11 @@ def test_the_mean_of_all_would_be_far_off():
 
 def test_an_earlier_run_tells_before_the_first_episode_and_then_gives_way():
     configs = sweep()
-    earlier = [(config, 3 * seconds(config, np.random.default_rng(1))) for config in configs if config.seed < 2]
+    earlier = [
+        (config, 3 * seconds(config, np.random.default_rng(1)))
+        for config in configs
+        if config.seed < 2
+    ]
     rest = [config for config in configs if config.seed >= 2]
     forecast = Forecast(rest, earlier)
     assert forecast.remaining_s(4) == pytest.approx(3 * play(rest, 4)[0], rel=0.25)
@@ -86,7 +98,9 @@ def test_the_closest_likeness_counts():
 
 
 def test_the_longest_episode_bounds_what_many_workers_can_do():
-    forecast = Forecast([EpisodeConfig("cutin", "full", budget=1.0, seed=seed) for seed in range(4)])
+    forecast = Forecast(
+        [EpisodeConfig("cutin", "full", budget=1.0, seed=seed) for seed in range(4)]
+    )
     forecast.finished(EpisodeConfig("cutin", "full", budget=1.0), 10.0)
     assert (forecast.remaining_s(100), forecast.remaining_s(2)) == (10.0, 15.0)
     assert forecast.remaining_s(0) == 30.0
@@ -103,7 +117,17 @@ class Clock:
 def test_lines_come_after_ten_seconds_then_each_minute_or_twentieth(capsys):
     clock = Clock()
     lines = Lines(1000, "episodes", clock)
-    for now, done in [(1, 0), (9, 5), (10, 6), (15, 500), (21, 501), (40, 510), (80, 520), (81, 530), (100, 579)]:
+    for now, done in [
+        (1, 0),
+        (9, 5),
+        (10, 6),
+        (15, 500),
+        (21, 501),
+        (40, 510),
+        (80, 520),
+        (81, 530),
+        (100, 579),
+    ]:
         clock.now = now
         lines(done, "6 min left" if now > 10 else "")
     assert capsys.readouterr().err.splitlines() == [
@@ -132,7 +156,9 @@ def test_the_reporter_counts_down_and_says_how_good_it_was():
 def test_an_episode_that_fails_is_counted_and_takes_no_time():
     shown = []
     configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
-    reporter = Reporter(Forecast(configs), lambda done, left: shown.append((done, left)), 3, Clock())
+    reporter = Reporter(
+        Forecast(configs), lambda done, left: shown.append((done, left)), 3, Clock()
+    )
     reporter.playing(1)
     reporter.finished(configs[0], None)
     assert shown[-1] == (1, "0 s left")
@@ -140,7 +166,8 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
 
 
 @pytest.mark.parametrize(
-    ("duration", "text"), [(0.4, "0 s"), (89.4, "89 s"), (90, "2 min"), (3600, "60 min"), (12000, "3 h 20 min")]
+    ("duration", "text"),
+    [(0.4, "0 s"), (89.4, "89 s"), (90, "2 min"), (3600, "60 min"), (12000, "3 h 20 min")],
 )
 def test_durations_as_people_say_them(duration, text):
     assert spoken(duration) == text

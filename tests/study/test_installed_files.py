@@ -47,11 +47,17 @@ FORMS = {
 
 @pytest.fixture
 def site(install, tmp_path, monkeypatch):
-    """Installs a policy that opens `weights.npz` in one of the forms; returns the folder of its module."""
+    """Installs a policy that opens `weights.npz` in one of the forms; returns the folder of its
+    module.
+    """
 
     def put(form):
         constant, parameter, opened = FORMS[form]
-        install("mine_policy", HEAD + BODY.format(constant=constant, parameter=parameter, opened=opened), mine="Mine")
+        install(
+            "mine_policy",
+            HEAD + BODY.format(constant=constant, parameter=parameter, opened=opened),
+            mine="Mine",
+        )
         monkeypatch.chdir(tmp_path / "mine_policy")
         write(tmp_path / "mine_policy", 1)
         return tmp_path / "mine_policy"
@@ -89,14 +95,18 @@ def test_the_same_command_plays_again_with_new_weights(site, tmp_path, capsys):
 
 def test_a_file_that_changes_while_a_study_runs_fails_what_met_it_late(site, tmp_path):
     folder = site("an absolute default")
-    configs = [EpisodeConfig("dartout", "mine", seed=n, scenario_parameters=(("duration_s", 0.1),)) for n in range(2)]
+    configs = [
+        EpisodeConfig("dartout", "mine", seed=n, scenario_parameters=(("duration_s", 0.1),))
+        for n in range(2)
+    ]
     assert [config.key for config in configs] == [config.digest() for config in configs]
     write(folder, 2)
     with Journal(tmp_path / JOURNAL) as journal:
         failures = run_all(configs, journal, 1)
         assert len(journal) == 0
     assert {failure.reason for failure in failures} == {
-        "the worker runs another version of care-sim or of the policy, or their files changed while the study ran"
+        "the worker runs another version of care-sim or of the policy, or their files changed "
+        "while the study ran"
     }
 
 
@@ -106,7 +116,11 @@ ELSEWHERE = {
     "a constant table": ('PATHS = {"a": Path.home() / "weights.npz"}', "n=1", 'self.PATHS["a"]'),
     "a default table": ("", 'paths={"a": Path.home() / "weights.npz"}', 'paths["a"]'),
     "a default configuration": ("", "config=Config()", "config.path"),
-    "a configuration made in the body": ("", "config=None", "Path((config or Late()).path).expanduser()"),
+    "a configuration made in the body": (
+        "",
+        "config=None",
+        "Path((config or Late()).path).expanduser()",
+    ),
     "a text in the body": ("", "path=None", 'path or "weights.npz"'),
 }
 CONFIGS = """
@@ -122,7 +136,9 @@ class Late:
 
 
 @pytest.mark.parametrize("form", ELSEWHERE)
-def test_weights_that_lie_elsewhere_count_by_whatever_names_them(form, install, tmp_path, monkeypatch):
+def test_weights_that_lie_elsewhere_count_by_whatever_names_them(
+    form, install, tmp_path, monkeypatch
+):
     home = tmp_path / "home"
     home.mkdir()
     monkeypatch.setenv("HOME", str(home))
@@ -131,7 +147,9 @@ def test_weights_that_lie_elsewhere_count_by_whatever_names_them(form, install, 
     write(home, 1)
     constant, parameter, opened = ELSEWHERE[form]
     install(
-        "mine_policy", HEAD + CONFIGS + BODY.format(constant=constant, parameter=parameter, opened=opened), mine="Mine"
+        "mine_policy",
+        HEAD + CONFIGS + BODY.format(constant=constant, parameter=parameter, opened=opened),
+        mine="Mine",
     )
     config = EpisodeConfig("dartout", "mine")
     before = config.digest()
@@ -142,9 +160,15 @@ def test_weights_that_lie_elsewhere_count_by_whatever_names_them(form, install, 
 
 
 def test_a_text_in_code_names_no_folder_and_nothing_of_the_system(install, tmp_path, monkeypatch):
-    install("mine_policy", HEAD + BODY.format(constant="", parameter="n=1", opened='"/proc/self/stat.d"'), mine="Mine")
+    install(
+        "mine_policy",
+        HEAD + BODY.format(constant="", parameter="n=1", opened='"/proc/self/stat.d"'),
+        mine="Mine",
+    )
     source = tmp_path / "mine_policy" / "mine_policy.py"
-    source.write_text(source.read_text() + "SEEN = ('/proc/self/status', {'a': ['/dev/null']})\nX = 'runs.d'\n")
+    source.write_text(
+        source.read_text() + "SEEN = ('/proc/self/status', {'a': ['/dev/null']})\nX = 'runs.d'\n"
+    )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs.d").mkdir()
     files = package_files.shipped_files(entries()["mine"]).values()

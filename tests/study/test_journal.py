@@ -24,9 +24,13 @@ sys.stdin.read()
 def test_a_second_study_is_refused_while_the_first_lives_and_not_after_it_was_killed(tmp_path):
     path = tmp_path / "journal.jsonl"
     command = [sys.executable, "-c", HOLDS_AND_DIES, str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as first:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as first:
         assert first.stdout.readline() == "open\n"
-        with pytest.raises(InvalidInput, match=f"another study writes to {tmp_path} now; wait for its end or give"):
+        with pytest.raises(
+            InvalidInput, match=f"another study writes to {tmp_path} now; wait for its end or give"
+        ):
             Journal(path)
         first.kill()
     with Journal(path) as journal:
@@ -45,7 +49,13 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
         assert "a" in journal
 
 
-ROW = {"digest": "a", "seed": 3, "detection_distance_m": 16.25, "scenario.gap_m": (0.5, 0.6), "policy": "care"}
+ROW = {
+    "digest": "a",
+    "seed": 3,
+    "detection_distance_m": 16.25,
+    "scenario.gap_m": (0.5, 0.6),
+    "policy": "care",
+}
 
 
 def written(path):

@@ -1,4 +1,6 @@
-"""Studies that are killed or interrupted: no process is left, no row is lost, the same command goes on."""
+"""Studies that are killed or interrupted: no process is left, no row is lost, the same command goes
+on.
+"""
 
 import json
 import os
@@ -8,7 +10,11 @@ import sys
 from care_sim.study.journal import JOURNAL
 from tests.helpers.descendants import Marked, until
 
-COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'care-sim'; from care_sim.cli import main; main()"]
+COMMAND = [
+    sys.executable,
+    "-c",
+    "import sys; sys.argv[0] = 'care-sim'; from care_sim.cli import main; main()",
+]
 STARTS = """
 import signal, sys, time
 for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
@@ -22,7 +28,15 @@ with processes(2) as pool:
 
 def study(folder):
     axes = ["--scenarios", "dartout", "--policies", "random", "--seeds", "800", "--workers", "2"]
-    return [*COMMAND, "sweep", *axes, "--scenario-parameters", "duration_s=0.1", "--out", str(folder)]
+    return [
+        *COMMAND,
+        "sweep",
+        *axes,
+        "--scenario-parameters",
+        "duration_s=0.1",
+        "--out",
+        str(folder),
+    ]
 
 
 def rows(folder):
@@ -44,7 +58,9 @@ def test_whatever_ends_a_study_leaves_no_process_and_the_same_command_goes_on(tm
         kept = rows(tmp_path)
         if end != signal.SIGKILL:
             assert started.process.returncode == 130
-            assert complaint.splitlines()[-1].startswith("care-sim: interrupted; what is finished is kept")
+            assert complaint.splitlines()[-1].startswith(
+                "care-sim: interrupted; what is finished is kept"
+            )
             assert "Traceback" not in complaint
     digests = [json.loads(line)["digest"] for line in kept]
     assert len(set(digests)) == len(digests)

@@ -9,7 +9,11 @@ def test_the_study_has_245_episodes_in_the_stated_split():
     assert len(configs) == len(set(configs)) == 245
     assert Counter(config.seed for config in configs) == dict.fromkeys(range(5), 49)
     faultless = [c for c in configs if not (c.false_negative_rate or c.camera_latency)]
-    assert Counter(c.scenario for c in faultless if c.seed == 0) == {"dense": 17, "dartout": 13, "cutin": 5}
+    assert Counter(c.scenario for c in faultless if c.seed == 0) == {
+        "dense": 17,
+        "dartout": 13,
+        "cutin": 5,
+    }
     assert sum(c.false_negative_rate > 0 for c in configs) == 8 * 5
     assert sum(c.camera_latency > 0 for c in configs) == 6 * 5
     assert {c.budget for c in configs if c.policy == "full"} == {1.0}

@@ -1,4 +1,6 @@
-"""Parameters are held as they are, from the task through journal and Parquet file, or refused in one line."""
+"""Parameters are held as they are, from the task through journal and Parquet file, or refused in
+one line.
+"""
 
 import enum
 from pathlib import Path
@@ -95,9 +97,14 @@ def test_python_types_of_everything_else(value, held):
     assert type(found) is type(held)
 
 
-scalars = st.one_of(st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(allow_nan=False), st.text(max_size=9))
+scalars = st.one_of(
+    st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(allow_nan=False), st.text(max_size=9)
+)
 lists = st.one_of(
-    *(st.lists(each, max_size=3) for each in (st.booleans(), st.floats(allow_nan=False), st.text(max_size=5))),
+    *(
+        st.lists(each, max_size=3)
+        for each in (st.booleans(), st.floats(allow_nan=False), st.text(max_size=5))
+    ),
     st.lists(st.lists(st.integers(-9, 9), min_size=1, max_size=3), max_size=3),
 )
 
@@ -105,7 +112,10 @@ lists = st.one_of(
 @given(value=scalars | lists)
 def test_files_give_back_what_a_task_was_given(tmp_path_factory, value):
     folder = tmp_path_factory.mktemp("held")
-    row = {"digest": "a", **{f"policy.{name}": held for name, held in settled([("x", value)], "policy")}}
+    row = {
+        "digest": "a",
+        **{f"policy.{name}": held for name, held in settled([("x", value)], "policy")},
+    }
     with Journal(folder / "journal.jsonl") as journal:
         journal.append(row)
     with Journal(folder / "journal.jsonl") as journal:
@@ -120,13 +130,24 @@ def test_files_give_back_what_a_task_was_given(tmp_path_factory, value):
 def test_an_odd_policy_is_played_and_known_again(anything, tmp_path):
     odd = (("nest", [[1, 2], [3, 4]]), ("label", "a|b `c` $d$\n\x1b[31m"), ("on", True))
     configs = grid(
-        ["dartout"], ["anything"], [0.1], [0], policy_parameters=odd, scenario_parameters=(("duration_s", 0.1),)
+        ["dartout"],
+        ["anything"],
+        [0.1],
+        [0],
+        policy_parameters=odd,
+        scenario_parameters=(("duration_s", 0.1),),
     )
     for _ in range(2):
         assert conduct(configs, tmp_path, workers=1) == []
     (row,) = read_rows(tmp_path / "episodes.parquet")
-    assert (row["policy.nest"], row["policy.label"], row["policy.on"]) == (((1, 2), (3, 4)), odd[1][1], True)
-    assert "\x1b" not in (tmp_path / "tables.md").read_text() + (tmp_path / "tables.tex").read_text()
+    assert (row["policy.nest"], row["policy.label"], row["policy.on"]) == (
+        ((1, 2), (3, 4)),
+        odd[1][1],
+        True,
+    )
+    assert (
+        "\x1b" not in (tmp_path / "tables.md").read_text() + (tmp_path / "tables.tex").read_text()
+    )
     assert policy_of(row) in policy_of(configs[0].row())
     check_results(tmp_path, configs, SWEEP)
 
@@ -137,7 +158,8 @@ def test_values_that_share_no_column_are_refused_before_anything_is_played(anyth
         for policy, value in (("anything", "text"), ("number", 3))
     ]
     with pytest.raises(
-        InvalidInput, match=r"one column of results must hold all values of policy\.x, got 'text' and 3"
+        InvalidInput,
+        match=r"one column of results must hold all values of policy\.x, got 'text' and 3",
     ):
         conduct(configs, tmp_path / "out", workers=1)
     assert not (tmp_path / "out").exists()

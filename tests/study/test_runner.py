@@ -47,7 +47,9 @@ def test_the_hash_tells_episodes_apart_and_repeats():
     a, b = (run_episode(config) for config in short(["care"], seeds=(0, 1)))
     assert a["episode_hash"] != b["episode_hash"]
     assert steady(run_episode(short(["care"])[0])) == steady(a)
-    street = [EpisodeConfig("dense", policy, scenario_parameters=SHORT) for policy in ("care", "random")]
+    street = [
+        EpisodeConfig("dense", policy, scenario_parameters=SHORT) for policy in ("care", "random")
+    ]
     assert len({run_episode(config)["episode_hash"] for config in street}) == 2
 
 
@@ -83,7 +85,9 @@ def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys)
     conduct(second, tmp_path, workers=1, force=True)
     line = f"1 of 2 episodes found in {tmp_path}; 1 of other options or code stay in its journal\n"
     assert line in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {"my-budget.png"}
+    assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {
+        "my-budget.png"
+    }
 
 
 class Counting(Audience):
@@ -133,7 +137,9 @@ def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_pat
     conduct(configs, tmp_path, workers=1)
     played = [json.loads(line)["seed"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
     assert played == [0, 0, 1, 1, 2, 2]
-    assert [row["digest"] for row in read_rows(tmp_path / EPISODES.file)] == [config.digest() for config in configs]
+    assert [row["digest"] for row in read_rows(tmp_path / EPISODES.file)] == [
+        config.digest() for config in configs
+    ]
 
 
 def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
@@ -148,7 +154,9 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
         "raises-oddly": "Odd: hard to unpickle (misbehaving.py, line 28)",
         "exits": "SystemExit: 4 (misbehaving.py, line 32)",
     }
-    assert str(failures[0]).startswith(f"dartout {failures[0].config.policy} 0.1 seed 0 scenario.duration_s=0.3: ")
+    assert str(failures[0]).startswith(
+        f"dartout {failures[0].config.policy} 0.1 seed 0 scenario.duration_s=0.3: "
+    )
     assert {config.policy for config in kept} == {"history", "care", "random"}
     assert Counter(audience.ended) == Counter((config, config in kept) for config in configs)
 
@@ -165,7 +173,9 @@ def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
 
 
 class BusyServer(ThreadPoolExecutor):
-    """Fails to start a worker at the first call, as a pool whose fork server is busy or was killed does."""
+    """Fails to start a worker at the first call, as a pool whose fork server is busy or was killed
+    does.
+    """
 
     error: type[Exception]
 
@@ -200,9 +210,21 @@ def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):
 
 
 def test_a_worker_imports_nothing_of_tables_and_commands():
-    import_as_a_worker = "import sys, care_sim.study.episode_play, care_sim.envs.closed_loop; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", import_as_a_worker], capture_output=True, text=True, check=True)
-    needless = {"rich", "tyro", "torch", "dask", "open3d", "care_sim.reports.report", "care_sim.reports.figures.files"}
+    import_as_a_worker = (
+        "import sys, care_sim.study.episode_play, care_sim.envs.closed_loop; print(*sys.modules)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", import_as_a_worker], capture_output=True, text=True, check=True
+    )
+    needless = {
+        "rich",
+        "tyro",
+        "torch",
+        "dask",
+        "open3d",
+        "care_sim.reports.report",
+        "care_sim.reports.figures.files",
+    }
     assert not needless & set(loaded.stdout.split())
 
 
@@ -212,7 +234,10 @@ def test_the_memory_of_a_worker_stays_flat(tmp_path):
     configs = grid(["dense"], ["care", "full"], [0.1], range(20), scenario_parameters=SHORT)
     with Journal(tmp_path / JOURNAL) as journal:
         assert run_all(configs, journal, 1) == []
-        peaks = [journal[config.digest()]["peak_rss_mb"] for config in sorted(configs, key=lambda c: c.seed)]
+        peaks = [
+            journal[config.digest()]["peak_rss_mb"]
+            for config in sorted(configs, key=lambda c: c.seed)
+        ]
     assert peaks[-1] < peaks[9] + 5
 
 
@@ -222,15 +247,38 @@ def listen_to_interrupts():
 
 
 def test_an_interrupt_keeps_what_was_computed(tmp_path):
-    sweep = ["sweep", "--scenarios", "dartout", "--policies", "random", "--seeds", "500", "--workers", "1"]
+    sweep = [
+        "sweep",
+        "--scenarios",
+        "dartout",
+        "--policies",
+        "random",
+        "--seeds",
+        "500",
+        "--workers",
+        "1",
+    ]
     options = ["--out", str(tmp_path), "--scenario-parameters", "duration_s=0.1"]
-    command = [sys.executable, "-c", "import sys; from care_sim.cli import main; main(sys.argv[1:])", *sweep, *options]
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from care_sim.cli import main; main(sys.argv[1:])",
+        *sweep,
+        *options,
+    ]
     process = subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=listen_to_interrupts
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=listen_to_interrupts,
     )
     journal = tmp_path / JOURNAL
     deadline = time.monotonic() + 40
-    while not (journal.exists() and journal.read_text().count("\n") >= 2) and time.monotonic() < deadline:
+    while (
+        not (journal.exists() and journal.read_text().count("\n") >= 2)
+        and time.monotonic() < deadline
+    ):
         time.sleep(0.1)
     os.killpg(process.pid, signal.SIGINT)
     _, complaint = process.communicate(timeout=40)

@@ -43,7 +43,9 @@ def limited():
 
 def test_no_study_is_built_that_no_memory_holds(tmp_path):
     command = [sys.executable, "-c", ALL_IN_ONE, str(tmp_path / "out"), *COMMANDS]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, preexec_fn=limited, check=True)
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=100, preexec_fn=limited, check=True
+    )
     assert done.stdout.split() == ["2"] * len(COMMANDS)
     lines = done.stderr.splitlines()
     assert len(lines) == len(COMMANDS)

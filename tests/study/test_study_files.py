@@ -11,7 +11,8 @@ from care_sim.study.results_files import EPISODES
 from care_sim.study.rows import read_rows, write_rows
 
 ROWS = [
-    EpisodeConfig("dense", policy).row() | asdict(Outcome(distance, 3.0, True, None, 2.5, False, None, 98280))
+    EpisodeConfig("dense", policy).row()
+    | asdict(Outcome(distance, 3.0, True, None, 2.5, False, None, 98280))
     for policy, distance in (("history", None), ("care", 1 / 3))
 ]
 
@@ -63,7 +64,17 @@ def test_the_journal_passes_over_a_torn_line_and_goes_on_behind_it(tmp_path):
 
 
 def test_a_sweep_over_a_range_is_reported_and_resumed(tmp_path, capsys):
-    sweep = ["sweep", "--scenarios", "dartout", "--policies", "care", "--seeds", "1", "--out", str(tmp_path)]
+    sweep = [
+        "sweep",
+        "--scenarios",
+        "dartout",
+        "--policies",
+        "care",
+        "--seeds",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
     sweep += ["--scenario-parameters", "duration_s=0.2", "gap_m=(0.9,1.0)", "--workers", "1"]
     for command in (sweep, sweep, ["report", str(tmp_path)]):
         with pytest.raises(SystemExit) as end:

@@ -14,7 +14,8 @@ from care_sim.viewer.pictures.keyframe import draw_keyframe
 class Photographer:
     """Watches an episode and writes one picture to `path`; without a path it does nothing.
 
-    Raises InvalidInput and OSError at once where no picture can be written: `care_sim.base.files.check_output`.
+    Raises InvalidInput and OSError at once where no picture can be written:
+    `care_sim.base.files.check_output`.
     """
 
     def __init__(self, path: Path | None):

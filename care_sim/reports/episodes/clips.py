@@ -1,4 +1,6 @@
-"""Episodes on film: one as its picture shows it, or the same seed under several policies side by side."""
+"""Episodes on film: one as its picture shows it, or the same seed under several policies side by
+side.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import zip_longest
@@ -29,12 +31,13 @@ def whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Ima
 class Film:
     """Episodes side by side on one film at `path`, drawn by `draw`; without a path it does nothing.
 
-    Raises InvalidInput for a folder and for an ending that no clip has, MissingExtra for one whose library is not
-    installed.
+    Raises InvalidInput for a folder and for an ending that no clip has, MissingExtra for one whose
+    library is not installed.
     """
 
     def __init__(self, path: Path | None, draw: Draw = whole):
-        self._path, self._draw = path, draw
+        self._path = path
+        self._draw = draw
         self._films: list[list[Image.Image]] = []
         if path is not None:
             check_clip(path)
@@ -54,9 +57,11 @@ class Film:
         return watch
 
     def write(self) -> bool:
-        """Write the film, a picture a keyframe, at the speed of the world; whether there was anything to write.
+        """Write the film, a picture a keyframe, at the speed of the world; whether there was
+        anything to write.
 
-        An episode that ends before the others keeps its last picture; one without a keyframe is left out.
+        An episode that ends before the others keeps its last picture; one without a keyframe is
+        left out.
         """
         films = [film for film in self._films if film]
         if self._path is not None and films:

@@ -11,10 +11,20 @@ from care_sim.loops.records import Keyframe, Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.task import Row
 
-COLUMNS = ("time\ns", "speed\nm/s", "sensor to\nactor m", "hull to\nhull m", "cells\nfired", "seen", "found", "brake")
+COLUMNS = (
+    "time\ns",
+    "speed\nm/s",
+    "sensor to\nactor m",
+    "hull to\nhull m",
+    "cells\nfired",
+    "seen",
+    "found",
+    "brake",
+)
 LEGEND = (
-    "seen: the camera shows the actor; found: the LiDAR detector reports it; distances are planar.\n"
-    "The brake acts 0.3 s after the decision. Keyframes in which nothing changes are left out."
+    "seen: the camera shows the actor; found: the LiDAR detector reports it; distances are "
+    "planar.\nThe brake acts 0.3 s after the decision. Keyframes in which nothing changes are left "
+    "out."
 )
 LABELS = {
     "detection_distance_m": "detection_distance_m (sensor to actor)",
@@ -23,10 +33,15 @@ LABELS = {
 }
 
 
-def print_timeline(config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe], console: Console) -> None:
+def print_timeline(
+    config: EpisodeConfig, row: Row, keyframes: Sequence[Keyframe], console: Console
+) -> None:
     """Print an episode where something changes in it, then its outcome."""
     table = Table(
-        title=Text(printable(config.label), "table.title"), title_justify="left", box=None, padding=(0, 1, 0, 0)
+        title=Text(printable(config.label), "table.title"),
+        title_justify="left",
+        box=None,
+        padding=(0, 1, 0, 0),
     )
     for number, column in enumerate(COLUMNS):
         table.add_column(column, justify="right" if number < 5 else "left", no_wrap=True)

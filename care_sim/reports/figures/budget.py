@@ -18,8 +18,12 @@ from care_sim.study.task import Row
 
 NAMES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
 """Every figure that a sweep can draw."""
-DODGE, SPREAD = 0.03, 0.24
-"""Share of a budget by which neighbouring policies are moved apart, so that equal curves stay visible; in all."""
+DODGE = 0.03
+"""Share of a budget by which neighbouring policies are moved apart, so that equal curves stay
+visible.
+"""
+SPREAD = 0.24
+"""The same share from the first policy to the last, at most."""
 FEW = 5
 """Policies up to which their quartiles are drawn in full strength."""
 
@@ -32,18 +36,27 @@ class Curve(NamedTuple):
 
 
 def sweep_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """A figure for every scenario that was run without further conditions at several budgets, by name."""
+    """A figure for every scenario that was run without further conditions at several budgets, by
+    name.
+    """
     cells = [cell for cell in summarise(rows) if not cell.setting.conditions]
     scenarios = sorted({cell.setting.scenario for cell in cells})
-    by_scenario = {name: [cell for cell in cells if cell.setting.scenario == name] for name in scenarios}
-    return {f"{name}-budget": budget_figure(own) for name, own in by_scenario.items() if len(_budgets(own)) > 1}
+    by_scenario = {
+        name: [cell for cell in cells if cell.setting.scenario == name] for name in scenarios
+    }
+    return {
+        f"{name}-budget": budget_figure(own)
+        for name, own in by_scenario.items()
+        if len(_budgets(own)) > 1
+    }
 
 
 def budget_figure(cells: Sequence[Cell]) -> Figure:
-    """Median first-detection distance in metres against the budget, interquartile bars; full scan as a line.
+    """Median first-detection distance in metres against the budget, interquartile bars; full scan
+    as a line.
 
-    A median that is not detected is an open marker at the bottom, with the number of episodes without a detection;
-    bars of a lower quartile that is not detected reach the bottom.
+    A median that is not detected is an open marker at the bottom, with the number of episodes
+    without a detection; bars of a lower quartile that is not detected reach the bottom.
     """
     policies = dict.fromkeys((cell.policy, cell.tags) for cell in cells if cell.policy != "full")
     figure = Figure(figsize=(8.2, 3.6 + 0.16 * max(len(policies), FEW)), layout="constrained")
@@ -56,7 +69,9 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     counts = sorted({cell.episodes for cell in cells})
     seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     axes.set_title(f"{cells[0].setting.scenario}: {seeds} seeds a point", loc="left", fontsize=10)
-    axes.set_xlabel("\n".join(["budget (share of cells fired)", *tag_notes(tags for _, tags in policies)]))
+    axes.set_xlabel(
+        "\n".join(["budget (share of cells fired)", *tag_notes(tags for _, tags in policies)])
+    )
     axes.set_ylabel("first detection (m, median and quartiles)")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="0.92")
@@ -65,7 +80,11 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
 
 
 def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[Curve]:
-    curves = [_full_scan(axes, cell) for cell in cells if cell.policy == "full" and cell.detection.median is not None]
+    curves = [
+        _full_scan(axes, cell)
+        for cell in cells
+        if cell.policy == "full" and cell.detection.median is not None
+    ]
     for number, (policy, style) in enumerate(drawn.items()):
         own = [cell for cell in cells if cell.policy == policy]
         shift = 1 + min(DODGE, SPREAD / len(drawn)) * (number - (len(drawn) - 1) / 2)
@@ -77,19 +96,34 @@ def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[Cu
 
 def _full_scan(axes: Axes, cell: Cell) -> Curve:
     height = cell.detection.median or 0.0
-    line = axes.axhline(height, color=FULL.colour, linestyle=FULL.line, linewidth=1.2, label="full scan", zorder=1)
+    line = axes.axhline(
+        height, color=FULL.colour, linestyle=FULL.line, linewidth=1.2, label="full scan", zorder=1
+    )
     return Curve(line, height)
 
 
 def _curve(axes: Axes, cells: Sequence[Cell], shift: float, style: Style, strength: float) -> Curve:
     """Draw the detected medians of a policy and their quartiles."""
     places = [cell.budget * shift for cell in cells]
-    medians = [math.nan if cell.detection.median is None else cell.detection.median for cell in cells]
-    bars: dict[str, Any] = {"color": style.colour, "alpha": strength, "linewidth": 1.3, "marker": "_", "markersize": 5}
+    medians = [
+        math.nan if cell.detection.median is None else cell.detection.median for cell in cells
+    ]
+    bars: dict[str, Any] = {
+        "color": style.colour,
+        "alpha": strength,
+        "linewidth": 1.3,
+        "marker": "_",
+        "markersize": 5,
+    }
     for place, values in zip(places, (cell.detection for cell in cells), strict=True):
         if values.median is not None and values.high is not None:
             axes.plot([place, place], [values.low or 0.0, values.high], **bars)
-    look: dict[str, Any] = {"color": style.colour, "linestyle": style.line, "marker": style.marker, "linewidth": 1.5}
+    look: dict[str, Any] = {
+        "color": style.colour,
+        "linestyle": style.line,
+        "marker": style.marker,
+        "linewidth": 1.5,
+    }
     (line,) = axes.plot(places, medians, label=marked(cells[0].policy, cells[0].tags), **look)
     return Curve(line, cells[-1].detection.median or 0.0)
 
@@ -97,17 +131,27 @@ def _curve(axes: Axes, cells: Sequence[Cell], shift: float, style: Style, streng
 def _undetected(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> None:
     """Open markers of the medians that are not detected, side by side at the bottom."""
     for budget in _budgets(cells):
-        missed = [c for c in cells if c.budget == budget and c.policy in drawn and c.detection.median is None]
+        missed = [
+            c
+            for c in cells
+            if c.budget == budget and c.policy in drawn and c.detection.median is None
+        ]
         for number, cell in enumerate(missed):
             _open_marker(axes, cell, drawn[cell.policy], 11.0 * (number - (len(missed) - 1) / 2))
 
 
 def _open_marker(axes: Axes, cell: Cell, style: Style, aside: float) -> None:
-    """An open marker at the bottom, `aside` points to the right of its budget, with its count above."""
+    """An open marker at the bottom, `aside` points to the right of its budget, with its count
+    above.
+    """
     figure = axes.get_figure(root=True)
     assert figure is not None
     moved = axes.transData + ScaledTranslation(aside / 72, 0, figure.dpi_scale_trans)
-    hollow: dict[str, Any] = {"marker": style.marker, "markeredgecolor": style.colour, "markerfacecolor": "white"}
+    hollow: dict[str, Any] = {
+        "marker": style.marker,
+        "markeredgecolor": style.colour,
+        "markerfacecolor": "white",
+    }
     axes.plot([cell.budget], [0.0], **hollow, clip_on=False, transform=moved, zorder=5)
     axes.annotate(
         f"{cell.never}/{cell.episodes} never",
@@ -125,7 +169,9 @@ def _open_marker(axes: Axes, cell: Cell, style: Style, aside: float) -> None:
 def _name_curves(figure: Figure, curves: Sequence[Curve]) -> None:
     """Name the curves beside the axes, in the order of their right ends."""
     handles = [curve.line for curve in sorted(curves, key=lambda curve: curve.end, reverse=True)]
-    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9, handlelength=3)
+    figure.legend(
+        handles=handles, loc="outside right upper", frameon=False, fontsize=9, handlelength=3
+    )
 
 
 def _budgets(cells: Sequence[Cell]) -> list[float]:

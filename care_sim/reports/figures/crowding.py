@@ -1,4 +1,6 @@
-"""The figure of the crowding study: how much later all-camera detects than CARE, by vehicles and budget."""
+"""The figure of the crowding study: how much later all-camera detects than CARE, by vehicles and
+budget.
+"""
 
 from collections.abc import Sequence
 
@@ -24,10 +26,11 @@ def crowding_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def crowding_figure(rows: Sequence[Row]) -> Figure:
-    """Mean paired difference in first detection, all-camera minus CARE, in metres: a number in every cell.
+    """Mean paired difference in first detection, all-camera minus CARE, in metres: a number in
+    every cell.
 
-    Bold where the interval excludes zero, an asterisk where the gate is met too, a frame where all-camera has
-    collapsed.
+    Bold where the interval excludes zero, an asterisk where the gate is met too, a frame where
+    all-camera has collapsed.
     """
     crowd = Crowd(rows)
     size = max(1.6 + 0.8 * len(crowd.budgets), 6.0), 1.5 + 0.34 * len(crowd.counts)
@@ -36,13 +39,22 @@ def crowding_figure(rows: Sequence[Row]) -> Figure:
     gaps = [[crowd.gap(n, budget) for budget in crowd.budgets] for n in crowd.counts]
     values = np.array([[np.nan if gap is None else gap.mean for gap in line] for line in gaps])
     widest = max(float(np.nanmax(np.abs(values), initial=0.0)), COLLAPSE_M)
-    image = axes.imshow(values, cmap="PuOr", vmin=-widest, vmax=widest, aspect="auto", origin="lower")
+    image = axes.imshow(
+        values, cmap="PuOr", vmin=-widest, vmax=widest, aspect="auto", origin="lower"
+    )
     for (row, column), value in np.ndenumerate(values):
         text = mean(gaps[row][column])
         pale = not abs(value) > PALE * widest
         weight = "bold" if isinstance(text, Bold) else "normal"
         axes.text(
-            column, row, text, ha="center", va="center", size=8, weight=weight, color="black" if pale else "white"
+            column,
+            row,
+            text,
+            ha="center",
+            va="center",
+            size=8,
+            weight=weight,
+            color="black" if pale else "white",
         )
     _frame_collapses(axes, crowd)
     _finish(axes, crowd)
@@ -54,7 +66,9 @@ def _frame_collapses(axes: Axes, crowd: Crowd) -> None:
     for column, budget in enumerate(crowd.budgets):
         for vehicles in crowd.collapsed(budget):
             corner = (column - 0.5, crowd.counts.index(vehicles) - 0.5)
-            axes.add_patch(Rectangle(corner, 1.0, 1.0, fill=False, edgecolor="black", linewidth=1.2))
+            axes.add_patch(
+                Rectangle(corner, 1.0, 1.0, fill=False, edgecolor="black", linewidth=1.2)
+            )
 
 
 def _finish(axes: Axes, crowd: Crowd) -> None:
@@ -63,6 +77,8 @@ def _finish(axes: Axes, crowd: Crowd) -> None:
     axes.set_xlabel("budget (share of cells fired)")
     axes.set_ylabel("standing vehicles")
     seeds = len({row["seed"] for row in crowd.played.rows})
-    title = f"dense, {seeds} seeds. Bold: interval without zero; asterisk: gate met; frame: collapsed"
+    title = (
+        f"dense, {seeds} seeds. Bold: interval without zero; asterisk: gate met; frame: collapsed"
+    )
     axes.set_title(title, loc="left", fontsize=8)
     axes.tick_params(length=0)

@@ -39,7 +39,11 @@ class Measure:
 MEASURES = (
     Measure("detection", "first detection, median, m", lambda cell: cell.detection.median),
     Measure("braked", "episodes with braking, %", lambda cell: 100.0 * cell.braked / cell.episodes),
-    Measure("clearance", "clearance, median, m", lambda cell: cell.clearance.median if cell.clearance else None),
+    Measure(
+        "clearance",
+        "clearance, median, m",
+        lambda cell: cell.clearance.median if cell.clearance else None,
+    ),
 )
 NAMES = tuple(f"faults-{place.scenario}-{measure.name}" for place in PLACES for measure in MEASURES)
 """Every figure that the study can draw."""
@@ -48,9 +52,13 @@ NAMES = tuple(f"faults-{place.scenario}-{measure.name}" for place in PLACES for 
 def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """A figure for every place and measure, by name."""
     played = Played(rows)
-    drawn = styles((policy, played.tags.get(policy, ())) for policy in policies_of(played) if policy != "full")
+    drawn = styles(
+        (policy, played.tags.get(policy, ())) for policy in policies_of(played) if policy != "full"
+    )
     curves = Curves(played, drawn | {"full": FULL})
-    return {f"faults-{p.scenario}-{m.name}": curves.figure(p, m) for p, m in product(PLACES, MEASURES)}
+    return {
+        f"faults-{p.scenario}-{m.name}": curves.figure(p, m) for p, m in product(PLACES, MEASURES)
+    }
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,9 @@ class Curves:
     drawn: dict[str, Style]
 
     def figure(self, place: Place, measure: Measure) -> Figure:
-        """All faults in one place: an open marker at the bottom stands for a median that there is not."""
+        """All faults in one place: an open marker at the bottom stands for a median that there is
+        not.
+        """
         lines = len(FAULTS) // COLUMNS + 1
         figure = Figure(figsize=(2.5 * COLUMNS, 2.3 * lines), layout="constrained")
         panels = list(figure.subplots(lines, COLUMNS, sharey=True).flat)
@@ -90,14 +100,30 @@ class Curves:
         axes.grid(axis="y", color="0.92")
         axes.set_axisbelow(True)
 
-    def _curve(self, axes: Axes, policy: str, style: Style, heights: Sequence[float | None]) -> None:
+    def _curve(
+        self, axes: Axes, policy: str, style: Style, heights: Sequence[float | None]
+    ) -> None:
         """Draw a policy over the strengths; None was not played, nan has no median."""
         played = [(place, height) for place, height in enumerate(heights) if height is not None]
         if not played:
             return
-        look: dict[str, Any] = {"color": style.colour, "marker": style.marker, "markersize": 4, "alpha": 0.85}
+        look: dict[str, Any] = {
+            "color": style.colour,
+            "marker": style.marker,
+            "markersize": 4,
+            "alpha": 0.85,
+        }
         label = self.played.marked(policy)
-        axes.plot(*zip(*played, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label)
+        axes.plot(
+            *zip(*played, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label
+        )
         missing = [place for place, height in played if math.isnan(height)]
         if missing:
-            axes.plot(missing, [0.0] * len(missing), **look, linestyle="", markerfacecolor="white", clip_on=False)
+            axes.plot(
+                missing,
+                [0.0] * len(missing),
+                **look,
+                linestyle="",
+                markerfacecolor="white",
+                clip_on=False,
+            )

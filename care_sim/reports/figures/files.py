@@ -16,10 +16,12 @@ _FORMATS = (".png", ".svg")
 
 
 def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as PNG and SVG, with its texts as they are: a $ in a name begins no formula, control codes are
-    shown as escapes, and what the font has no sign for is drawn as a box.
+    """Write a figure as PNG and SVG, with its texts as they are: a $ in a name begins no formula,
+    control codes are shown as escapes, and what the font has no sign for is drawn as a box.
     """
-    of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}  # Matplotlib's own
+    of_ticks = {
+        id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)
+    }  # Matplotlib's own
     for text in figure.findobj(Text):
         if id(text) not in of_ticks:
             text.set_parse_math(False)
@@ -28,7 +30,10 @@ def save(figure: Figure, stem: Path) -> None:
         warnings.filterwarnings("ignore", r"Glyph .* missing from font")
         with replacing(stem.with_suffix(".png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
-        with rc_context({"svg.hashsalt": stem.name}), replacing(stem.with_suffix(".svg")) as unfinished:
+        with (
+            rc_context({"svg.hashsalt": stem.name}),
+            replacing(stem.with_suffix(".svg")) as unfinished,
+        ):
             figure.savefig(unfinished, metadata={"Date": None})
 
 
@@ -39,8 +44,12 @@ def check_figure(stem: Path) -> None:
 
 
 def remove_others(folder: Path, names: Iterable[str], kept: Container[str]) -> None:
-    """Remove the figures of the given names from a folder, all but those `kept`; a * in a name stands for any text."""
-    found = [path for name in names for suffix in _FORMATS for path in folder.glob(f"{name}{suffix}")]
+    """Remove the figures of the given names from a folder, all but those `kept`; a * in a name
+    stands for any text.
+    """
+    found = [
+        path for name in names for suffix in _FORMATS for path in folder.glob(f"{name}{suffix}")
+    ]
     for path in found:
         if path.stem not in kept:
             path.unlink(missing_ok=True)

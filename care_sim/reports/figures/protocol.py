@@ -10,8 +10,12 @@ from care_sim.reports.protocol.rows import SOURCES, plays_of
 from care_sim.study.task import Row
 
 KINDS = ("pareto", "levels")
-FIGURE_NAMES = tuple(f"{kind}-{source}{rest}" for kind in KINDS for source in SOURCES for rest in ("", "-*"))
-"""Every figure that a folder may hold, as patterns: the source, then what of detector and conditions is not usual."""
+FIGURE_NAMES = tuple(
+    f"{kind}-{source}{rest}" for kind in KINDS for source in SOURCES for rest in ("", "-*")
+)
+"""Every figure that a folder may hold, as patterns: the source, then what of detector and
+conditions is not usual.
+"""
 
 
 def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:

@@ -1,4 +1,7 @@
-"""The paper's Figure 2: first-sighting against overall recall, a panel a budget, a marker a policy."""
+"""The paper's Figure 2: first-sighting against overall recall.
+
+One panel per budget, one marker per policy.
+"""
 
 from collections.abc import Mapping
 
@@ -19,14 +22,16 @@ Point = tuple[float, float]
 def pareto_figure(plays: Plays) -> Figure:
     """Markers of all policies, and in grey the Pareto frontier of those that a car can have.
 
-    What lies below and left of the staircase is beaten in one recall and not better in the other. Open markers show
-    what lies under them; that of CARE is filled.
+    What lies below and left of the staircase is beaten in one recall and not better in the other.
+    Open markers show what lies under them; that of CARE is filled.
     """
     figure = Figure(figsize=(8.4, 3.6), layout="constrained")
     panels = figure.subplots(1, len(plays.budgets), squeeze=False)[0]
     drawn = styles(plays.tags.items())
     for axes, budget in zip(panels, plays.budgets, strict=True):
-        points = {policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))}
+        points = {
+            policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))
+        }
         _draw(axes, points, drawn, plays)
         axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
     panels[0].set_ylabel("first-sighting recall (%)")
@@ -35,8 +40,14 @@ def pareto_figure(plays: Plays) -> Figure:
 
 
 def frontier(points: Mapping[str, Point]) -> list[str]:
-    """The policies that no other equals in both recalls and beats in one, from least to most overall recall."""
-    best = [name for name, point in points.items() if not any(_beats(other, point) for other in points.values())]
+    """The policies that no other equals in both recalls and beats in one, from least to most
+    overall recall.
+    """
+    best = [
+        name
+        for name, point in points.items()
+        if not any(_beats(other, point) for other in points.values())
+    ]
     return sorted(best, key=lambda name: points[name])
 
 
@@ -46,20 +57,28 @@ def _beats(other: Point, point: Point) -> bool:
 
 def recalls(plays: Plays, policy: str, budget: float) -> Point | None:
     """Where a policy stands at a budget; None where a recall is not known."""
-    overall, first = (plays.level(ratio, policy, budget).by_event for ratio in (OVERALL, FIRST_SIGHTING))
+    overall, first = (
+        plays.level(ratio, policy, budget).by_event for ratio in (OVERALL, FIRST_SIGHTING)
+    )
     return None if overall is None or first is None else (overall, first)
 
 
-def _draw(axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: Plays) -> None:
+def _draw(
+    axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: Plays
+) -> None:
     for policy, (overall, first) in points.items():
         look = drawn[policy]
-        (marker,) = axes.plot(overall, first, look.marker, color=look.colour, label=marked(policy, plays.tags[policy]))
+        (marker,) = axes.plot(
+            overall, first, look.marker, color=look.colour, label=marked(policy, plays.tags[policy])
+        )
         if policy == REFERENCE:
             marker.set(markersize=5, zorder=5)
         else:
             marker.set(markersize=9, markerfacecolor="none", markeredgewidth=1.5, zorder=4)
     axes.margins(0.1)
-    _staircase(axes, {policy: point for policy, point in points.items() if not _marks(plays.tags[policy])})
+    _staircase(
+        axes, {policy: point for policy, point in points.items() if not _marks(plays.tags[policy])}
+    )
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.94")
     axes.set_axisbelow(True)
@@ -82,9 +101,19 @@ def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
 
 def _name(figure: Figure, axes: Axes, plays: Plays) -> None:
     """The title, the markers by policy, what the full scan reaches, and what the grey line is."""
-    figure.suptitle(f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10)
+    figure.suptitle(
+        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
+    )
     ceiling = recalls(plays, FULL, 1.0) if plays.full else None
-    reached = f"; full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall" if ceiling else ""
+    reached = (
+        f"; full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall"
+        if ceiling
+        else ""
+    )
     line = f"grey line: Pareto frontier of the policies that a car can have{reached}"
-    figure.supxlabel("\n".join(["overall recall (%)", line, *tag_notes(plays.tags.values())]), fontsize=9)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
+    figure.supxlabel(
+        "\n".join(["overall recall (%)", line, *tag_notes(plays.tags.values())]), fontsize=9
+    )
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
+    )

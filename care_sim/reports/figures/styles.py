@@ -38,12 +38,18 @@ FULL = Style("0.35", "_", "--")
 
 
 def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:
-    """A style for every policy, given with its tags; those that no car can have are grey and dashed."""
-    spare, greys, markers = cycle(_SPARE), cycle(_GREYS), cycle(_MARKERS)
+    """A style for every policy, given with its tags; those that no car can have are grey and
+    dashed.
+    """
+    spare = cycle(_SPARE)
+    greys = cycle(_GREYS)
+    markers = cycle(_MARKERS)
     made = {}
     for policy, tags in policies:
         if any(tag in tags for tag in MARKS):
             made[policy] = Style(next(greys), next(markers), "--")
         else:
-            made[policy] = Style(*_KNOWN[policy]) if policy in _KNOWN else Style(next(spare), next(markers))
+            made[policy] = (
+                Style(*_KNOWN[policy]) if policy in _KNOWN else Style(next(spare), next(markers))
+            )
     return made

@@ -8,13 +8,23 @@ import altair as alt
 from care_sim.base.text import counted, percent
 from care_sim.reports.figures.budget import DODGE, SPREAD
 from care_sim.reports.formatting import marked, spread, tag_notes
-from care_sim.reports.page.chart import FULL_SCAN, Chart, Look, apart, budget_axis, budgets_text, inline, specification
+from care_sim.reports.page.chart import (
+    FULL_SCAN,
+    Chart,
+    Look,
+    apart,
+    budget_axis,
+    budgets_text,
+    inline,
+    specification,
+)
 from care_sim.reports.summary import Cell, summarise
 from care_sim.study.task import FULL, Row
 
 NOTES = (
-    "Median over the seeds; bars are quartiles. Hollow, at the bottom: the median is an actor that was not detected. "
-    "Curves are drawn a little apart sideways, so that equal ones stay visible.",
+    "Median over the seeds; bars are quartiles. Hollow, at the bottom: the median is an actor "
+    "that was not detected. Curves are drawn a little apart sideways, so that equal ones stay "
+    "visible.",
 )
 
 
@@ -29,7 +39,8 @@ def budget_charts(rows: Sequence[Row]) -> list[Chart]:
 def _chart(cells: Sequence[Cell]) -> Chart:
     tags = dict.fromkeys((cell.policy, cell.tags) for cell in cells if cell.policy != FULL)
     full = [cell for cell in cells if cell.policy == FULL and cell.detection.median is not None]
-    look, values = Look.of(tags, bool(full)), _values(cells, [policy for policy, _ in tags])
+    look = Look.of(tags, bool(full))
+    values = _values(cells, [policy for policy, _ in tags])
     height = alt.Y("median:Q", title="first detection (m)", scale=alt.Scale(zero=True))
     base = alt.Chart(inline(values)).encode(
         x=budget_axis(_budgets(cells)), y=height, color=look.colour, opacity=look.opacity
@@ -42,7 +53,9 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         alt.Tooltip("never:N", title="never detected"),
     ]
     layers: list[Any] = [
-        base.mark_rule(strokeWidth=1.5).encode(y="low:Q", y2="high:Q").transform_filter("datum.median != null"),
+        base.mark_rule(strokeWidth=1.5)
+        .encode(y="low:Q", y2="high:Q")
+        .transform_filter("datum.median != null"),
         base.mark_line(strokeWidth=1.8).encode(strokeDash=look.dash),
         base.mark_point(filled=True, size=55).encode(shape=look.shape, tooltip=about),
         missed.mark_point(filled=False, size=55).encode(shape=look.shape, tooltip=about),
@@ -52,16 +65,24 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         rule = alt.Chart(inline(line)).mark_rule(strokeWidth=1.5, strokeDash=[5, 3])
         layers.append(rule.encode(y=height, color=look.colour, opacity=look.opacity))
     chart = alt.layer(*layers).add_params(look.chosen).properties(width="container", height=300)
-    scenario, budgets = cells[0].setting.scenario, _budgets(cells)
+    scenario = cells[0].setting.scenario
+    budgets = _budgets(cells)
     counts = sorted({cell.episodes for cell in cells})
     seeds = counted(counts[0], "seed") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
     title = f"{scenario}: first detection against the budget, {seeds} a point"
-    about_it = f"Median distance of the first detection in metres, a curve a policy, budgets {budgets_text(budgets)}."
-    return Chart(title, about_it, (*NOTES, *tag_notes(own for _, own in tags)), specification(chart))
+    about_it = (
+        "Median distance of the first detection in metres, one curve per policy, "
+        f"budgets {budgets_text(budgets)}."
+    )
+    return Chart(
+        title, about_it, (*NOTES, *tag_notes(own for _, own in tags)), specification(chart)
+    )
 
 
 def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, Any]]:
-    """The points of the policies; none in height where the median is not detected, which breaks the line."""
+    """The points of the policies; none in height where the median is not detected, which breaks the
+    line.
+    """
     return [
         {
             "policy": marked(cell.policy, cell.tags),

@@ -100,9 +100,17 @@ class Page:
     @property
     def warnings(self) -> list[str]:
         """Sentences about what is missing, or is not as it was."""
-        reasons = Counter(episode.ending for episode in self.episodes if isinstance(episode.ending, str))
-        unplayable = [f"Episodes that cannot be played again: {count} ({reason})." for reason, count in reasons.items()]
-        otherwise = [f"Episodes that end otherwise when played again here, which are marked: {self.differing}."]
+        reasons = Counter(
+            episode.ending for episode in self.episodes if isinstance(episode.ending, str)
+        )
+        unplayable = [
+            f"Episodes that cannot be played again: {count} ({reason})."
+            for reason, count in reasons.items()
+        ]
+        otherwise = [
+            "Episodes that end otherwise when played again here, which are marked: "
+            f"{self.differing}."
+        ]
         return [*self.origin.missing, *unplayable, *(otherwise if self.differing else [])]
 
     @property
@@ -121,17 +129,22 @@ class Page:
         return sum(bool(episode.differences) for episode in self.episodes)
 
 
-def write_page(folder: Path, path: Path, most: int, workers: int, make_executor: ExecutorFactory = processes) -> Page:
+def write_page(
+    folder: Path, path: Path, most: int, workers: int, make_executor: ExecutorFactory = processes
+) -> Page:
     """Write the page of a folder of results, with at most so many episodes to watch, to `path`.
 
     Raises InvalidInput where there are no results, and MissingExtra without the libraries.
     """
     rows, study, left_out = reported(folder)
     with replacing(path, HTML) as unfinished:
-        findings, about = Findings.of(study, rows), origin(folder, rows, study.kind, left_out)
+        findings = Findings.of(study, rows)
+        about = origin(folder, rows, study.kind, left_out)
         watched = chosen(rows, most) if study.kind is EPISODES else []
         if watched:
-            print(f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr)
+            print(
+                f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr
+            )
         episodes = played_again(watched, workers, make_executor)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
         unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")
@@ -145,16 +158,26 @@ def _no_charts(_rows: Sequence[Row]) -> list[Chart]:
 def _template() -> Any:
     loader = PackageLoader("care_sim.reports.page", "assets")
     environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=loader,
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template("page.html")
 
 
 def _asset(name: str) -> Markup:
     """A file of the page as it stands."""
-    return Markup(resources.files("care_sim.reports.page").joinpath("assets", name).read_text(encoding="utf-8"))
+    return Markup(
+        resources.files("care_sim.reports.page")
+        .joinpath("assets", name)
+        .read_text(encoding="utf-8")
+    )
 
 
 def _embedded(data: Any) -> Markup:
     """Plain data for a script element, whose end no text in it can be."""
-    return Markup(json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))
+    return Markup(
+        json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+    )

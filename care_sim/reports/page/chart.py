@@ -1,4 +1,6 @@
-"""What the charts of a page share: marks, colours and shapes of policies, and the form that the browser draws."""
+"""What the charts of a page share: marks, colours and shapes of policies, and the form that the
+browser draws.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ from care_sim.reports.page.shapes import outline
 
 FULL_SCAN = "full scan"
 PANEL_WIDTH = 200
-"""Pixels that a panel wants to be wide; the browser sets as many side by side as there is room for."""
+"""Width of a panel in pixels; the browser sets as many side by side as there is room for."""
 FAINT = 0.12
 """Opacity of what is not chosen in the legend."""
 _DASHES = {"-": [1, 0], "--": [5, 3]}
@@ -22,7 +24,9 @@ _DASHES = {"-": [1, 0], "--": [5, 3]}
 
 @dataclass(frozen=True)
 class Chart:
-    """A chart of a page: a title, what it shows in a sentence, how to read it, and its Vega-Lite specification."""
+    """A chart of a page: a title, what it shows in a sentence, how to read it, and its Vega-Lite
+    specification.
+    """
 
     title: str
     description: str
@@ -45,7 +49,7 @@ def specification(chart: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Look:
-    """Colour, shape and line of every name in the legend, and the choice that a click there makes."""
+    """Colour, shape and line of every name in the legend, and the selection by a click there."""
 
     colour: alt.Color
     shape: alt.Shape
@@ -57,22 +61,32 @@ class Look:
     def of(cls, tags: Iterable[tuple[str, tuple[str, ...]]], full: bool) -> "Look":
         """The look of policies, given with their tags, and of the full scan."""
         tags = list(tags)
-        drawn = {marked(policy, own): style for (policy, own), style in zip(tags, styles(tags).values(), strict=True)}
+        drawn = {
+            marked(policy, own): style
+            for (policy, own), style in zip(tags, styles(tags).values(), strict=True)
+        }
         return cls.of_styles(drawn | ({FULL_SCAN: FULL} if full else {}))
 
     @classmethod
     def of_styles(cls, drawn: Mapping[str, Style]) -> "Look":
         """The look of names with these styles."""
-        names, chosen = list(drawn), alt.selection_point(fields=["policy"], bind="legend")
+        names = list(drawn)
+        chosen = alt.selection_point(fields=["policy"], bind="legend")
         legend = alt.Legend(title=None)
 
         def scale(values: Sequence[Any]) -> alt.Scale:
             return alt.Scale(domain=names, range=list(values))
 
         return cls(
-            alt.Color("policy:N", scale=scale([to_hex(s.colour) for s in drawn.values()]), legend=legend),
-            alt.Shape("policy:N", scale=scale([outline(s.marker) for s in drawn.values()]), legend=legend),
-            alt.StrokeDash("policy:N", scale=scale([_DASHES[s.line] for s in drawn.values()]), legend=legend),
+            alt.Color(
+                "policy:N", scale=scale([to_hex(s.colour) for s in drawn.values()]), legend=legend
+            ),
+            alt.Shape(
+                "policy:N", scale=scale([outline(s.marker) for s in drawn.values()]), legend=legend
+            ),
+            alt.StrokeDash(
+                "policy:N", scale=scale([_DASHES[s.line] for s in drawn.values()]), legend=legend
+            ),
             alt.condition(chosen, alt.value(1.0), alt.value(FAINT)),
             chosen,
         )
@@ -84,14 +98,19 @@ def budget_axis(budgets: Sequence[float], column: str = "place") -> alt.X:
         f"{column}:Q",
         scale=alt.Scale(type="log", domain=[min(budgets) * 0.85, max(budgets) * 1.18], nice=False),
         axis=alt.Axis(
-            values=list(budgets), labelExpr="format(datum.value * 100, '.3~g') + '%'", grid=False, labelOverlap=True
+            values=list(budgets),
+            labelExpr="format(datum.value * 100, '.3~g') + '%'",
+            grid=False,
+            labelOverlap=True,
         ),
         title="budget (share of cells fired)",
     )
 
 
 def apart(number: int, count: int, least: float, spread: float) -> float:
-    """The factor by which the budgets of one policy of many are moved, so that equal values stay visible."""
+    """The factor by which the budgets of one policy of many are moved, so that equal values stay
+    visible.
+    """
     return 1 + min(least, spread / count) * (number - (count - 1) / 2)
 
 

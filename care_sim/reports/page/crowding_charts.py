@@ -1,4 +1,6 @@
-"""The chart of the crowding study: how much later all-camera detects than CARE, by vehicles and budget."""
+"""The chart of the crowding study: how much later all-camera detects than CARE, by vehicles and
+budget.
+"""
 
 from collections.abc import Sequence
 
@@ -11,7 +13,9 @@ from care_sim.reports.page.chart import Chart, inline, specification
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.study.task import Row
 
-NOTES = ("Asterisk: the interval excludes zero and the gate is met. Frame: all-camera has collapsed.",)
+NOTES = (
+    "Asterisk: the interval excludes zero and the gate is met. Frame: all-camera has collapsed.",
+)
 
 
 def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
@@ -33,7 +37,12 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
     ]
     widest = max([COLLAPSE_M, *(abs(gap.mean) for gap in gaps.values() if gap)])
     base = alt.Chart(inline(values)).encode(
-        x=alt.X("budget:O", sort=[*map(percent, crowd.budgets)], title="budget", axis=alt.Axis(labelAngle=0)),
+        x=alt.X(
+            "budget:O",
+            sort=[*map(percent, crowd.budgets)],
+            title="budget",
+            axis=alt.Axis(labelAngle=0),
+        ),
         y=alt.Y("vehicles:O", sort="descending", title="standing vehicles"),
     )
     about = [alt.Tooltip(f"{name}:N") for name in ("vehicles", "budget", "interval")]
@@ -50,5 +59,8 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
     ).properties(width="container", height=26 * len(crowd.counts))
     seeds = counted(len({row["seed"] for row in rows}), "seed")
     title = f"dense: first detection of all-camera minus care, m, {seeds}"
-    about_it = "A heat map of the mean difference by budget and standing vehicles; negative where all-camera is later."
+    about_it = (
+        "A heat map of the mean difference by budget and standing vehicles; negative where "
+        "all-camera is later."
+    )
     return [Chart(title, about_it, NOTES, specification(chart))]

@@ -1,4 +1,6 @@
-"""The episodes of a page: which are played again, and whether they go as they went when the results were made."""
+"""The episodes of a page: which are played again, and whether they go as they went when the results
+were made.
+"""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +34,9 @@ class Episode:
 
     @property
     def identical(self) -> bool:
-        """Whether the replay fired, measured and moved as the episode did (its hash), and ends as the row does."""
+        """Whether the replay fired, measured and moved as the episode did (its hash), and ends as
+        the row does.
+        """
         if self.replay is None or self.differences:
             return False
         return bool(self.replay.row["episode_hash"] == self.row.get("episode_hash"))
@@ -42,17 +46,29 @@ class Episode:
         """The outcomes in which the replay departs from the row, each as NAME THEN -> NOW."""
         if self.replay is None:
             return []
-        pairs = {name: (self.row[name], self.replay.row[name]) for name in Outcome.__dataclass_fields__}
-        return [f"{name} {_text(was)} → {_text(now)}" for name, (was, now) in pairs.items() if not _equal(was, now)]
+        pairs = {
+            name: (self.row[name], self.replay.row[name]) for name in Outcome.__dataclass_fields__
+        }
+        return [
+            f"{name} {_text(was)} → {_text(now)}"
+            for name, (was, now) in pairs.items()
+            if not _equal(was, now)
+        ]
 
 
 def chosen(rows: Sequence[Row], most: int) -> list[Row]:
-    """At most so many rows: those of the first seed, then of the next, so that policies are seen side by side."""
+    """At most so many rows: those of the first seed, then of the next, so that policies are seen
+    side by side.
+    """
     return sorted(rows, key=lambda row: row["seed"])[:most]
 
 
-def played_again(rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes) -> list[Episode]:
-    """Play the episodes of rows again, in processes. An interrupt does not wait for those that have not begun."""
+def played_again(
+    rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes
+) -> list[Episode]:
+    """Play the episodes of rows again, in processes. An interrupt does not wait for those that have
+    not begun.
+    """
     if not rows:
         return []
     executor = make_executor(min(workers, len(rows)))
@@ -64,14 +80,20 @@ def played_again(rows: Sequence[Row], workers: int, make_executor: ExecutorFacto
 
 
 def config_of(row: Row) -> EpisodeConfig:
-    """The configuration that a row was played with. Raises InvalidInput for one that this version does not accept."""
+    """The configuration that a row was played with. Raises InvalidInput for one that this version
+    does not accept.
+    """
     plain = {name: row[name] for name in PLAIN_FIELDS}
     scenario, policy = (_parameters(row, kind) for kind in ("scenario", "policy"))
     return EpisodeConfig(**plain, scenario_parameters=scenario, policy_parameters=policy)
 
 
 def _parameters(row: Row, kind: str) -> Parameters:
-    named = ((name.removeprefix(f"{kind}."), value) for name, value in row.items() if name.startswith(f"{kind}."))
+    named = (
+        (name.removeprefix(f"{kind}."), value)
+        for name, value in row.items()
+        if name.startswith(f"{kind}.")
+    )
     return tuple((name, value) for name, value in named if value is not None)
 
 

@@ -16,8 +16,10 @@ from care_sim.reports.tables.faults import FAULTS, PLACES, policies_of
 from care_sim.study.designs.levels import Place
 from care_sim.study.task import Row
 
-LARGEST, LEAST = 220.0, 15.0
-"""Areas of the marks, in square pixels, of the first policy and of one after the last."""
+LARGEST = 220.0
+"""Area of the marks of the first policy, in square pixels."""
+LEAST = 15.0
+"""Area of the marks of a policy after the last, in square pixels."""
 
 
 def fault_charts(rows: Sequence[Row]) -> list[Chart]:
@@ -28,7 +30,9 @@ def fault_charts(rows: Sequence[Row]) -> list[Chart]:
 
 def _chart(played: Played, place: Place, measure: Measure) -> Chart:
     names = policies_of(played)
-    known = styles((policy, played.tags.get(policy, ())) for policy in names if policy != "full") | {"full": FULL}
+    known = styles(
+        (policy, played.tags.get(policy, ())) for policy in names if policy != "full"
+    ) | {"full": FULL}
     drawn = {played.marked(policy): style for policy, style in known.items()}
     look = Look.of_styles(drawn)
     ratio = (LEAST / LARGEST) ** (1 / len(names))
@@ -46,13 +50,17 @@ def _chart(played: Played, place: Place, measure: Measure) -> Chart:
     )
     missed = base.transform_filter("datum.value == null").encode(y=alt.datum(0))
     nested = alt.Size("area:Q", scale=None, legend=None)
-    about = [alt.Tooltip(f"{name}:N") for name in ("policy", "fault", "level")] + [alt.Tooltip("text:N", title="value")]
+    about = [alt.Tooltip(f"{name}:N") for name in ("policy", "fault", "level")] + [
+        alt.Tooltip("text:N", title="value")
+    ]
     layers = alt.layer(
         base.mark_line(strokeWidth=1.5).encode(strokeDash=look.dash),
         base.mark_point(filled=True).encode(shape=look.shape, size=nested, tooltip=about),
         missed.mark_point(filled=False).encode(shape=look.shape, size=nested, tooltip=about),
     ).properties(width=PANEL_WIDTH, height=110)
-    header = alt.Header(title=None, labelAnchor="start", labelExpr="split(datum.value, ', ')", labelFontSize=11)
+    header = alt.Header(
+        title=None, labelAnchor="start", labelExpr="split(datum.value, ', ')", labelFontSize=11
+    )
     faults = [fault.label for fault in FAULTS]
     chart = layers.facet(
         facet=alt.Facet("fault:N", sort=faults, header=header), columns=5, data=inline(values)
@@ -62,8 +70,13 @@ def _chart(played: Played, place: Place, measure: Measure) -> Chart:
     hollow = "Hollow, at the bottom: the median is an actor that was not detected."
     return Chart(
         f"{place}: {measure.label}, {seeds}",
-        f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a policy.",
-        (apart, *([hollow] if any(value["value"] is None for value in values) else []), *played.notes(played.policies)),
+        f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a "
+        "policy.",
+        (
+            apart,
+            *([hollow] if any(value["value"] is None for value in values) else []),
+            *played.notes(played.policies),
+        ),
         specification(chart.add_params(look.chosen)),
     )
 

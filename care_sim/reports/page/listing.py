@@ -1,4 +1,6 @@
-"""The episodes of a page as it lists them: setting by setting a line a configuration, an entry a seed."""
+"""The episodes of a page as it lists them: setting by setting a line a configuration, an entry a
+seed.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,7 +36,9 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Group:
-    """The configurations of a setting, and their seeds; `watchable` counts the episodes that can be watched."""
+    """The configurations of a setting, and their seeds; `watchable` counts the episodes that can be
+    watched.
+    """
 
     label: str
     seeds: tuple[int, ...]
@@ -43,8 +47,13 @@ class Group:
 
 
 def groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Group]:
-    """All rows by setting; `episodes` are those of them that were played again, in the order of `reel`."""
-    held = {_place(episode.row): (number, episode) for number, episode in enumerate(_watchable(episodes))}
+    """All rows by setting; `episodes` are those of them that were played again, in the order of
+    `reel`.
+    """
+    held = {
+        _place(episode.row): (number, episode)
+        for number, episode in enumerate(_watchable(episodes))
+    }
     by_setting: dict[Setting, list[Row]] = {}
     for row in rows:
         by_setting.setdefault(setting_of(row), []).append(row)
@@ -58,7 +67,8 @@ def reel(episodes: Sequence[Episode]) -> dict[str, Any]:
     played = []
     for episode in _watchable(episodes):
         assert episode.replay is not None
-        bodies, row = episode.replay.bodies, episode.row
+        bodies = episode.replay.bodies
+        row = episode.row
         played.append(
             {
                 "policy": f"{marked(policy_of(row), tags_of_row(row))} {percent(row['budget'])}",
@@ -108,5 +118,7 @@ def _place(row: Row) -> tuple[Any, ...]:
 
 def _world(row: Row) -> tuple[Any, ...]:
     """What two episodes share that can be watched side by side."""
-    physics = sorted((name, repr(value)) for name, value in row.items() if name.startswith("scenario.") and value)
+    physics = sorted(
+        (name, repr(value)) for name, value in row.items() if name.startswith("scenario.") and value
+    )
     return row["scenario"], tuple(physics), row["seed"]

@@ -10,7 +10,16 @@ from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.protocol_budgets import APART, DODGE, SPREAD
 from care_sim.reports.figures.protocol_frontier import Point, frontier, recalls
 from care_sim.reports.formatting import MARKS, marked, tag_notes
-from care_sim.reports.page.chart import FULL_SCAN, PANEL_WIDTH, Chart, Look, apart, budget_axis, inline, specification
+from care_sim.reports.page.chart import (
+    FULL_SCAN,
+    PANEL_WIDTH,
+    Chart,
+    Look,
+    apart,
+    budget_axis,
+    inline,
+    specification,
+)
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import Plays, plays_of
 from care_sim.study.task import FULL, Row
@@ -31,48 +40,95 @@ def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
 
 
 def _pareto(plays: Plays) -> Chart:
-    """First-sighting against overall recall, a panel a budget, and the frontier of what a car can have."""
+    """First-sighting against overall recall, a panel a budget, and the frontier of what a car can
+    have.
+    """
     look = Look.of(plays.tags.items(), full=False)
     values = [value for budget in plays.budgets for value in _points(plays, budget)]
-    about = [alt.Tooltip("overall:Q", format=".1f"), alt.Tooltip("first:Q", format=".1f", title="first sightings")]
+    about = [
+        alt.Tooltip("overall:Q", format=".1f"),
+        alt.Tooltip("first:Q", format=".1f", title="first sightings"),
+    ]
     place = {
-        "x": alt.X("overall:Q", title="overall recall (%)", scale=alt.Scale(zero=False, padding=12)),
-        "y": alt.Y("first:Q", title="first-sighting recall (%)", scale=alt.Scale(zero=False, padding=12)),
+        "x": alt.X(
+            "overall:Q", title="overall recall (%)", scale=alt.Scale(zero=False, padding=12)
+        ),
+        "y": alt.Y(
+            "first:Q", title="first-sighting recall (%)", scale=alt.Scale(zero=False, padding=12)
+        ),
     }
-    line = alt.Chart().mark_line(color="#999999", interpolate="step-before").encode(**place, order="order:Q")
+    line = (
+        alt.Chart()
+        .mark_line(color="#999999", interpolate="step-before")
+        .encode(**place, order="order:Q")
+    )
     points = (
         alt.Chart()
         .mark_point(size=90, strokeWidth=2)
-        .encode(**place, color=look.colour, shape=look.shape, opacity=look.opacity, tooltip=["policy:N", *about])
+        .encode(
+            **place,
+            color=look.colour,
+            shape=look.shape,
+            opacity=look.opacity,
+            tooltip=["policy:N", *about],
+        )
     )
     panels = alt.layer(
-        line.transform_filter("datum.policy == null"), points.transform_filter("datum.policy != null")
+        line.transform_filter("datum.policy == null"),
+        points.transform_filter("datum.policy != null"),
     ).properties(width=PANEL_WIDTH + 20, height=220)
     order = [*map(_panel, plays.budgets)]
-    chart = _faceted(panels, values, order).resolve_scale(x="independent", y="independent").add_params(look.chosen)
+    chart = (
+        _faceted(panels, values, order)
+        .resolve_scale(x="independent", y="independent")
+        .add_params(look.chosen)
+    )
     ceiling = recalls(plays, FULL, 1.0) if plays.full else None
-    reached = [f"Full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall."] if ceiling else []
+    reached = (
+        [f"Full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall."]
+        if ceiling
+        else []
+    )
     notes = (
         "Grey line: Pareto frontier of the policies that a car can have.",
         *reached,
         *tag_notes(plays.tags.values()),
     )
-    description = "First-sighting recall against overall recall in percent, a panel a budget, a marker a policy."
-    return Chart(f"{_title(plays)}: first sightings against all", description, notes, specification(chart))
+    description = (
+        "First-sighting recall against overall recall in percent, one panel per budget, one marker "
+        "per policy."
+    )
+    return Chart(
+        f"{_title(plays)}: first sightings against all", description, notes, specification(chart)
+    )
 
 
 def _points(plays: Plays, budget: float) -> Values:
     """The policies at a budget; then the corners of the frontier, without a policy."""
-    points = {policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))}
-    possible = {policy: point for policy, point in points.items() if not {*plays.tags[policy]} & {*MARKS}}
+    points = {
+        policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))
+    }
+    possible = {
+        policy: point for policy, point in points.items() if not {*plays.tags[policy]} & {*MARKS}
+    }
     corners = [possible[policy] for policy in frontier(possible)]
     if corners:
         least = [min(point[axis] for point in points.values()) for axis in (0, 1)]
         corners = [(least[0], corners[0][1]), *corners, (corners[-1][0], least[1])]
-    named: list[tuple[str | None, Point]] = [(marked(p, plays.tags[p]), point) for p, point in points.items()]
+    named: list[tuple[str | None, Point]] = [
+        (marked(p, plays.tags[p]), point) for p, point in points.items()
+    ]
     return [
-        {"panel": _panel(budget), "policy": policy, "overall": overall, "first": first, "order": order}
-        for order, (policy, (overall, first)) in enumerate([*named, *((None, corner) for corner in corners)])
+        {
+            "panel": _panel(budget),
+            "policy": policy,
+            "overall": overall,
+            "first": first,
+            "order": order,
+        }
+        for order, (policy, (overall, first)) in enumerate(
+            [*named, *((None, corner) for corner in corners)]
+        )
     ]
 
 
@@ -83,20 +139,38 @@ def _levels(plays: Plays) -> Chart:
     height = alt.Y("value:Q", title="recall (%)", scale=alt.Scale(zero=False))
     base = alt.Chart().encode(y=height, color=look.colour, opacity=look.opacity)
     curves = base.encode(x=budget_axis(plays.budgets))
-    about = ["policy:N", "budget:N", alt.Tooltip("value:Q", format=".1f", title="recall (%)"), "by:N"]
+    about = [
+        "policy:N",
+        "budget:N",
+        alt.Tooltip("value:Q", format=".1f", title="recall (%)"),
+        "by:N",
+    ]
     ours, papers = (f"datum.place != null && datum.by == '{by}'" for by in ("here", "paper"))
     panels = alt.layer(
         base.mark_rule(strokeWidth=1.5, strokeDash=[5, 3]).transform_filter("datum.place == null"),
         curves.mark_line(strokeWidth=1.8).encode(strokeDash=look.dash).transform_filter(ours),
-        curves.mark_point(filled=True, size=50).encode(shape=look.shape, tooltip=about).transform_filter(ours),
-        curves.mark_point(filled=False, size=60).encode(shape=look.shape, tooltip=about).transform_filter(papers),
+        curves.mark_point(filled=True, size=50)
+        .encode(shape=look.shape, tooltip=about)
+        .transform_filter(ours),
+        curves.mark_point(filled=False, size=60)
+        .encode(shape=look.shape, tooltip=about)
+        .transform_filter(papers),
     ).properties(width=PANEL_WIDTH + 140, height=260)
-    chart = _faceted(panels, values, [ratio.name for ratio in RECALLS]).resolve_scale(y="independent")
-    said = ["Hollow: what the paper gives."] if any(value["by"] == "paper" for value in values) else []
+    chart = _faceted(panels, values, [ratio.name for ratio in RECALLS]).resolve_scale(
+        y="independent"
+    )
+    said = (
+        ["Hollow: what the paper gives."] if any(value["by"] == "paper" for value in values) else []
+    )
     notes = (*said, f"{APART[0].upper()}{APART[1:]}.", *tag_notes(plays.tags.values()))
-    description = "First-sighting and overall recall in percent against the budget, a curve a policy."
+    description = (
+        "First-sighting and overall recall in percent against the budget, a curve a policy."
+    )
     return Chart(
-        f"{_title(plays)}: recall against the budget", description, notes, specification(chart.add_params(look.chosen))
+        f"{_title(plays)}: recall against the budget",
+        description,
+        notes,
+        specification(chart.add_params(look.chosen)),
     )
 
 
@@ -107,13 +181,29 @@ def _curves(plays: Plays, ratio: Ratio) -> Values:
         shift = apart(number, len(plays.tags), DODGE, SPREAD)
         for budget in plays.budgets:
             about = {"policy": marked(policy, tags), "budget": percent(budget), "panel": ratio.name}
-            here, said = plays.level(ratio, policy, budget).by_event, None
+            here = plays.level(ratio, policy, budget).by_event
+            said = None
             if not plays.setting.conditions:
                 said = published_level(ratio, policy, budget)
-            values += [about | {"place": budget * shift, "value": here, "by": "here"}] if here is not None else []
-            values += [about | {"place": budget, "value": said, "by": "paper"}] if said is not None else []
+            values += (
+                [about | {"place": budget * shift, "value": here, "by": "here"}]
+                if here is not None
+                else []
+            )
+            values += (
+                [about | {"place": budget, "value": said, "by": "paper"}]
+                if said is not None
+                else []
+            )
     ceiling = plays.level(ratio, FULL, 1.0).by_event if plays.full else None
-    full = {"policy": FULL_SCAN, "budget": "100%", "panel": ratio.name, "place": None, "value": ceiling, "by": "here"}
+    full = {
+        "policy": FULL_SCAN,
+        "budget": "100%",
+        "panel": ratio.name,
+        "place": None,
+        "value": ceiling,
+        "by": "here",
+    }
     return [*values, *([full] if ceiling is not None else [])]
 
 

@@ -1,4 +1,6 @@
-"""Where the rows of a page come from: machine, versions, code, configuration, and what of it is missing."""
+"""Where the rows of a page come from: machine, versions, code, configuration, and what of it is
+missing.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,9 +20,11 @@ MANY = 12
 
 @dataclass(frozen=True)
 class Origin:
-    """`machine` and `versions` as the study wrote them; `missing` are sentences about what is not there.
+    """`machine` and `versions` as the study wrote them; `missing` are sentences about what is not
+    there.
 
-    `settings` are the values of every parameter that is not the same in all rows, or not the default.
+    `settings` are the values of every parameter that is not the same in all rows, or not the
+    default.
     """
 
     machine: Mapping[str, Any]
@@ -42,13 +46,19 @@ class Origin:
 def origin(folder: Path, rows: Sequence[Row], kind: Kind, left_out: Sequence[str]) -> Origin:
     """What the folder of a study tells about its rows."""
     description, trouble = _description(folder / CONFIG)
-    missing = [*trouble, *_unplayed(description, rows, kind), *(f"Left out: {what}." for what in left_out)]
+    missing = [
+        *trouble,
+        *_unplayed(description, rows, kind),
+        *(f"Left out: {what}." for what in left_out),
+    ]
     machine, versions = (_mapping(description, name) for name in ("machine", "versions"))
     return Origin(machine, versions, settings(rows), tuple(missing))
 
 
 def settings(rows: Sequence[Row]) -> dict[str, str]:
-    """Parameters by name, with their values in the rows; those at their defaults throughout are left out."""
+    """Parameters by name, with their values in the rows; those at their defaults throughout are
+    left out.
+    """
     names = [*filter(is_parameter, rows[0])]
     values = {name: list(dict.fromkeys(row.get(name) for row in rows)) for name in names}
     return {name: _listed(held) for name, held in values.items() if held != [DEFAULTS.get(name)]}
@@ -56,11 +66,17 @@ def settings(rows: Sequence[Row]) -> dict[str, str]:
 
 def _listed(values: Sequence[Any]) -> str:
     texts = [_text(value) for value in values]
-    return ", ".join(texts) if len(texts) <= MANY else f"{texts[0]} to {texts[-1]}, {len(texts)} values"
+    return (
+        ", ".join(texts)
+        if len(texts) <= MANY
+        else f"{texts[0]} to {texts[-1]}, {len(texts)} values"
+    )
 
 
 def _text(value: Any) -> str:
-    return "not given" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+    return (
+        "not given" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+    )
 
 
 def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
@@ -68,24 +84,37 @@ def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
     try:
         description = read(path)
     except FileNotFoundError:
-        return {}, [f"{CONFIG} is missing: machine, versions and the list of what was to be played are not known."]
+        return {}, [
+            f"{CONFIG} is missing: machine, versions and the list of what was to be played are not "
+            "known."
+        ]
     except (OSError, ValueError) as error:
-        return {}, [f"{CONFIG} cannot be read ({str(error).splitlines()[0]}): machine and versions are not known."]
+        return {}, [
+            f"{CONFIG} cannot be read ({str(error).splitlines()[0]}): machine and versions are not "
+            "known."
+        ]
     if not isinstance(description, dict):
-        return {}, [f"{CONFIG} is not the description of a study: machine and versions are not known."]
+        return {}, [
+            f"{CONFIG} is not the description of a study: machine and versions are not known."
+        ]
     return description, []
 
 
 def _unplayed(description: Mapping[str, Any], rows: Sequence[Row], kind: Kind) -> list[str]:
     """What the configurations ask for and the rows do not hold; what failed is told as left out."""
     try:
-        asked = sum(len(each.get("seeds", each.get("floor_seeds"))) for each in description.get("configurations", ()))
+        asked = sum(
+            len(each.get("seeds", each.get("floor_seeds")))
+            for each in description.get("configurations", ())
+        )
         asked *= len(description.get("scenes", "1"))
         failed = len(description.get("failed", ()))
     except (AttributeError, TypeError):
         return [f"The configurations in {CONFIG} cannot be read."]
     lacking = asked - failed - len(rows)
-    return [f"{lacking} of {asked} {kind.unit} are missing from {kind.file}."] if lacking > 0 else []
+    return (
+        [f"{lacking} of {asked} {kind.unit} are missing from {kind.file}."] if lacking > 0 else []
+    )
 
 
 def _mapping(description: Mapping[str, Any], name: str) -> Mapping[str, Any]:

@@ -1,7 +1,8 @@
-"""An episode played again to be watched: what moved, what the camera and the LiDAR saw, and what the policy knew.
+"""An episode played again to be watched: what moved, what the camera and the LiDAR saw, and what
+the policy knew.
 
-Everything is in the world frame and in whole numbers, lengths in centimetres and angles in milliradians, so that an
-episode takes a few kilobytes.
+Everything is in the world frame and in whole numbers, lengths in centimetres and angles in
+milliradians, so that an episode takes a few kilobytes.
 """
 
 import base64
@@ -31,7 +32,8 @@ SECTORS = 128
 """Directions of the picture in which fired cells are counted, from azimuth -pi on."""
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 """How full a sector is, is written as one digit, from none of its cells to all of them."""
-CENTI, MILLI = 100, 1000
+CENTI = 100
+MILLI = 1000
 
 
 @dataclass(frozen=True)
@@ -58,12 +60,16 @@ def replayed(config: EpisodeConfig) -> Replay:
 
 def packed(story: dict[str, Any]) -> str:
     """Plain data as deflated JSON in base64."""
-    return base64.b64encode(zlib.compress(json.dumps(story, separators=(",", ":")).encode(), 9)).decode()
+    return base64.b64encode(
+        zlib.compress(json.dumps(story, separators=(",", ":")).encode(), 9)
+    ).decode()
 
 
 @dataclass
 class Recorder:
-    """Watches an episode. A moment is what there is before a keyframe; the last one is after the last keyframe."""
+    """Watches an episode. A moment is what there is before a keyframe; the last one is after the
+    last keyframe.
+    """
 
     actors: Sequence[Actor] = ()
     first_sighting: Actor | None = None
@@ -75,7 +81,8 @@ class Recorder:
 
     def before(self, loop: ClosedLoop) -> None:
         """Take down the world and the belief at the start."""
-        self.actors, self.first_sighting = loop.world.actors, loop.world.first_sighting
+        self.actors = loop.world.actors
+        self.first_sighting = loop.world.first_sighting
         self.ego_size = loop.world.ego_kind.size
         self._take(loop)
 
@@ -91,17 +98,29 @@ class Recorder:
     def story(self) -> dict[str, Any]:
         """What was taken down, a list a column."""
         columns = {name: [moment[name] for moment in self.moments] for name in self.moments[0]}
-        ego = {"size": _whole(np.array(self.ego_size[:2]), CENTI), "sensor": _whole(LIDAR_POSITION[0], CENTI)}
+        ego = {
+            "size": _whole(np.array(self.ego_size[:2]), CENTI),
+            "sensor": _whole(LIDAR_POSITION[0], CENTI),
+        }
         return {"ego": ego, "tracked": self.tracked, "rays": self.rays, **columns}
 
     def _take(self, loop: ClosedLoop) -> None:
-        world, tracks = loop.world, loop.belief.tracks
+        world = loop.world
+        tracks = loop.belief.tracks
         self.poses.append([actor.pose_at(world.time) for actor in self.actors])
         places = loop.sensor.boxes_to_world(tracks.boxes)
-        moves = loop.sensor.vectors_to_world(np.column_stack([tracks.velocities, np.zeros(len(tracks))]))
-        for track, label, box in zip(tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True):
+        moves = loop.sensor.vectors_to_world(
+            np.column_stack([tracks.velocities, np.zeros(len(tracks))])
+        )
+        for track, label, box in zip(
+            tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True
+        ):
             self.tracked[track] = [CLASSES[label], *_whole(box[3:5], CENTI)]
-        columns = [tracks.ids[:, None], _poses(places[:, [0, 1, 6]]), _whole_array(moves[:, :2], CENTI)]
+        columns = [
+            tracks.ids[:, None],
+            _poses(places[:, [0, 1, 6]]),
+            _whole_array(moves[:, :2], CENTI),
+        ]
         self.moments.append(
             {
                 "time": _whole(world.time, CENTI),
@@ -109,7 +128,9 @@ class Recorder:
                 "speed": _whole(loop.world.ego_motion.speed, CENTI),
                 "tracks": np.column_stack([*columns, tracks.misses > 0]).tolist(),
                 "camera": sightlines(
-                    loop.belief.detections, explained(loop.belief.detections, tracks, loop.rig), loop.rig
+                    loop.belief.detections,
+                    explained(loop.belief.detections, tracks, loop.rig),
+                    loop.rig,
                 ),
                 "seen": "".join(str(int(loop.picture.shows(actor.body))) for actor in self.actors),
             }
@@ -132,11 +153,16 @@ def fullness(fired: Cells, grid: AngularGrid) -> str:
     """How much of every sector fires, a digit a sector."""
     width = grid.columns // SECTORS
     counts = np.bincount(np.asarray(fired) % grid.columns // width, minlength=SECTORS)
-    return "".join(DIGITS[round(digit)] for digit in (counts / (width * grid.rows) * (len(DIGITS) - 1)).tolist())
+    return "".join(
+        DIGITS[round(digit)]
+        for digit in (counts / (width * grid.rows) * (len(DIGITS) - 1)).tolist()
+    )
 
 
 def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) -> list[list[int]]:
-    """The left and right azimuth of every camera box in the sensor frame, and 1 where a track explains it."""
+    """The left and right azimuth of every camera box in the sensor frame, and 1 where a track
+    explains it.
+    """
     lines = []
     for number, (left, _, right, _) in enumerate(detections.boxes.tolist()):
         camera = rig.cameras[int(detections.cameras[number])]
@@ -149,8 +175,13 @@ def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) 
 def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     """What the keyframes tell, a column each."""
     switches = {"in_view": "in_view", "found": "detected", "brake": "braking"}
-    written = {key: "".join(str(int(getattr(f, name))) for f in keyframes) for key, name in switches.items()}
-    distances = [_whole(f.distance_m, CENTI) if np.isfinite(f.distance_m) else None for f in keyframes]
+    written = {
+        key: "".join(str(int(getattr(f, name))) for f in keyframes)
+        for key, name in switches.items()
+    }
+    distances = [
+        _whole(f.distance_m, CENTI) if np.isfinite(f.distance_m) else None for f in keyframes
+    ]
     contact = next((f.index for f in keyframes if f.impact_speed_mps is not None), None)
     return {**written, "distance": distances, "contact": contact}
 

@@ -10,13 +10,21 @@ from matplotlib.transforms import Affine2D
 
 from care_sim.core.frames import Floats
 
-_LETTERS = {Path.MOVETO: "M", Path.LINETO: "L", Path.CURVE3: "Q", Path.CURVE4: "C", Path.CLOSEPOLY: "Z"}
+_LETTERS = {
+    Path.MOVETO: "M",
+    Path.LINETO: "L",
+    Path.CURVE3: "Q",
+    Path.CURVE4: "C",
+    Path.CLOSEPOLY: "Z",
+}
 STROKE = 0.28
 """How thick a bar is that stands for a line of a marker without an area."""
 
 
 def outline(marker: str) -> str:
-    """The outline of a marker that Matplotlib knows by this name; bars where it draws lines. It can be filled."""
+    """The outline of a marker that Matplotlib knows by this name; bars where it draws lines. It can
+    be filled.
+    """
     style = MarkerStyle(marker)
     path = style.get_path().transformed(style.get_transform() + Affine2D().scale(2, -2))
     return "".join(_outlined(path) if style.is_filled() else starmap(_bar, _ends(path)))

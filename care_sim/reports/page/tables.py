@@ -1,4 +1,6 @@
-"""Tables of a study as a page holds them: blocks of rows, and the number by which an entry is sorted."""
+"""Tables of a study as a page holds them: blocks of rows, and the number by which an entry is
+sorted.
+"""
 
 import re
 from dataclasses import dataclass
@@ -22,7 +24,9 @@ class Entry:
 
 @dataclass(frozen=True)
 class Line:
-    """A row. One that is `attached`, the paper's numbers, belongs to the row above and moves with it."""
+    """A row. One that is `attached`, the paper's numbers, belongs to the row above and moves with
+    it.
+    """
 
     entries: tuple[Entry, ...]
     attached: bool
@@ -43,16 +47,21 @@ def blocks(table: Table) -> list[Block]:
         if len(row) == 1 < len(table.columns):
             parts.append((row[0], []))
         else:
-            entries = tuple(Entry(str(text), isinstance(text, Bold), sort_key(text)) for text in row)
+            entries = tuple(
+                Entry(str(text), isinstance(text, Bold), sort_key(text)) for text in row
+            )
             parts[-1][1].append(Line(entries, attached=PAPER in row[:2] and bool(parts[-1][1])))
     return [Block(heading, tuple(lines)) for heading, lines in parts if heading or lines]
 
 
 def sort_key(text: str) -> float | None:
-    """The number that an entry begins with, the value of a share as k/n, and the least for what was never detected."""
+    """The number that an entry begins with, the value of a share as k/n, and the least for what was
+    never detected.
+    """
     if text.startswith((NOT_DETECTED, "n.d.")):
         return float("-inf")
-    share, number = _SHARE.fullmatch(text), _NUMBER.match(text)
+    share = _SHARE.fullmatch(text)
+    number = _NUMBER.match(text)
     if share and int(share[2]):
         return int(share[1]) / int(share[2])
     return float(number[1]) if number else None

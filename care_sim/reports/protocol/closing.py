@@ -1,4 +1,6 @@
-"""What is said after the protocol's tables: how much was played, and whether the paper's gate is met."""
+"""What is said after the protocol's tables: how much was played, and whether the paper's gate is
+met.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,25 +16,39 @@ from care_sim.study.task import REFERENCE, Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:
-    """Size of the study, and CARE over history against the gate of five points in every plain setting."""
-    gains = {plays.setting: _gains(plays) for plays in plays_of(rows) if not plays.setting.conditions}
+    """Size of the study, and CARE over history against the gate of five points in every plain
+    setting.
+    """
+    gains = {
+        plays.setting: _gains(plays) for plays in plays_of(rows) if not plays.setting.conditions
+    }
     gates = [_gate(setting, gaps) for setting, gaps in gains.items() if gaps]
-    return [_size(rows), *gates, *on_intervals(gap for gaps in gains.values() for gap in gaps.values())]
+    return [
+        _size(rows),
+        *gates,
+        *on_intervals(gap for gaps in gains.values() for gap in gaps.values()),
+    ]
 
 
 def _size(rows: Sequence[Row]) -> str:
     scenes = {(row["source"], row["scene"]): row for row in rows}
-    total, keyframes = counts(scenes.values()), sum(row["keyframes"] for row in scenes.values())
+    total = counts(scenes.values())
+    keyframes = sum(row["keyframes"] for row in scenes.values())
     return (
-        f"Scenes: {len(scenes):,}, with {total.events:,.0f} first sightings and {total.frames:,.0f} object frames in "
-        f"{keyframes:,} keyframes; plays: {len(rows):,}.{by_both_counts(scenes.values())}"
+        f"Scenes: {len(scenes):,}, with {total.events:,.0f} first sightings and "
+        f"{total.frames:,.0f} object frames in {keyframes:,} keyframes; plays: "
+        f"{len(rows):,}.{by_both_counts(scenes.values())}"
     )
 
 
 def _gains(plays: Plays) -> dict[float, Gap]:
     """CARE over history at the paper's budgets."""
     pair = Pair(REFERENCE, HISTORY, FIRST_SIGHTING)
-    return {budget: gap for budget in plays.budgets if budget in BUDGETS and (gap := pair.gap(plays, budget))}
+    return {
+        budget: gap
+        for budget in plays.budgets
+        if budget in BUDGETS and (gap := pair.gap(plays, budget))
+    }
 
 
 def _gate(setting: Setting, gaps: Mapping[float, Gap]) -> str:

@@ -1,4 +1,6 @@
-"""The paper's Table 1, CARE less every policy, and every policy less history: what a new idea adds to either."""
+"""The paper's Table 1, CARE less every policy, and every policy less history: what a new idea adds
+to either.
+"""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -19,7 +21,9 @@ HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}
 
 
 class Contrast(NamedTuple):
-    """A pair, named by the one of its policies that is not the base, and its differences at every budget."""
+    """A pair, named by the one of its policies that is not the base, and its differences at every
+    budget.
+    """
 
     policy: str
     pair: Pair
@@ -27,8 +31,8 @@ class Contrast(NamedTuple):
 
 
 def contrast_tables(plays: Plays) -> list[Table]:
-    """CARE less every other policy, every policy less history, and CARE's with equal weight to every scene; none of a
-    base that was not played, or alone.
+    """CARE less every other policy, every policy less history, and CARE's with equal weight to
+    every scene; none of a base that was not played, or alone.
     """
     wanted = ((REFERENCE, False), (HISTORY, False), (REFERENCE, True))
     return [_table(plays, base, alike) for base, alike in wanted if plays.other_than(base)]
@@ -63,7 +67,9 @@ def _contrasts(plays: Plays, base: str, alike: bool) -> Iterator[Contrast]:
 
 
 def _lines(plays: Plays, contrasts: Iterable[Contrast]) -> Iterator[tuple[str, ...]]:
-    """The differences at every budget, and under them the paper's, below the headings of the measures."""
+    """The differences at every budget, and under them the paper's, below the headings of the
+    measures.
+    """
     heading = ""
     for policy, pair, gaps in contrasts:
         if pair.heading != heading:

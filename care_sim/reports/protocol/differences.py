@@ -1,4 +1,6 @@
-"""How much more one policy found than another, and how sure that is: by scenes, or where they are few by events."""
+"""How much more one policy found than another, and how sure that is: by scenes, or where they are
+few by events.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +37,8 @@ GAP = "dense minus sparse"
 class Gap:
     """A difference in the unit of `ratio`; `interval` is None where too little was played for one.
 
-    The interval comes from resampling scenes, or `over_events` from resampling the events of the scenes played.
+    The interval comes from resampling scenes, or `over_events` from resampling the events of the
+    scenes played.
     """
 
     ratio: Ratio
@@ -46,11 +49,15 @@ class Gap:
     @property
     def sign(self) -> int:
         """1 or -1 where the interval excludes zero, else 0."""
-        return 0 if self.interval is None else int(self.interval.low > 0) - int(self.interval.high < 0)
+        return (
+            0 if self.interval is None else int(self.interval.low > 0) - int(self.interval.high < 0)
+        )
 
 
 class Compared(Protocol):
-    """Anything that can be measured of a setting at a budget and set beside what the paper says of it."""
+    """Anything that can be measured of a setting at a budget and set beside what the paper says of
+    it.
+    """
 
     @property
     def heading(self) -> str:
@@ -74,7 +81,9 @@ class Compared(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """`first` less `second`, of all or `within` one stratum; with `alike` every scene weighs the same."""
+    """`first` less `second`, of all or `within` one stratum; with `alike` every scene weighs the
+    same.
+    """
 
     first: str
     second: str
@@ -116,7 +125,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class Third:
-    """CARE less all-camera in a third of the scenes (paper, Sec. 5.2), or in the dense third less the sparse.
+    """CARE less all-camera in a third of the scenes (paper, Sec. 5.2), or in the dense third less
+    the sparse.
 
     `ranked_by` is the column of CARE's plays by which scenes are ranked.
     """
@@ -154,22 +164,33 @@ def _among(ratio: Ratio, ours: Tallies, theirs: Tallies) -> Gap | None:
     return Gap(ratio, found.by_event.mean, found.by_event if found.scenes >= FEWEST_PAIRS else None)
 
 
-def _dense_less_sparse(ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Mapping[str, Sequence[str]]) -> Gap | None:
+def _dense_less_sparse(
+    ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Mapping[str, Sequence[str]]
+) -> Gap | None:
     interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
     if interval is None:
         return None
-    ends = [_among(ratio, {name: ours[name] for name in groups[which]}, theirs) for which in ("dense", "sparse")]
+    ends = [
+        _among(ratio, {name: ours[name] for name in groups[which]}, theirs)
+        for which in ("dense", "sparse")
+    ]
     enough = all(end and end.interval for end in ends)
     return Gap(ratio, interval.mean, interval if enough else None)
 
 
 def _by_events(pair: Pair, plays: Plays, budget: float) -> Interval | None:
-    """The interval from resampling events, paired and averaged over floor seeds; overall recall has none."""
+    """The interval from resampling events, paired and averaged over floor seeds; overall recall has
+    none.
+    """
     if pair.ratio is OVERALL:
         return None
-    scenes = sorted(set(plays.tallies(pair.first, budget)) & set(plays.tallies(pair.second, budget)))
+    scenes = sorted(
+        set(plays.tallies(pair.first, budget)) & set(plays.tallies(pair.second, budget))
+    )
     ours, theirs = (
-        np.concatenate([_of_events(pair.ratio, plays.delays(policy, budget, scene)) for scene in scenes])
+        np.concatenate(
+            [_of_events(pair.ratio, plays.delays(policy, budget, scene)) for scene in scenes]
+        )
         for policy in pair.policies
     )
     return paired_difference(ours, theirs) if len(ours) >= FEWEST_PAIRS else None

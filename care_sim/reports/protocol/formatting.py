@@ -7,7 +7,9 @@ from care_sim.reports.table import Bold
 
 PAPER = "(paper)"
 """What the line under a policy begins with that holds the paper's numbers."""
-MET, NOT_MET, UNDECIDED = "met", "not met", "undecided"
+MET = "met"
+NOT_MET = "not met"
+UNDECIDED = "undecided"
 OVER_EVENTS = "°"
 """Ends what rests on an interval over events."""
 
@@ -24,7 +26,9 @@ def mean(gap: Gap | None) -> str:
 
 def interval(gap: Gap | None) -> str:
     """The interval alone."""
-    return f"{bounds(gap.interval, _decimals(gap.ratio))}{_mark(gap)}" if gap and gap.interval else ""
+    return (
+        f"{bounds(gap.interval, _decimals(gap.ratio))}{_mark(gap)}" if gap and gap.interval else ""
+    )
 
 
 def whole(gap: Gap | None) -> str:
@@ -42,7 +46,9 @@ def verdict(gap: Gap, claimed: int) -> str:
 
 
 def judged(gap: Gap | None, claimed: int | None, paper: str) -> str:
-    """A difference, whether it bears a claim out, and the claim as the paper has it; bold as `mean` is."""
+    """A difference, whether it bears a claim out, and the claim as the paper has it; bold as `mean`
+    is.
+    """
     if gap is None:
         return ""
     if claimed is None:

@@ -1,4 +1,6 @@
-"""What stands under the protocol's tables: how much was played, what is missing, where the paper's numbers stand."""
+"""What stands under the protocol's tables: how much was played, what is missing, where the paper's
+numbers stand.
+"""
 
 from collections.abc import Collection, Iterable, Iterator
 
@@ -13,39 +15,47 @@ from care_sim.study.task import FULL, Row
 
 UNITS = "Recall in points; TTFD in keyframes, where less is better."
 BY_EVENTS = (
-    f"{OVER_EVENTS}: fewer than {FEWEST_PAIRS} scenes have events and plays of both policies, too few for an interval "
-    "over scenes. This one comes from resampling events, paired and averaged over floor seeds; events of one scene are "
-    "not independent, so it is too narrow, and it speaks for these drives alone."
+    f"{OVER_EVENTS}: fewer than {FEWEST_PAIRS} scenes have events and plays of both policies, too "
+    "few for an interval over scenes. This one comes from resampling events, paired and averaged "
+    "over floor seeds; events of one scene are not independent, so it is too narrow, and it speaks "
+    "for these drives alone."
 )
 NO_INTERVAL = (
-    f"Without an interval: fewer than {FEWEST_PAIRS} scenes, in a measure for which events are not resampled (overall "
-    f"recall, strata, equal scene weights, thirds) or with fewer than {FEWEST_PAIRS} events."
+    f"Without an interval: fewer than {FEWEST_PAIRS} scenes, in a measure for which events are not "
+    "resampled (overall recall, strata, equal scene weights, thirds) or with fewer than "
+    f"{FEWEST_PAIRS} events."
 )
 
 
 def played(plays: Plays) -> str:
     """Scenes, events, object frames and floor seeds."""
     total = counts(plays.scenes.values())
-    seeds = {len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets}
+    seeds = {
+        len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets
+    }
     return (
-        f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} object frames; "
-        f"{_several(max(seeds, default=0), 'floor seed')}, averaged per scene.{by_both_counts(plays.scenes.values())}"
+        f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} "
+        f"object frames; {_several(max(seeds, default=0), 'floor seed')}, averaged per "
+        f"scene.{by_both_counts(plays.scenes.values())}"
     )
 
 
 def by_both_counts(scenes: Collection[Row]) -> str:
-    """How many events there are by the other presence, given one row of every scene; nothing where rows do not tell."""
+    """How many events there are by the other presence, given one row of every scene; nothing where
+    rows do not tell.
+    """
     if any(row.get("emerging") is None for row in scenes):
         return ""
     emerging = sum(row["emerging"] for row in scenes)
     if any(row.get("presence") == VISIBLE for row in scenes):
         return (
-            f" Of the events, {emerging:,} are of objects that were hidden within range at scene start, which "
-            f"presence {ANNOTATED} does not count."
+            f" Of the events, {emerging:,} are of objects that were hidden within range at scene "
+            f"start, which presence {ANNOTATED} does not count."
         )
     return (
-        f" {_several(emerging, 'object')} hidden within range at scene start {'is' if emerging == 1 else 'are'} no "
-        f"event; presence {VISIBLE} counts them too, {counts(scenes).events + emerging:,.0f} in all."
+        f" {_several(emerging, 'object')} hidden within range at scene start "
+        f"{'is' if emerging == 1 else 'are'} no event; presence {VISIBLE} counts them too, "
+        f"{counts(scenes).events + emerging:,.0f} in all."
     )
 
 
@@ -55,18 +65,23 @@ def counts(scenes: Iterable[Row]) -> Tally:
 
 
 def on_intervals(gaps: Iterable[Gap | None]) -> tuple[str, ...]:
-    """What to know of the intervals of the differences shown: which are over events, and why some have none."""
+    """What to know of the intervals of the differences shown: which are over events, and why some
+    have none.
+    """
     shown = [gap for gap in gaps if gap]
     by_events = (BY_EVENTS,) if any(gap.over_events for gap in shown) else ()
     return (*by_events, NO_INTERVAL) if any(gap.interval is None for gap in shown) else by_events
 
 
 def left_out(plays: Plays) -> tuple[str, ...]:
-    """How many scenes lack a play of a policy, which are therefore out of its levels and contrasts."""
+    """How many scenes lack a play of a policy; they are left out of its levels and contrasts."""
     missing = list(_missing(plays))
     if not missing:
         return ()
-    return (f"Left out where a play is missing, of {_several(len(plays.scenes), 'scene')}: {'; '.join(missing)}.",)
+    return (
+        f"Left out where a play is missing, of {_several(len(plays.scenes), 'scene')}: "
+        f"{'; '.join(missing)}.",
+    )
 
 
 def papers(sources: Iterable[str]) -> tuple[str, ...]:
@@ -76,7 +91,10 @@ def papers(sources: Iterable[str]) -> tuple[str, ...]:
 
 def _missing(plays: Plays) -> Iterator[str]:
     for policy in plays.policies:
-        lacking = {budget: len(plays.scenes) - len(plays.tallies(policy, budget)) for budget in plays.budgets}
+        lacking = {
+            budget: len(plays.scenes) - len(plays.tallies(policy, budget))
+            for budget in plays.budgets
+        }
         listed = [f"{count} at {percent(budget)}" for budget, count in lacking.items() if count]
         if listed:
             yield f"{policy} {', '.join(listed)}"

@@ -1,4 +1,6 @@
-"""What the paper says of its nuScenes evaluation (Secs. 5.2 to 5.4): numbers by budget, and their sentences."""
+"""What the paper says of its nuScenes evaluation (Secs. 5.2 to 5.4): numbers by budget, and their
+sentences.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,9 +16,11 @@ _SIGNS = {"+": 1, "above": 1, "-": -1, "below": -1, "tied": 0}
 
 @dataclass(frozen=True)
 class Said:
-    """What the paper says at each of its budgets, empty where nothing, and the sentence or table it stands in.
+    """What the paper says at each of its budgets, empty where nothing, and the sentence or table it
+    stands in.
 
-    An entry begins with a signed number, with above or below where the paper gives a sign alone, or with tied.
+    An entry begins with a signed number, with above or below where the paper gives a sign alone, or
+    with tied.
     """
 
     entries: tuple[str, str, str]
@@ -42,7 +46,9 @@ class Said:
 
 
 class Level(NamedTuple):
-    """What the paper says of one policy: recalls and their shares of the full scan's in %, TTFD in keyframes."""
+    """What the paper says of one policy: recalls and their shares of the full scan's in %, TTFD in
+    keyframes.
+    """
 
     first: str = ""
     first_of_full: str = ""
@@ -51,83 +57,97 @@ class Level(NamedTuple):
     ttfd: str = ""
 
 
-_TABLE_1 = "Table 1: Paired per-scene bootstrap contrasts, in points of recall with 95% confidence intervals."
+_TABLE_1 = (
+    "Table 1: Paired per-scene bootstrap contrasts, in points of recall with 95% confidence "
+    "intervals."
+)
 _HISTORY = (
-    "Against the history policy, the first-sighting gain is not free at tight budgets: in the paired per-scene "
-    "contrast used for all intervals, overall recall moves by -0.8, -0.5, and +0.6 points at 10%, 20%, and 35%, a "
-    "budget-dependent Pareto choice that we report as such rather than as a uniform win."
+    "Against the history policy, the first-sighting gain is not free at tight budgets: in the "
+    "paired per-scene contrast used for all intervals, overall recall moves by -0.8, -0.5, and "
+    "+0.6 points at 10%, 20%, and 35%, a budget-dependent Pareto choice that we report as such "
+    "rather than as a uniform win."
 )
 _ALIKE = "Equal scene weights give 5.3, 5.2, and 4.2 points, so event-rich scenes do not drive it."
 _TTFD = (
-    "Descriptively, on a single seed CARE lowers the mean censored TTFD of the history policy from 3.76 to 3.64, 3.60 "
-    "to 3.47, and 3.45 to 3.33 keyframes, a shift of about 0.12 keyframes (60 ms); no interval claim is made for TTFD."
+    "Descriptively, on a single seed CARE lowers the mean censored TTFD of the history policy from "
+    "3.76 to 3.64, 3.60 to 3.47, and 3.45 to 3.33 keyframes, a shift of about 0.12 keyframes (60 "
+    "ms); no interval claim is made for TTFD."
 )
 _UNCERTAINTY = (
-    "It attains the best overall recall of all policies, exceeding CARE by 1.0, 2.2, and 0.5 points with intervals "
-    "excluding zero, because it re-examines regions that returned points without a confident detection."
+    "It attains the best overall recall of all policies, exceeding CARE by 1.0, 2.2, and 0.5 "
+    "points with intervals excluding zero, because it re-examines regions that returned points "
+    "without a confident detection."
 )
 _BEAMS = (
-    "Beam reduction shows the opposite behavior: its first-sighting recall is statistically tied with CARE at 20% and "
-    "35% and 2.0 points behind at 10%, while it gives up 17.4, 11.5, and 6.4 points of overall recall (Table 1), so "
-    "CARE gives the better joint trade-off."
+    "Beam reduction shows the opposite behavior: its first-sighting recall is statistically tied "
+    "with CARE at 20% and 35% and 2.0 points behind at 10%, while it gives up 17.4, 11.5, and 6.4 "
+    "points of overall recall (Table 1), so CARE gives the better joint trade-off."
 )
 _CAMERA = (
-    "The all-camera control shows that the camera cue, not the history state, drives the first-sighting gain: the two "
-    "are tied on first sightings at all three budgets."
+    "The all-camera control shows that the camera cue, not the history state, drives the "
+    "first-sighting gain: the two are tied on first sightings at all three budgets."
 )
 _UNIFORM = (
-    "The history+uniform control falls below plain history at every budget, so an undirected reserve costs more than "
-    "it returns."
+    "The history+uniform control falls below plain history at every budget, so an undirected "
+    "reserve costs more than it returns."
 )
 _ORACLE = (
-    "An oracle variant sharpens this point: replacing the forecast of every tracked object with its true next "
-    "position, an upper bound on any learned region predictor, moves first-sighting recall by at most 0.5 points in a "
-    "single-seed diagnostic run, and every interval contains zero. Within the same run CARE stays 3.7 to 4.7 points "
-    "above this oracle, so what it adds is information about objects that have no track yet, not a better forecast. "
-    "The oracle raises overall recall by 0.5 to 0.7 points, as expected from perfect placement on tracked objects."
+    "An oracle variant sharpens this point: replacing the forecast of every tracked object with "
+    "its true next position, an upper bound on any learned region predictor, moves first-sighting "
+    "recall by at most 0.5 points in a single-seed diagnostic run, and every interval contains "
+    "zero. Within the same run CARE stays 3.7 to 4.7 points above this oracle, so what it adds is "
+    "information about objects that have no track yet, not a better forecast. The oracle raises "
+    "overall recall by 0.5 to 0.7 points, as expected from perfect placement on tracked objects."
 )
 _PRIORITY = (
-    "Priority ordering is structural: on the full split the variant changes first-sighting recall by at most 0.2 "
-    "points, with overall recall of 0.380, 0.418, and 0.457."
+    "Priority ordering is structural: on the full split the variant changes first-sighting recall "
+    "by at most 0.2 points, with overall recall of 0.380, 0.418, and 0.457."
 )
 _GUARD = (
-    "At the 10% budget, relative to CARE without forgetting, unguarded forgetting loses 1.8 points of near-field "
-    "recall on objects within 20 m, interval [-2.9,-0.5], a quarter-scale guard loses 1.5 points [-2.7,-0.2], and the "
-    "default shows no significant loss, -0.5 [-1.7,+0.4], while releasing 24 cells per keyframe. At 20% even the "
-    "default pays 3.1 points [-4.7,-1.5], so forgetting is a tool for the tightest budgets."
+    "At the 10% budget, relative to CARE without forgetting, unguarded forgetting loses 1.8 points "
+    "of near-field recall on objects within 20 m, interval [-2.9,-0.5], a quarter-scale guard "
+    "loses 1.5 points [-2.7,-0.2], and the default shows no significant loss, -0.5 [-1.7,+0.4], "
+    "while releasing 24 cells per keyframe. At 20% even the default pays 3.1 points [-4.7,-1.5], "
+    "so forgetting is a tool for the tightest budgets."
 )
 _LEARNED = (
-    "The learned scorer matches CARE on first-sighting recall but loses 0.6 to 2.4 points of overall recall at every "
-    "budget (Table 1)."
+    "The learned scorer matches CARE on first-sighting recall but loses 0.6 to 2.4 points of "
+    "overall recall at every budget (Table 1)."
 )
 _DENSE = (
-    "In the densest third of the scenes, ranked by tracked-object count, CARE gains 0.7 and 1.0 points of overall "
-    "recall over the all-camera reserve at 20% and 35%. The dense-minus-sparse difference of 0.7 and 1.3 points "
-    "excludes zero, and the same pattern appears when scenes are ranked by explained detections instead. Sparse scenes "
-    "are tied, and the stratified first-sighting contrasts are tied apart from a 1.3-point loss in the middle third at "
-    "20%."
+    "In the densest third of the scenes, ranked by tracked-object count, CARE gains 0.7 and 1.0 "
+    "points of overall recall over the all-camera reserve at 20% and 35%. The dense-minus-sparse "
+    "difference of 0.7 and 1.3 points excludes zero, and the same pattern appears when scenes are "
+    "ranked by explained detections instead. Sparse scenes are tied, and the stratified "
+    "first-sighting contrasts are tied apart from a 1.3-point loss in the middle third at 20%."
 )
 _CAUSAL = (
-    "Delaying the camera detections by one full keyframe, so the reserve only sees half-second-old evidence, still "
-    "recovers 4.6, 5.3, and 2.6 points over history: same-frame camera input is not required."
+    "Delaying the camera detections by one full keyframe, so the reserve only sees half-second-old "
+    "evidence, still recovers 4.6, 5.3, and 2.6 points over history: same-frame camera input is "
+    "not required."
 )
 _CEILING = (
-    "A full scan reaches 0.245 first-sighting and 0.494 overall recall; CARE at 35% recovers 88% and 94% of these "
-    "ceilings against 70% and 93% for history, so it closes most of the allocation-controlled gap."
+    "A full scan reaches 0.245 first-sighting and 0.494 overall recall; CARE at 35% recovers 88% "
+    "and 94% of these ceilings against 70% and 93% for history, so it closes most of the "
+    "allocation-controlled gap."
 )
 _MECHANICAL = (
-    "At 10% the unexplained wedges alone fill the reserve on 79% of keyframes, and the realized allocation changes on "
-    "only 17% of keyframes, against 68% at 35%."
+    "At 10% the unexplained wedges alone fill the reserve on 79% of keyframes, and the realized "
+    "allocation changes on only 17% of keyframes, against 68% at 35%."
 )
 GATE = (
-    "The effect-size gate fixed before the runs, five points of first-sighting recall, is met at 10% and 20%; the 35% "
-    "gain stays positive but below it."
+    "The effect-size gate fixed before the runs, five points of first-sighting recall, is met at "
+    "10% and 20%; the 35% gain stays positive but below it."
 )
 _TIED = ("tied", "tied", "tied")
 
 _PLAIN: dict[Compared, Said] = {
-    Pair("care", "history", FIRST_SIGHTING): Said(("+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"), _TABLE_1),
-    Pair("care", "uncertainty", FIRST_SIGHTING): Said(("+3.5 [2.6,4.4]", "+2.7 [1.7,3.8]", "+2.1 [1.1,3.1]"), _TABLE_1),
+    Pair("care", "history", FIRST_SIGHTING): Said(
+        ("+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"), _TABLE_1
+    ),
+    Pair("care", "uncertainty", FIRST_SIGHTING): Said(
+        ("+3.5 [2.6,4.4]", "+2.7 [1.7,3.8]", "+2.1 [1.1,3.1]"), _TABLE_1
+    ),
     Pair("care", "beam-reduce", FIRST_SIGHTING): Said(("+2.0", "tied", "tied"), _BEAMS),
     Pair("care", "all-camera", FIRST_SIGHTING): Said(_TIED, _CAMERA),
     Pair("care", "learned-scorer", FIRST_SIGHTING): Said(_TIED, _LEARNED),
@@ -138,9 +158,15 @@ _PLAIN: dict[Compared, Said] = {
     Pair("care", "history", FIRST_SIGHTING, alike=True): Said(("+5.3", "+5.2", "+4.2"), _ALIKE),
     Pair("care", "history", OVERALL): Said(("-0.8", "-0.5", "+0.6"), _HISTORY),
     Pair("care", "uncertainty", OVERALL): Said(("-1.0", "-2.2", "-0.5"), _UNCERTAINTY),
-    Pair("care", "beam-reduce", OVERALL): Said(("+17.4 [15.9,19.0]", "+11.5 [10.4,12.7]", "+6.4 [5.4,7.5]"), _TABLE_1),
-    Pair("care", "learned-scorer", OVERALL): Said(("+2.4 [1.9,3.0]", "+0.7 [0.4,1.0]", "+0.6 [0.3,0.9]"), _TABLE_1),
-    Pair("care", "all-camera", OVERALL): Said(("-0.13 [-0.26,-0.01]", "+0.5 [0.3,0.8]", "+0.7 [0.4,1.0]"), _TABLE_1),
+    Pair("care", "beam-reduce", OVERALL): Said(
+        ("+17.4 [15.9,19.0]", "+11.5 [10.4,12.7]", "+6.4 [5.4,7.5]"), _TABLE_1
+    ),
+    Pair("care", "learned-scorer", OVERALL): Said(
+        ("+2.4 [1.9,3.0]", "+0.7 [0.4,1.0]", "+0.6 [0.3,0.9]"), _TABLE_1
+    ),
+    Pair("care", "all-camera", OVERALL): Said(
+        ("-0.13 [-0.26,-0.01]", "+0.5 [0.3,0.8]", "+0.7 [0.4,1.0]"), _TABLE_1
+    ),
     Pair("history-oracle", "history", OVERALL): Said(("+0.5 to 0.7",) * 3, _ORACLE),
     Pair("history-uniform", "history", OVERALL): Said(("below",) * 3, _UNIFORM),
     Pair("care-sbf", "care", OVERALL, "range/below 20 m"): Said(
@@ -175,12 +201,19 @@ ALLOCATIONS = {"all-camera": Said(("17%", "", "68%"), _MECHANICAL)}
 
 
 def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
-    """A recall in % that the paper gives of a policy, itself or as a share of the full scan's; None without."""
-    said, full = LEVELS.get((policy, budget), Level()), LEVELS["full", 1.0]
+    """A recall in % that the paper gives of a policy, itself or as a share of the full scan's; None
+    without.
+    """
+    said = LEVELS.get((policy, budget), Level())
+    full = LEVELS["full", 1.0]
     if ratio is FIRST_SIGHTING:
-        own, share, ceiling = said.first, said.first_of_full, full.first
+        own = said.first
+        share = said.first_of_full
+        ceiling = full.first
     elif ratio is OVERALL:
-        own, share, ceiling = said.overall, said.overall_of_full, full.overall
+        own = said.overall
+        share = said.overall_of_full
+        ceiling = full.overall
     else:
         return None
     if own:
@@ -189,7 +222,7 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
 
 
 def statements_about(setting: Setting) -> Mapping[Compared, Said]:
-    """What the paper says of plays under these conditions, whatever films and detector they are of."""
+    """What the paper says under these conditions, whatever the films and the detector are."""
     if setting.strict_causal:
         return _STRICT_CAUSAL
     return {} if setting.conditions else _PLAIN

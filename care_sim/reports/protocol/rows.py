@@ -1,4 +1,6 @@
-"""The rows of the first-sighting protocol, one a play: setting by setting what each policy found of every scene."""
+"""The rows of the first-sighting protocol, one a play: setting by setting what each policy found of
+every scene.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -30,7 +32,9 @@ _COLUMNS = tuple(field.name for field in fields(Tally))
 
 @dataclass(frozen=True)
 class Setting:
-    """What plays that are compared have in common: films, detector, and the conditions that are not the default."""
+    """What plays that are compared have in common: films, detector, and the conditions that are not
+    the default.
+    """
 
     source: str
     detector: str
@@ -47,7 +51,9 @@ class Setting:
         changed = [f"{name.replace('_', ' ')} {value}" for name, value in self.conditions]
         if self.strict_causal:
             changed = ["strict-causal (camera one keyframe old)"]
-        return ", ".join([SOURCES.get(self.source, self.source), f"detector {self.detector}", *changed])
+        return ", ".join(
+            [SOURCES.get(self.source, self.source), f"detector {self.detector}", *changed]
+        )
 
     @property
     def slug(self) -> str:
@@ -64,9 +70,11 @@ class Setting:
 
 
 class Plays:
-    """The plays of one setting, floor seeds averaged per scene. Policies are named with their parameters.
+    """The plays of one setting, floor seeds averaged per scene. Policies are named with their
+    parameters.
 
-    `scenes` holds one row of every scene; `full` are the full scans of them, which may come from another setting.
+    `scenes` holds one row of every scene; `full` are the full scans of them, which may come from
+    another setting.
     """
 
     def __init__(self, setting: Setting, rows: Sequence[Row], full: Sequence[Row] = ()):
@@ -121,7 +129,9 @@ class Plays:
 
     def delays(self, policy: str, budget: float, scene: str) -> Floats:
         """(floor seeds, events) censored TTFD in keyframes of a scene's events."""
-        return np.array([row["ttfds"] for row in self.rows(policy, budget) if row["scene"] == scene], float)
+        return np.array(
+            [row["ttfds"] for row in self.rows(policy, budget) if row["scene"] == scene], float
+        )
 
     def thirds(self, column: str, budget: float) -> dict[str, list[str]]:
         """Scenes ranked by what the reference held there (`tracks`, `explained`), cut in three."""
@@ -136,9 +146,15 @@ class Plays:
         return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
 
     def difference(self, policy: str, budget: float) -> AllocationDifference:
-        """How its allocations differ from those of the reference, over all plays for which that is known."""
+        """How its allocations differ from those of the reference, over all plays for which that is
+        known.
+        """
         columns = ("keyframes", "differing_keyframes", "differing_cells")
-        known = [row for row in self.rows(policy, budget) if None not in (row[column] for column in columns)]
+        known = [
+            row
+            for row in self.rows(policy, budget)
+            if None not in (row[column] for column in columns)
+        ]
         return AllocationDifference(*(int(sum(row[column] for row in known)) for column in columns))
 
     def strata(self) -> dict[str, list[str]]:
@@ -150,22 +166,31 @@ class Plays:
 
 
 def plays_of(rows: Sequence[Row]) -> list[Plays]:
-    """The plays of every setting in the order of their first rows; the full scan alone makes none where others do.
+    """The plays of every setting in the order of their first rows; the full scan alone makes none
+    where others do.
 
-    Raises InvalidInput where the plays of a scene are of two films, or one does not tell the TTFD of its events.
+    Raises InvalidInput where the plays of a scene are of two films, or one does not tell the TTFD
+    of its events.
     """
     _check_films(rows)
     groups: dict[Setting, list[Row]] = {}
     for row in rows:
         groups.setdefault(setting_of(row), []).append(row)
-    full = {setting: [row for row in own if row["policy"] == FULL] for setting, own in groups.items()}
-    plays = [Plays(setting, own, full[setting] or full.get(setting.for_full(), ())) for setting, own in groups.items()]
+    full = {
+        setting: [row for row in own if row["policy"] == FULL] for setting, own in groups.items()
+    }
+    plays = [
+        Plays(setting, own, full[setting] or full.get(setting.for_full(), ()))
+        for setting, own in groups.items()
+    ]
     return [each for each in plays if each.tags] or plays
 
 
 def setting_of(row: Row) -> Setting:
     """The setting that a row belongs to; a condition that it has no column for is the usual one."""
-    changed = tuple((name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None))
+    changed = tuple(
+        (name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None)
+    )
     return Setting(row["source"], with_parameters(row, "detector"), changed)
 
 
@@ -176,11 +201,13 @@ def _check_films(rows: Sequence[Row]) -> None:
         scene = (row["source"], row["scene"], row.get("camera_detections") or "")
         if len(row["ttfds"]) != row["events"]:
             raise InvalidInput(
-                f"a play of scene {row['scene']} has {len(row['ttfds'])} TTFD of {row['events']:g} events"
+                f"a play of scene {row['scene']} has {len(row['ttfds'])} TTFD of {row['events']:g} "
+                "events"
             )
         if films.setdefault(scene, row["film_hash"]) != row["film_hash"]:
             raise InvalidInput(
-                f"the plays of scene {row['scene']} are of two films, its data changed between runs: take a new --out"
+                f"the plays of scene {row['scene']} are of two films, its data changed between "
+                "runs: take a new --out"
             )
 
 

@@ -1,4 +1,4 @@
-"""Every contrast of the paper's evaluation beside what was measured, and whether it is borne out."""
+"""Every contrast of the paper's evaluation beside what was measured, and whether it is met."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -14,20 +14,30 @@ from care_sim.reports.table import Table
 Measured = Mapping[Compared, Mapping[float, Gap | None]]
 """What was measured of every statement, by budget."""
 RULE = (
-    "In brackets: the paper's. Met: the interval excludes zero on the side that the paper says, or contains zero where "
-    "it says tied. Not met: it excludes zero on the other side, or at all where the paper says tied. Undecided: it "
-    "contains zero where the paper claims a sign, or there is none. A tie that is met shows no difference; it does not "
-    "show that there is none."
+    "In brackets: the paper's. Met: the interval excludes zero on the side that the paper says, or "
+    "contains zero where it says tied. Not met: it excludes zero on the other side, or at all "
+    "where the paper says tied. Undecided: it contains zero where the paper claims a sign, or "
+    "there is none. A tie that is met shows no difference; it does not show that there is none."
 )
-THIRDS = "Thirds of the scenes, by tracked objects or by explained detections: care minus all-camera."
-UNIFORM = "The paper does not say in which measure history-uniform falls below history: both are tested."
+THIRDS = (
+    "Thirds of the scenes, by tracked objects or by explained detections: care minus all-camera."
+)
+UNIFORM = (
+    "The paper does not say in which measure history-uniform falls below history: both are tested."
+)
 
 
 def statements_tables(plays: Plays) -> list[Table]:
-    """One line a statement, at the paper's budgets; none where the paper says nothing of such plays."""
+    """One line a statement, at the paper's budgets; none where the paper says nothing of such
+    plays.
+    """
     said = statements_about(plays.setting)
     budgets = [budget for budget in plays.budgets if budget in BUDGETS]
-    found = {each: {budget: each.gap(plays, budget) for budget in budgets} for each in said if _is_played(each, plays)}
+    found = {
+        each: {budget: each.gap(plays, budget) for budget in budgets}
+        for each in said
+        if _is_played(each, plays)
+    }
     measured = {each: gaps for each, gaps in found.items() if any(gaps.values())}
     if not measured:
         return []
@@ -61,7 +71,10 @@ def _lines(measured: Measured, said: Mapping[Compared, Said]) -> Iterator[tuple[
         if each.heading != heading:
             heading = each.heading
             yield (heading,)
-        yield (each.label, *(entry for budget, gap in gaps.items() for entry in _entries(gap, said[each], budget)))
+        yield (
+            each.label,
+            *(entry for budget, gap in gaps.items() for entry in _entries(gap, said[each], budget)),
+        )
 
 
 def _entries(gap: Gap | None, said: Said, budget: float) -> tuple[str, str]:
@@ -70,8 +83,14 @@ def _entries(gap: Gap | None, said: Said, budget: float) -> tuple[str, str]:
 
 
 def _count(measured: Measured, said: Mapping[Compared, Said]) -> str:
-    claims = [(gap, said[each].sign(budget)) for each, gaps in measured.items() for budget, gap in gaps.items()]
-    verdicts = Counter(verdict(gap, claimed) for gap, claimed in claims if gap and claimed is not None)
+    claims = [
+        (gap, said[each].sign(budget))
+        for each, gaps in measured.items()
+        for budget, gap in gaps.items()
+    ]
+    verdicts = Counter(
+        verdict(gap, claimed) for gap, claimed in claims if gap and claimed is not None
+    )
     listed = ", ".join(f"{verdicts[each]} {each}" for each in (MET, NOT_MET, UNDECIDED))
     return f"Of {verdicts.total()}, each budget counted: {listed}."
 
@@ -83,5 +102,11 @@ def _asides(measured: Measured) -> tuple[str, ...]:
 
 
 def _not_played(plays: Plays, said: Mapping[Compared, Said]) -> tuple[str, ...]:
-    named = dict.fromkeys(policy for each in said for policy in each.policies if policy not in plays.policies)
-    return (f"The paper also speaks of policies that were not played: {', '.join(named)}.",) if named else ()
+    named = dict.fromkeys(
+        policy for each in said for policy in each.policies if policy not in plays.policies
+    )
+    return (
+        (f"The paper also speaks of policies that were not played: {', '.join(named)}.",)
+        if named
+        else ()
+    )

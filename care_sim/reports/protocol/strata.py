@@ -1,4 +1,6 @@
-"""Where policies gain and what the residual filter changes: strata, thirds of scenes, and differing allocations."""
+"""Where policies gain and what the residual filter changes: strata, thirds of scenes, and differing
+allocations.
+"""
 
 from collections.abc import Iterator
 
@@ -18,23 +20,29 @@ from care_sim.study.task import REFERENCE
 BASES = (HISTORY, "all-camera")
 """The policies that strata compare CARE with."""
 RANKED = (
-    "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. No interval of "
-    f"fewer than {FEWEST_PAIRS} scenes."
+    "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. "
+    f"No interval of fewer than {FEWEST_PAIRS} scenes."
 )
 NO_THIRDS = (
-    f"No thirds of the scenes by traffic: they take all-camera and at least {FEWEST_SCENES} scenes at every budget."
+    "No thirds of the scenes by traffic: they take all-camera and at least "
+    f"{FEWEST_SCENES} scenes at every budget."
 )
 DIFFERING = (
-    "Share of the keyframes, and mean number of cells where they differ. Each policy follows its own tracks, so "
-    "differences accumulate over a scene."
+    "Share of the keyframes, and mean number of cells where they differ. Each policy follows its "
+    "own tracks, so differences accumulate over a scene."
 )
 
 
 def strata_tables(plays: Plays) -> list[Table]:
-    """Recall by range, azimuth and class: the level of every policy, and CARE less the others in `BASES`."""
+    """Recall by range, azimuth and class: the level of every policy, and CARE less the others in
+    `BASES`.
+    """
     if not plays.policies:
         return []
-    columns = (*(marked(policy, tags) for policy, tags in plays.tags.items()), *(pair.label for pair in _pairs(plays)))
+    columns = (
+        *(marked(policy, tags) for policy, tags in plays.tags.items()),
+        *(pair.label for pair in _pairs(plays)),
+    )
     notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
     without = (NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
     return [
@@ -45,7 +53,10 @@ def strata_tables(plays: Plays) -> list[Table]:
             (*notes, *more),
             terminal=False,
         )
-        for ratio, counted, more in ((FIRST_SIGHTING, "events", ()), (OVERALL, "object frames", without))
+        for ratio, counted, more in (
+            (FIRST_SIGHTING, "events", ()),
+            (OVERALL, "object frames", without),
+        )
     ]
 
 
@@ -54,7 +65,10 @@ def _pairs(plays: Plays, ratio: Ratio = FIRST_SIGHTING, within: str = "") -> lis
 
 
 def _on_strata(plays: Plays) -> tuple[str, ...]:
-    intervals = f"Intervals over scenes that have anything in the stratum, none of fewer than {FEWEST_PAIRS}."
+    intervals = (
+        "Intervals over scenes that have anything in the stratum, none of fewer than "
+        f"{FEWEST_PAIRS}."
+    )
     return ("Levels in %.", *((intervals,) if _pairs(plays) else ()))
 
 
@@ -79,7 +93,9 @@ def _stratum_line(plays: Plays, ratio: Ratio, within: str, budget: float) -> tup
 
 
 def thirds_tables(plays: Plays) -> list[Table]:
-    """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every budget."""
+    """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every
+    budget.
+    """
     if not _has_thirds(plays):
         return []
     said = statements_about(plays.setting)
@@ -89,7 +105,11 @@ def thirds_tables(plays: Plays) -> list[Table]:
             ("third", *map(percent, plays.budgets)),
             tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
             (f"{UNITS} {RANKED}",),
-            papers(text.source for each, text in said.items() if isinstance(each, Third) and text.among(plays.budgets)),
+            papers(
+                text.source
+                for each, text in said.items()
+                if isinstance(each, Third) and text.among(plays.budgets)
+            ),
             terminal=False,
         )
     ]
@@ -104,7 +124,10 @@ def _has_thirds(plays: Plays) -> bool:
 def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
     yield (f"{RANKINGS[column]} a keyframe",)
     for name in reversed(SCENE_THIRDS):
-        yield (f"{name} third", *(_mean_count(plays, column, name, budget) for budget in plays.budgets))
+        yield (
+            f"{name} third",
+            *(_mean_count(plays, column, name, budget) for budget in plays.budgets),
+        )
     for ratio in (OVERALL, FIRST_SIGHTING):
         thirds = [Third(which, column, ratio) for which in (*reversed(SCENE_THIRDS), GAP)]
         yield (thirds[0].heading,)
@@ -129,16 +152,26 @@ def allocation_tables(plays: Plays) -> list[Table]:
     """How often every policy fires other cells than CARE, and how many; none without CARE."""
     if not plays.others:
         return []
-    asked = {name: text for name, text in ALLOCATIONS.items() if name in plays.others and text.among(plays.budgets)}
+    asked = {
+        name: text
+        for name, text in ALLOCATIONS.items()
+        if name in plays.others and text.among(plays.budgets)
+    }
     said = {} if plays.setting.conditions else asked
     lines: list[tuple[str, ...]] = []
     for policy in plays.others:
-        lines.append((marked(policy, plays.tags[policy]), *(_differing(plays, policy, b) for b in plays.budgets)))
+        lines.append(
+            (
+                marked(policy, plays.tags[policy]),
+                *(_differing(plays, policy, b) for b in plays.budgets),
+            )
+        )
         if policy in said:
             lines.append((PAPER, *said[policy].among(plays.budgets)))
     return [
         Table(
-            f"{plays.setting.label}: keyframes on which the allocation differs from that of {REFERENCE}",
+            f"{plays.setting.label}: keyframes on which the allocation differs from that of "
+            f"{REFERENCE}",
             ("policy", *map(percent, plays.budgets)),
             tuple(lines),
             (DIFFERING, *tag_notes(plays.tags.values())),
@@ -149,4 +182,8 @@ def allocation_tables(plays: Plays) -> list[Table]:
 
 def _differing(plays: Plays, policy: str, budget: float) -> str:
     found = plays.difference(policy, budget)
-    return f"{100 * found.share:.0f}%, {found.cells_where_differing:.0f} cells" if found.keyframes else ""
+    return (
+        f"{100 * found.share:.0f}%, {found.cells_where_differing:.0f} cells"
+        if found.keyframes
+        else ""
+    )

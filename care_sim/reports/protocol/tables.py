@@ -3,7 +3,14 @@
 from collections.abc import Callable, Collection, Sequence
 
 from care_sim.base.text import percent
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, Tallies, ratio_level
+from care_sim.evaluation.scene_contrasts import (
+    FIRST_SIGHTING,
+    OVERALL,
+    TTFD,
+    Ratio,
+    Tallies,
+    ratio_level,
+)
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import contrast_tables
 from care_sim.reports.protocol.differences import RATIOS
@@ -95,7 +102,8 @@ def _said_line(said: Level) -> tuple[str, ...]:
 
 def _of_full(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
     """Share of the ceiling in %, of the scenes that the policy and the full scan have."""
-    ours, full = plays.tallies(policy, budget), plays.tallies(FULL, 1.0)
+    ours = plays.tallies(policy, budget)
+    full = plays.tallies(FULL, 1.0)
     value, ceiling = (_over(ratio, tallies, set(ours) & set(full)) for tallies in (ours, full))
     return f"{100 * value / ceiling:.0f}" if value is not None and ceiling else ""
 

@@ -1,4 +1,6 @@
-"""The paper's ablations (Sec. 5.4) in the closed loop: one thing varied at a time, and a fixed table each."""
+"""The paper's ablations (Sec. 5.4) in the closed loop: one thing varied at a time, and a fixed
+table each.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,9 +16,15 @@ from care_sim.study.designs.levels import USUAL, Level, Place
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.task import Row
 
-PLACES = (Place("dartout", 0.03), Place("dartout", 0.10), Place("dense", 0.02), Place("dense", 0.03))
-"""The dart-out at the paper's tightest budget and at the one it reports, the dense street at the tightest and
-below: with more the reserve holds every wedge whole, and nothing that is varied here could show.
+PLACES = (
+    Place("dartout", 0.03),
+    Place("dartout", 0.10),
+    Place("dense", 0.02),
+    Place("dense", 0.03),
+)
+"""The dart-out at the paper's tightest budget and at the one it reports, the dense street at the
+tightest and below: with more the reserve holds every wedge whole, and nothing that is varied here
+could show.
 """
 OTHERS = ("history", "all-camera")
 LEVELS = ("level", "first detection m", "quartiles m", "braked")
@@ -50,11 +58,16 @@ def _margins(columns: int, rows: int) -> Level:
 
 def _rules(name: str, values: Iterable[float]) -> tuple[Level, ...]:
     default = getattr(ForgettingRules(), name)
-    return tuple(Level(f"{value:g}", parameters={} if value == default else {name: float(value)}) for value in values)
+    return tuple(
+        Level(f"{value:g}", parameters={} if value == default else {name: float(value)})
+        for value in values
+    )
 
 
 ABLATIONS = (
-    Ablation("reserve fraction rho", "care", _conditions("reserve_fraction", (0.15, 0.3, 0.5)), OTHERS),
+    Ablation(
+        "reserve fraction rho", "care", _conditions("reserve_fraction", (0.15, 0.3, 0.5)), OTHERS
+    ),
     Ablation(
         "angular margin of hulls and wedges, columns and rows",
         "care",
@@ -62,8 +75,18 @@ ABLATIONS = (
         OTHERS,
         ("Halved, the margin keeps its one row: there is no half of one.",),
     ),
-    Ablation("least confidence of the camera", "care", _conditions("camera_confidence", (0.25, 0.5)), OTHERS),
-    Ablation("age of the camera's detections, keyframes", "care", _conditions("camera_latency", (0, 1)), OTHERS),
+    Ablation(
+        "least confidence of the camera",
+        "care",
+        _conditions("camera_confidence", (0.25, 0.5)),
+        OTHERS,
+    ),
+    Ablation(
+        "age of the camera's detections, keyframes",
+        "care",
+        _conditions("camera_latency", (0, 1)),
+        OTHERS,
+    ),
     Ablation("seed of the shared floor", "care", _conditions("floor_seed", (0, 1, 2)), OTHERS),
     Ablation(
         "order of the reserve",
@@ -75,17 +98,30 @@ ABLATIONS = (
         ),
     ),
     Ablation(
-        "scale k_safe of the guard, 0: unguarded", "care-sbf", _rules("k_safe", (0, 0.25, 0.5, 1, 1.5, 2)), ("care",)
+        "scale k_safe of the guard, 0: unguarded",
+        "care-sbf",
+        _rules("k_safe", (0, 0.25, 0.5, 1, 1.5, 2)),
+        ("care",),
     ),
-    Ablation("localisation margin sigma_pos, m", "care-sbf", _rules("position_sigma_m", (0, 0.2, 0.4, 0.8)), ("care",)),
     Ablation(
-        "margin forgotten a keyframe, columns", "care-sbf", _rules("decay_per_keyframe", (0.25, 0.5, 1, 2)), ("care",)
+        "localisation margin sigma_pos, m",
+        "care-sbf",
+        _rules("position_sigma_m", (0, 0.2, 0.4, 0.8)),
+        ("care",),
+    ),
+    Ablation(
+        "margin forgotten a keyframe, columns",
+        "care-sbf",
+        _rules("decay_per_keyframe", (0.25, 0.5, 1, 2)),
+        ("care",),
     ),
 )
 
 
 def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """Every ablation in every place, and the full scan; `also` are further policies that feel the conditions."""
+    """Every ablation in every place, and the full scan; `also` are further policies that feel the
+    conditions.
+    """
     made = [config for place in PLACES for config in USUAL.configurations(place, ["full"], seeds)]
     for place, ablation in product(PLACES, ABLATIONS):
         beside = [*ablation.references, *(also if ablation.varies_conditions else ())]
@@ -107,10 +143,14 @@ def _table(ablation: Ablation, played: Played) -> Table:
     lines = [line for place in PLACES for line in _block(ablation, place, beside, played)]
     hidden = (*LEVELS[2:], *columns[len(LEVELS) + 1 + MOST_SHOWN :])
     notes = (*ablation.notes, *played.notes(beside))
-    return Table(f"{ablation.policy}: {ablation.title}", columns, tuple(lines), notes, (), hidden, LEVELS)
+    return Table(
+        f"{ablation.policy}: {ablation.title}", columns, tuple(lines), notes, (), hidden, LEVELS
+    )
 
 
-def _block(ablation: Ablation, place: Place, beside: Sequence[str], played: Played) -> Iterator[tuple[str, ...]]:
+def _block(
+    ablation: Ablation, place: Place, beside: Sequence[str], played: Played
+) -> Iterator[tuple[str, ...]]:
     yield (str(place),)
     usual = USUAL.key(place, ablation.policy)
     for level in ablation.levels:
@@ -118,18 +158,30 @@ def _block(ablation: Ablation, place: Place, beside: Sequence[str], played: Play
         others = (level.for_others().key(place, policy) for policy in beside)
         name = f"{level.label} (usual)" if ours == usual else level.label
         change = "" if ours == usual else interval(played.difference(ours, usual))
-        yield (name, *_levels(played.cell(ours)), change, *(interval(played.difference(ours, o)) for o in others))
+        yield (
+            name,
+            *_levels(played.cell(ours)),
+            change,
+            *(interval(played.difference(ours, o)) for o in others),
+        )
 
 
 def _beside(ablation: Ablation, played: Played) -> list[str]:
-    """The references, and the further policies that were played where the conditions depart from the usual."""
+    """The references, and the further policies that were played where the conditions depart from
+    the usual.
+    """
     known = (ablation.policy, *ablation.references, "full")
     usual = USUAL.key(PLACES[0], "care")
-    levels = [other for other in map(Level.for_others, ablation.levels) if other.key(PLACES[0], "care") != usual]
+    levels = [
+        other
+        for other in map(Level.for_others, ablation.levels)
+        if other.key(PLACES[0], "care") != usual
+    ]
     joined = [
         policy
         for policy in played.policies
-        if policy not in known and any(played.has(o.key(p, policy)) for o, p in product(levels, PLACES))
+        if policy not in known
+        and any(played.has(o.key(p, policy)) for o, p in product(levels, PLACES))
     ]
     return [*ablation.references, *joined]
 

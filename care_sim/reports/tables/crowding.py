@@ -1,4 +1,6 @@
-"""Where the all-camera reserve collapses as the number of tracked vehicles in the dense street grows."""
+"""Where the all-camera reserve collapses as the number of tracked vehicles in the dense street
+grows.
+"""
 
 from collections.abc import Sequence
 
@@ -19,11 +21,14 @@ COLUMN = "scenario.vehicles"
 """The column of the rows that the study varies."""
 TITLE = "dense, by standing vehicles: "
 COLLAPSE_M = 3.0
-"""All-camera counts as collapsed where CARE detects this much earlier and the interval excludes zero."""
+"""All-camera counts as collapsed where CARE detects this much earlier and the interval excludes
+zero.
+"""
 
 
 def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221 configurations a seed.
+    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221
+    configurations a seed.
 
     `also` are further policies.
     """
@@ -31,7 +36,9 @@ def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     return [
         config
         for vehicles in VEHICLES
-        for config in grid(["dense"], policies, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),))
+        for config in grid(
+            ["dense"], policies, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),)
+        )
     ]
 
 
@@ -42,15 +49,22 @@ class Crowd:
         self.played = Played(rows)
         self.counts = sorted({row[COLUMN] for row in rows})
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != "full"})
-        self.others = ["all-camera", *(policy for policy in self.played.policies if policy not in POLICIES)]
+        self.others = [
+            "all-camera",
+            *(policy for policy in self.played.policies if policy not in POLICIES),
+        ]
 
     def key(self, vehicles: int, policy: str, budget: float) -> Key:
         """Where the rows are found."""
         return key_of({"scenario": "dense", "policy": policy, "budget": budget, COLUMN: vehicles})
 
     def gap(self, vehicles: int, budget: float, other: str = "all-camera") -> Contrast | None:
-        """First detection of another policy minus that of CARE, metres; negative where the other is later."""
-        return self.played.difference(self.key(vehicles, other, budget), self.key(vehicles, "care", budget))
+        """First detection of another policy minus that of CARE, metres; negative where the other is
+        later.
+        """
+        return self.played.difference(
+            self.key(vehicles, other, budget), self.key(vehicles, "care", budget)
+        )
 
     def median(self, vehicles: int, policy: str, budget: float) -> str:
         """A median first detection, as text."""
@@ -61,36 +75,65 @@ class Crowd:
         """Numbers of vehicles at which all-camera has collapsed."""
         gaps = {vehicles: self.gap(vehicles, budget) for vehicles in self.counts}
         return [
-            n for n, gap in gaps.items() if gap and gap.excludes_zero and gap.difference.cautious.mean <= -COLLAPSE_M
+            n
+            for n, gap in gaps.items()
+            if gap and gap.excludes_zero and gap.difference.cautious.mean <= -COLLAPSE_M
         ]
 
 
 def crowding_tables(rows: Sequence[Row]) -> list[Table]:
-    """What all-camera, and every further policy, has less than CARE by standing vehicles and budget: differences,
-    intervals, and the medians behind them.
+    """What all-camera, and every further policy, has less than CARE by standing vehicles and
+    budget: differences, intervals, and the medians behind them.
     """
     crowd = Crowd(rows)
-    gaps = [_gaps_table(crowd, other, intervals) for other in crowd.others for intervals in (False, True)]
+    gaps = [
+        _gaps_table(crowd, other, intervals)
+        for other in crowd.others
+        for intervals in (False, True)
+    ]
     return [*gaps, _medians_table(crowd)]
 
 
 def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
     entry, more = (interval, ", with intervals") if intervals else (mean, "")
-    lines = [(str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets)) for n in crowd.counts]
+    lines = [
+        (str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets))
+        for n in crowd.counts
+    ]
     title = f"{TITLE}first detection of {crowd.played.marked(other)} minus care, m{more}"
-    notes = (_collapse_note(crowd),) if other == "all-camera" and not intervals else crowd.played.notes([other])
-    return Table(title, ("vehicles", *map(percent, crowd.budgets)), tuple(lines), notes, terminal=not intervals)
+    notes = (
+        (_collapse_note(crowd),)
+        if other == "all-camera" and not intervals
+        else crowd.played.notes([other])
+    )
+    return Table(
+        title,
+        ("vehicles", *map(percent, crowd.budgets)),
+        tuple(lines),
+        notes,
+        terminal=not intervals,
+    )
 
 
 def _medians_table(crowd: Crowd) -> Table:
     policies = ["care", *crowd.others]
     lines = [
-        (str(n), *(_medians(crowd, n, policies, budget) for budget in crowd.budgets), crowd.median(n, "full", 1.0))
+        (
+            str(n),
+            *(_medians(crowd, n, policies, budget) for budget in crowd.budgets),
+            crowd.median(n, "full", 1.0),
+        )
         for n in crowd.counts
     ]
     title = f"{TITLE}median first detection, {'/'.join(map(crowd.played.marked, policies))}, m"
     columns = ("vehicles", *map(percent, crowd.budgets), "full")
-    return Table(title, columns, tuple(lines), ("n.d.: not detected.", *crowd.played.notes(policies)), terminal=False)
+    return Table(
+        title,
+        columns,
+        tuple(lines),
+        ("n.d.: not detected.", *crowd.played.notes(policies)),
+        terminal=False,
+    )
 
 
 def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:
@@ -100,8 +143,10 @@ def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float
 
 def _collapse_note(crowd: Crowd) -> str:
     found = [(percent(budget), crowd.collapsed(budget)) for budget in crowd.budgets]
-    listed = "; ".join(f"{budget}: {', '.join(map(str, counts)) or 'none'}" for budget, counts in found)
+    listed = "; ".join(
+        f"{budget}: {', '.join(map(str, counts)) or 'none'}" for budget, counts in found
+    )
     return (
-        f"All-camera has collapsed (at least {COLLAPSE_M:.0f} m later than care on average, interval without zero), by "
-        f"budget, at these numbers of vehicles: {listed}."
+        f"All-camera has collapsed (at least {COLLAPSE_M:.0f} m later than care on average, "
+        f"interval without zero), by budget, at these numbers of vehicles: {listed}."
     )

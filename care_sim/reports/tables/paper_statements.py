@@ -1,7 +1,8 @@
-"""Every statement of the paper's Sec. 5.6 beside what a study measured, as pure functions of its rows.
+"""Every statement of the paper's Sec. 5.6 beside what a study measured, as pure functions of its
+rows.
 
-Numbers are medians in metres; a median that is not detected ranks below every other. Statements that the paper
-makes in words are put as a bound, which they name.
+Numbers are medians in metres; a median that is not detected ranks below every other. Statements
+that the paper makes in words are put as a bound, which they name.
 """
 
 import math
@@ -37,7 +38,13 @@ def statements(rows: Sequence[Row]) -> list[Statement]:
     if not paper_cells() <= set(found):
         return []
     cells = {_key(cell): cell for key, cell in found.items() if key in paper_cells()}
-    return [*_dartout(cells), *_dense(cells), _cutin(cells), *_faults(cells), _collisions(list(cells.values()))]
+    return [
+        *_dartout(cells),
+        *_dense(cells),
+        _cutin(cells),
+        *_faults(cells),
+        _collisions(list(cells.values())),
+    ]
 
 
 def _key(cell: Cell) -> tuple[str, str, float, str]:
@@ -47,7 +54,8 @@ def _key(cell: Cell) -> tuple[str, str, float, str]:
 
 def _dartout(cells: Cells) -> list[Statement]:
     camera = [cells["dartout", policy, 0.1, ""] for policy in CAMERA_POLICIES]
-    history, full = cells["dartout", "history", 0.1, ""], cells["dartout", "full", 1.0, ""]
+    history = cells["dartout", "history", 0.1, ""]
+    full = cells["dartout", "full", 1.0, ""]
     gaps = [_gap(cell, full) for cell in camera]
     passes = [_pass(cell) for cell in camera]
     latest = min(camera, key=_median)
@@ -87,8 +95,13 @@ def _dartout(cells: Cells) -> list[Statement]:
 
 
 def _dense(cells: Cells) -> list[Statement]:
-    care, camera, full = (cells["dense", p, b, ""] for p, b in (("care", 0.03), ("all-camera", 0.03), ("full", 1.0)))
-    pairs = [(cells["dense", "all-camera", b, ""], cells["dense", "care", b, ""]) for b in (0.05, 0.1, 0.2)]
+    care, camera, full = (
+        cells["dense", p, b, ""] for p, b in (("care", 0.03), ("all-camera", 0.03), ("full", 1.0))
+    )
+    pairs = [
+        (cells["dense", "all-camera", b, ""], cells["dense", "care", b, ""])
+        for b in (0.05, 0.1, 0.2)
+    ]
     return [
         Statement(
             "dense 3%: care detects within 0.5 m of full",
@@ -105,7 +118,9 @@ def _dense(cells: Cells) -> list[Statement]:
         Statement(
             "dense from 5%: all-camera and care within 0.5 m of each other",
             "they converge",
-            ", ".join(f"{_shown(a)} against {_shown(b)} at {100 * a.budget:.0f}%" for a, b in pairs),
+            ", ".join(
+                f"{_shown(a)} against {_shown(b)} at {100 * a.budget:.0f}%" for a, b in pairs
+            ),
             all(_gap(a, b) <= 0.5 for a, b in pairs),
         ),
     ]
@@ -113,16 +128,29 @@ def _dense(cells: Cells) -> list[Statement]:
 
 def _cutin(cells: Cells) -> Statement:
     group = [cell for cell in cells.values() if cell.setting.scenario == "cutin"]
-    first, last = max(group, key=_median), min(group, key=_median)
-    return Statement("cut-in: all policies within 1 m", "no separation", _list(group), _gap(first, last) <= 1.0)
+    first = max(group, key=_median)
+    last = min(group, key=_median)
+    return Statement(
+        "cut-in: all policies within 1 m", "no separation", _list(group), _gap(first, last) <= 1.0
+    )
 
 
 def _faults(cells: Cells) -> list[Statement]:
-    """A camera policy may not fall behind history, which asks no camera and so is its faultless self under latency."""
+    """A camera policy may not fall behind history, which asks no camera and so is its faultless
+    self under latency.
+    """
     made = []
-    for text, name in (("missed detections up to 0.4", "false_negative_rate"), ("latency up to 2", "camera_latency")):
-        faults = [fault for _, policy, _, fault in cells if fault.startswith(name) and policy == "care"]
-        pairs = [(_slowest(cells, f), cells.get(("dartout", "history", 0.1, f), _history(cells))) for f in faults]
+    for text, name in (
+        ("missed detections up to 0.4", "false_negative_rate"),
+        ("latency up to 2", "camera_latency"),
+    ):
+        faults = [
+            fault for _, policy, _, fault in cells if fault.startswith(name) and policy == "care"
+        ]
+        pairs = [
+            (_slowest(cells, f), cells.get(("dartout", "history", 0.1, f), _history(cells)))
+            for f in faults
+        ]
         measured = (f"{_shown(a)} against {_shown(b)}" for a, b in pairs)
         agrees = all(_median(a) > _median(b) for a, b in pairs)
         said = f"dart-out 10%: {text} leaves every camera policy before history"
@@ -140,7 +168,9 @@ def _history(cells: Cells) -> Cell:
 
 def _collisions(cells: Sequence[Cell]) -> Statement:
     collided = sum(cell.collisions for cell in cells)
-    return Statement("no episode collides", "0", f"{collided} of {sum(c.episodes for c in cells)}", not collided)
+    return Statement(
+        "no episode collides", "0", f"{collided} of {sum(c.episodes for c in cells)}", not collided
+    )
 
 
 def _median(cell: Cell) -> float:

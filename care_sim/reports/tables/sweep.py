@@ -1,4 +1,6 @@
-"""Tables of a sweep: in every setting the levels of all policies, then what CARE and the learned have over each."""
+"""Tables of a sweep: in every setting the levels of all policies, then what CARE and the learned
+have over each.
+"""
 
 from collections.abc import Sequence
 
@@ -33,7 +35,8 @@ WHOLE = tuple(column for column in COLUMNS if column not in ("policy", "paper"))
 
 def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     """Levels and contrasts, one setting after the other."""
-    cells, groups = summarise(rows), grouped(rows)
+    cells = summarise(rows)
+    groups = grouped(rows)
     tables = []
     for setting in dict.fromkeys(cell.setting for cell in cells):
         own = [cell for cell in cells if cell.setting == setting]
@@ -54,15 +57,23 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
 
 
 def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
-    """CARE minus every other policy, then the same of every learned one; none for a policy that ran alone."""
-    tags = {cell.policy: cell.tags for cell in cells} | ({FULL: ()} if full_of(groups, setting) else {})
+    """CARE minus every other policy, then the same of every learned one; none for a policy that ran
+    alone.
+    """
+    tags = {cell.policy: cell.tags for cell in cells} | (
+        {FULL: ()} if full_of(groups, setting) else {}
+    )
     learned = [policy for policy in tags if "learned" in tags[policy]]
     named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
     return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
 
 
 def _contrast_table(
-    setting: Setting, reference: str, cells: Sequence[Cell], groups: Groups, tags: dict[str, tuple[str, ...]]
+    setting: Setting,
+    reference: str,
+    cells: Sequence[Cell],
+    groups: Groups,
+    tags: dict[str, tuple[str, ...]],
 ) -> Table:
     """The reference minus the others, policies by budgets, a block a measure."""
     budgets = sorted({cell.budget for cell in cells if cell.policy == reference})
@@ -70,17 +81,30 @@ def _contrast_table(
     for measure in (DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])):
         lines.append((f"{measure.name}, {measure.unit}",))
         for policy in (policy for policy in tags if policy != reference):
-            pairs = [((setting, reference, budget), (setting, policy, budget)) for budget in budgets]
-            lines.append((marked(policy, tags[policy]), *(interval(_ahead(measure, *pair, groups)) for pair in pairs)))
+            pairs = [
+                ((setting, reference, budget), (setting, policy, budget)) for budget in budgets
+            ]
+            lines.append(
+                (
+                    marked(policy, tags[policy]),
+                    *(interval(_ahead(measure, *pair, groups)) for pair in pairs),
+                )
+            )
     columns = (f"{reference} minus", *map(percent, budgets))
     title = f"{setting.label}: {reference} minus each policy"
-    return Table(title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1])
+    return Table(
+        title, columns, tuple(lines), tag_notes(cell.tags for cell in cells), whole=columns[:1]
+    )
 
 
 def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast | None:
     """What a policy has over another at the same budget, or over the full scan."""
     setting, policy, _ = theirs
-    return contrast(measure, groups.get(ours), full_of(groups, setting) if policy == FULL else groups.get(theirs))
+    return contrast(
+        measure,
+        groups.get(ours),
+        full_of(groups, setting) if policy == FULL else groups.get(theirs),
+    )
 
 
 def _published(cell: Cell) -> Published | None:
@@ -113,4 +137,6 @@ def _share(count: int, cell: Cell) -> str:
 def _median(values: Quartiles | None, cell: Cell) -> str:
     if values is None:
         return "never in view"
-    return f"{values.median:.1f}" + (f" (of {values.count})" if values.count < cell.episodes else "")
+    return f"{values.median:.1f}" + (
+        f" (of {values.count})" if values.count < cell.episodes else ""
+    )

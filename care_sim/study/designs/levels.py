@@ -22,7 +22,8 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Level:
-    """One value of what is varied: fields of `EpisodeConfig` that depart from the usual, or parameters of the policy.
+    """One value of what is varied: fields of `EpisodeConfig` that depart from the usual, or
+    parameters of the policy.
 
     `policy` plays instead of the study's own where the level is another policy.
     """
@@ -32,10 +33,18 @@ class Level:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     policy: str | None = None
 
-    def configurations(self, place: Place, policies: Iterable[str], seeds: Sequence[int]) -> list[EpisodeConfig]:
+    def configurations(
+        self, place: Place, policies: Iterable[str], seeds: Sequence[int]
+    ) -> list[EpisodeConfig]:
         """The episodes of this level; `full` runs once for all that it does not feel."""
         given = {**self.changes, "policy_parameters": tuple(self.parameters.items())}
-        return grid([place.scenario], [self.policy or policy for policy in policies], [place.budget], seeds, **given)
+        return grid(
+            [place.scenario],
+            [self.policy or policy for policy in policies],
+            [place.budget],
+            seeds,
+            **given,
+        )
 
     def for_others(self) -> "Level":
         """The same conditions for policies that lack the parameters."""
@@ -43,8 +52,16 @@ class Level:
 
     def key(self, place: Place, policy: str) -> Key:
         """Where `care_sim.reports.summary` keeps the rows of a policy at this level."""
-        row: Row = {"scenario": place.scenario, "policy": self.policy or policy, "budget": place.budget}
-        key = key_of(row | dict(self.changes) | {f"policy.{name}": value for name, value in self.parameters.items()})
+        row: Row = {
+            "scenario": place.scenario,
+            "policy": self.policy or policy,
+            "budget": place.budget,
+        }
+        key = key_of(
+            row
+            | dict(self.changes)
+            | {f"policy.{name}": value for name, value in self.parameters.items()}
+        )
         return (key[0].for_full(), "full", 1.0) if policy == "full" else key
 
 

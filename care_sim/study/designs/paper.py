@@ -1,4 +1,6 @@
-"""The closed-loop study of the paper (Sec. 5.6): its 49 configurations, and the figures it published."""
+"""The closed-loop study of the paper (Sec. 5.6): its 49 configurations, and the figures it
+published.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +15,12 @@ ALL = (*BUDGETED, "full")
 
 
 def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """The episodes of the study, 49 a seed; five seeds give the paper's 245. `also` are further policies.
+    """The episodes of the study, 49 a seed; five seeds give the paper's 245. `also` are further
+    policies.
 
-    The paper states the total, the scenes and the conditions; this split is ours: budgets on the dense
-    street (17) and in the dart-out (13), the cut-in (5), missed detections (8) and camera latency (6).
+    The paper states the total, the scenes and the conditions; this split is ours: budgets on the
+    dense street (17) and in the dart-out (13), the cut-in (5), missed detections (8) and camera
+    latency (6).
     """
     policies = list(dict.fromkeys([*ALL, *also]))
     impaired = [policy for policy in policies if policy != "full"]
@@ -38,7 +42,8 @@ def paper_cells() -> frozenset[Key]:
 
 @dataclass(frozen=True)
 class Published:
-    """What the paper says of some cells of the study: a `figure` for the tables, and its `sentence`.
+    """What the paper says of some cells of the study: a `figure` for the tables, and its
+    `sentence`.
 
     A figure gives the first detection in metres, then the share of episodes with braking.
     """
@@ -57,23 +62,26 @@ class Published:
 
 
 _DARTOUT = (
-    "When a pedestrian darts out from behind a parked vehicle, at the 10% budget the camera policies detect it at "
-    "about 15 m, brake in every episode, and pass at 5.7 m or more; history detects at 11.9 m, brakes in three of "
-    "its five episodes, and passes at 4.0 m."
+    "When a pedestrian darts out from behind a parked vehicle, at the 10% budget the camera "
+    "policies detect it at about 15 m, brake in every episode, and pass at 5.7 m or more; history "
+    "detects at 11.9 m, brakes in three of its five episodes, and passes at 4.0 m."
 )
 _DENSE = (
-    "In the dense scene of Figure 5, at 3% CARE detects the crosser at 15.1 m, the full-scan bound, while the "
-    "all-camera reserve spreads over the tracked vehicles and detects at 10.3 m; they converge from 5% upward."
+    "In the dense scene of Figure 5, at 3% CARE detects the crosser at 15.1 m, the full-scan "
+    "bound, while the all-camera reserve spreads over the tracked vehicles and detects at 10.3 m; "
+    "they converge from 5% upward."
 )
 _CAPTION = (
-    "The all-camera reserve collapses at 3%, spread over the five tracked vehicles; CARE and CARE+SBF match the "
-    "full-scan bound throughout, so the three top curves coincide."
+    "The all-camera reserve collapses at 3%, spread over the five tracked vehicles; CARE and "
+    "CARE+SBF match the full-scan bound throughout, so the three top curves coincide."
 )
 _CUTIN = (
-    "A vehicle cut-in shows no separation, since a large vehicle returns enough points even when starved: the "
-    "camera cue matters for small or sparse first sightings."
+    "A vehicle cut-in shows no separation, since a large vehicle returns enough points even when "
+    "starved: the camera cue matters for small or sparse first sightings."
 )
-_FAULTS = "At 10%, false-negative rates up to 0.4 and a two-frame latency leave the ordering unchanged."
+_FAULTS = (
+    "At 10%, false-negative rates up to 0.4 and a two-frame latency leave the ordering unchanged."
+)
 NO_COLLISION = "No episode collides under the fixed physics, so we report detection and braking."
 
 PUBLISHED = (
@@ -92,4 +100,6 @@ PUBLISHED = (
 
 def published(scenario: str, policy: str, budget: float, faults: bool) -> Published | None:
     """What the paper reports for a cell of its study, if anything."""
-    return next((entry for entry in PUBLISHED if entry.covers(scenario, policy, budget, faults)), None)
+    return next(
+        (entry for entry in PUBLISHED if entry.covers(scenario, policy, budget, faults)), None
+    )

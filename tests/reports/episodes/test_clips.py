@@ -1,4 +1,6 @@
-"""Clips read back: how many pictures, how long each, what they show; and that filming changes nothing."""
+"""Clips read back: how many pictures, how long each, what they show; and that filming changes
+nothing.
+"""
 
 import re
 import sys
@@ -39,7 +41,10 @@ def frames_of(path):
         return [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in reader]
     with Image.open(path) as clip:
         assert clip.info["loop"] == 0
-        shown = [(np.asarray(frame.convert("RGB")), frame.info["duration"]) for frame in ImageSequence.Iterator(clip)]
+        shown = [
+            (np.asarray(frame.convert("RGB")), frame.info["duration"])
+            for frame in ImageSequence.Iterator(clip)
+        ]
     return [frame for frame, duration in shown for _ in range(round(duration / 100))]
 
 
@@ -56,8 +61,12 @@ def test_a_clip_shows_every_picture_in_turn_and_holds_the_last(ending, tmp_path)
         assert np.abs(frame.reshape(-1, 3).mean(axis=0) - colour).max() < 12
 
 
-def test_a_clip_that_cannot_be_written_is_refused_before_an_episode_is_played(tmp_path, monkeypatch):
-    with pytest.raises(InvalidInput, match=r"unknown ending of a clip '\.avi'; known: \.gif, \.mp4, \.png, \.webp"):
+def test_a_clip_that_cannot_be_written_is_refused_before_an_episode_is_played(
+    tmp_path, monkeypatch
+):
+    with pytest.raises(
+        InvalidInput, match=r"unknown ending of a clip '\.avi'; known: \.gif, \.mp4, \.png, \.webp"
+    ):
         Film(tmp_path / "clip.avi")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtra, match=r"extra 'video': pip install 'care-sim\[video\]'"):
@@ -117,7 +126,17 @@ def test_a_policy_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, capsy
 def test_what_was_played_is_printed_when_the_rest_is_interrupted(monkeypatch, capsys):
     care_fails_with(KeyboardInterrupt, monkeypatch)
     with pytest.raises(SystemExit) as end:
-        main(["compare", "dartout", "--policies", "history", "care", "--scenario-parameters", "duration_s=0.4"])
+        main(
+            [
+                "compare",
+                "dartout",
+                "--policies",
+                "history",
+                "care",
+                "--scenario-parameters",
+                "duration_s=0.4",
+            ]
+        )
     assert end.value.code == 130
     assert re.findall("^ ?(history|care) ", capsys.readouterr().out, re.M) == ["history"]
 
@@ -137,16 +156,32 @@ def test_episodes_side_by_side_end_together(tmp_path, capsys):
     with Image.open(tmp_path / "clip.png") as clip:
         pictures = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(clip)]
     assert len(pictures) == 4
-    left, right = zip(*((each[:, : panel.WIDTH], each[:, -panel.WIDTH :]) for each in pictures), strict=True)
+    left, right = zip(
+        *((each[:, : panel.WIDTH], each[:, -panel.WIDTH :]) for each in pictures), strict=True
+    )
     assert np.array_equal(left[1], left[3])
     assert not np.array_equal(left[0], left[1])
     assert not np.array_equal(right[1], right[3])
 
 
 def keyframes(*states, distance_m=20.0):
-    """A record a tenth of a second from (in view, detected), the person 1 m nearer each time, clearance 2 m less."""
+    """A record a tenth of a second from (in view, detected), the person 1 m nearer each time,
+    clearance 2 m less.
+    """
     return [
-        Keyframe(n, 0.1 * n, np.arange(9), seen, found, found, 8.0, distance, distance, distance - 2.0, None)
+        Keyframe(
+            n,
+            0.1 * n,
+            np.arange(9),
+            seen,
+            found,
+            found,
+            8.0,
+            distance,
+            distance,
+            distance - 2.0,
+            None,
+        )
         for n, ((seen, found), distance) in enumerate(
             zip(states, accumulate(states, lambda d, _: d - 1.0, initial=distance_m), strict=False)
         )
@@ -159,7 +194,10 @@ def test_the_verdict_of_a_panel():
     assert panel.verdict(keyframes(hidden, seen, seen), 0.1)[0] == "in view for 0.2 s, not detected"
     late = panel.verdict(keyframes(hidden, seen, seen, found, found), 0.1)
     assert late == ("detected at 17.0 m, 0.2 s late; least clearance 14.0 m", picture.DETECTED)
-    assert panel.verdict(keyframes(hidden, found), 0.1)[0] == "detected at 19.0 m; least clearance 17.0 m"
+    assert (
+        panel.verdict(keyframes(hidden, found), 0.1)[0]
+        == "detected at 19.0 m; least clearance 17.0 m"
+    )
 
 
 def test_gymnasiums_wrapper_records_a_video(tmp_path):

@@ -4,7 +4,9 @@ from care_sim.reports.episodes.timeline import eventful
 
 
 def frame(number, braking):
-    return SimpleNamespace(index=number, in_view=False, detected=False, braking=braking, impact_speed_mps=None)
+    return SimpleNamespace(
+        index=number, in_view=False, detected=False, braking=braking, impact_speed_mps=None
+    )
 
 
 def test_only_the_keyframes_about_a_change_are_shown():

@@ -7,11 +7,16 @@ from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.figures.styles import styles
 from tests.helpers.made_rows import CROWD, STUDY, rows
 
-SWEEP = [*STUDY, *rows("history", [None, None, None, 8.0, 9.0], budget=0.1), *rows("care", [15.0] * 5, budget=0.1)]
+SWEEP = [
+    *STUDY,
+    *rows("history", [None, None, None, 8.0, 9.0], budget=0.1),
+    *rows("care", [15.0] * 5, budget=0.1),
+]
 
 
 @pytest.mark.parametrize(
-    ("draw", "study", "name"), [(sweep_figures, SWEEP, "dense-budget"), (crowding_figures, CROWD, "crowding")]
+    ("draw", "study", "name"),
+    [(sweep_figures, SWEEP, "dense-budget"), (crowding_figures, CROWD, "crowding")],
 )
 def test_figures_are_written_the_same_every_time(draw, study, name, tmp_path):
     figures = draw(study)
@@ -29,7 +34,12 @@ def test_one_budget_makes_no_curve():
 
 def test_the_figure_names_its_curves():
     (legend,) = sweep_figures(SWEEP)["dense-budget"].legends
-    assert [text.get_text() for text in legend.get_texts()] == ["full scan", "care", "all-camera", "history"]
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "full scan",
+        "care",
+        "all-camera",
+        "history",
+    ]
 
 
 def test_a_median_that_is_not_detected_is_an_open_marker_at_the_bottom_with_the_count():
@@ -43,11 +53,25 @@ def test_a_median_that_is_not_detected_is_an_open_marker_at_the_bottom_with_the_
 
 
 def test_every_policy_looks_different_and_those_no_car_can_have_are_dashed():
-    names = ("history", "all-camera", "care", "care-sbf", "care-priority", "uncertainty", "random", "beam-reduce")
-    drawn = styles([(name, ("causal",)) for name in (*names, "history-uniform", "installed", "another")])
+    names = (
+        "history",
+        "all-camera",
+        "care",
+        "care-sbf",
+        "care-priority",
+        "uncertainty",
+        "random",
+        "beam-reduce",
+    )
+    drawn = styles(
+        [(name, ("causal",)) for name in (*names, "history-uniform", "installed", "another")]
+    )
     drawn |= styles([("history-oracle", ("privileged",)), ("random-points", ("non-causal",))])
     assert len({(style.colour, style.marker) for style in drawn.values()}) == len(drawn) == 13
-    assert [name for name, style in drawn.items() if style.line != "-"] == ["history-oracle", "random-points"]
+    assert [name for name, style in drawn.items() if style.line != "-"] == [
+        "history-oracle",
+        "random-points",
+    ]
 
 
 def test_the_heat_map_has_a_number_in_every_cell_and_frames_the_collapse():
@@ -61,4 +85,10 @@ def test_only_figures_of_known_names_are_removed(tmp_path):
     for name in ("a.png", "a.svg", "b.png", "mine.png", "c-1.png", "c-2.svg", "c-1.txt", "c.png"):
         (tmp_path / name).touch()
     remove_others(tmp_path, ["a", "b", "c-*"], kept={"b", "c-2"})
-    assert {path.name for path in tmp_path.iterdir()} == {"b.png", "mine.png", "c-2.svg", "c-1.txt", "c.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "b.png",
+        "mine.png",
+        "c-2.svg",
+        "c-1.txt",
+        "c.png",
+    }

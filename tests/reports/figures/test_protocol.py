@@ -12,12 +12,22 @@ from care_sim.reports.figures.protocol import FIGURE_NAMES, protocol_figures
 from care_sim.reports.figures.protocol_frontier import frontier
 from tests.helpers.made_plays import study
 
-FOUND = {"history": (4, 6), "care": (6, 5), "beam-reduce": (5, 2), "history-oracle": (7, 7), "full": (8, 8)}
+FOUND = {
+    "history": (4, 6),
+    "care": (6, 5),
+    "beam-reduce": (5, 2),
+    "history-oracle": (7, 7),
+    "full": (8, 8),
+}
 ROWS = study(FOUND)
 
 
 def test_every_setting_has_its_figures_and_their_names_are_known():
-    rows = [*ROWS, *study(FOUND, camera_latency=1, budgets=(0.1,)), *study({"full": (8, 8)}, source="nuscenes")]
+    rows = [
+        *ROWS,
+        *study(FOUND, camera_latency=1, budgets=(0.1,)),
+        *study({"full": (8, 8)}, source="nuscenes"),
+    ]
     figures = protocol_figures(rows)
     assert list(figures) == ["pareto-streets", "levels-streets", "pareto-streets-camera-latency-1"]
     assert all(any(fnmatch(name, pattern) for pattern in FIGURE_NAMES) for name in figures)
@@ -35,7 +45,11 @@ def test_figures_are_written_the_same_every_time(name, tmp_path):
 
 def test_a_panel_a_budget_and_a_staircase_over_what_a_car_can_have():
     figure = protocol_figures(ROWS)["pareto-streets"]
-    assert [axes.get_title(loc="left") for axes in figure.axes] == ["budget 10%", "budget 20%", "budget 35%"]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        "budget 10%",
+        "budget 20%",
+        "budget 35%",
+    ]
     axes = figure.axes[0]
     markers = {line.get_label(): (*line.get_xdata(), *line.get_ydata()) for line in axes.lines[:-1]}
     assert markers == {
@@ -47,7 +61,9 @@ def test_a_panel_a_budget_and_a_staircase_over_what_a_car_can_have():
     stairs = axes.lines[-1]
     assert stairs.get_drawstyle() == "steps-pre"
     left, low = axes.get_xlim()[0], axes.get_ylim()[0]
-    assert np.array_equal(stairs.get_xydata(), [(left, 30.0), (50.0, 30.0), (60.0, 20.0), (60.0, low)])
+    assert np.array_equal(
+        stairs.get_xydata(), [(left, 30.0), (50.0, 30.0), (60.0, 20.0), (60.0, low)]
+    )
     assert "full scan: 40.0% of first sightings, 80.0% overall" in figure.get_supxlabel()
 
 
@@ -60,7 +76,11 @@ def test_levels_have_a_line_a_policy_and_the_full_scan():
     care = next(line for line in first.lines if line.get_label() == "care")
     assert list(care.get_ydata()) == [30.0] * 3
     assert list(overall.lines[0].get_ydata()) == [80.0, 80.0]
-    said = {line.get_label(): list(line.get_ydata()) for line in overall.lines if "paper" in line.get_label()}
+    said = {
+        line.get_label(): list(line.get_ydata())
+        for line in overall.lines
+        if "paper" in line.get_label()
+    }
     assert said["paper: full scan"] == [49.4, 49.4]
     assert said["paper: care"] == [pytest.approx(0.94 * 49.4)]
     strict = [row | {"camera_latency": 1} for row in ROWS]
@@ -69,7 +89,9 @@ def test_levels_have_a_line_a_policy_and_the_full_scan():
 
 
 def test_the_levels_say_that_policies_are_moved_apart():
-    figure, alone = (protocol_figures(study(found))["levels-streets"] for found in (FOUND, {"care": (6, 5)}))
+    figure, alone = (
+        protocol_figures(study(found))["levels-streets"] for found in (FOUND, {"care": (6, 5)})
+    )
     first, second = (line.get_xdata() for line in figure.axes[0].lines[1:3])
     assert second[0] - first[0] == pytest.approx(0.025 * 0.1)
     said = "policies are drawn a little apart sideways, so that equal points stay visible"
@@ -77,7 +99,9 @@ def test_the_levels_say_that_policies_are_moved_apart():
     assert said not in alone.get_supxlabel()
 
 
-POINTS = st.dictionaries(st.text("abcdefgh", min_size=1), st.tuples(*[st.integers(0, 9)] * 2), min_size=1)
+POINTS = st.dictionaries(
+    st.text("abcdefgh", min_size=1), st.tuples(*[st.integers(0, 9)] * 2), min_size=1
+)
 
 
 @given(POINTS)

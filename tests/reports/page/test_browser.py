@@ -24,9 +24,13 @@ from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 from tests.helpers.places import ROOT
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="the browser tests need the PyPI package playwright")
+sync_api = pytest.importorskip(
+    "playwright.sync_api", reason="the browser tests need the PyPI package playwright"
+)
 CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="the browser tests need Chromium: apt-get install chromium")
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="the browser tests need Chromium: apt-get install chromium"
+)
 
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 MOST_BYTES, MOST_MS = 5e6, 2000
@@ -44,7 +48,9 @@ def chromium():
 
 @pytest.fixture
 def opened(chromium):
-    """Opens a file; at the end there must have been no error in the console and no request but for the file."""
+    """Opens a file; at the end there must have been no error in the console and no request but for
+    the file.
+    """
     pages, troubles, requests = [], [], []
 
     def open_file(path, ready=DRAWN, **context):
@@ -63,19 +69,25 @@ def opened(chromium):
 
 
 def folder_of(rows, folder, study):
-    write_rows(rows, folder / ("plays.parquet" if study == "protocol" else "episodes.parquet"), study)
+    write_rows(
+        rows, folder / ("plays.parquet" if study == "protocol" else "episodes.parquet"), study
+    )
     return folder
 
 
 def written(folder, rows, study, most=0):
     path = folder / "report.html"
-    write_page(folder_of(rows, folder, study), path, most, 1, lambda _workers: ThreadPoolExecutor(1))
+    write_page(
+        folder_of(rows, folder, study), path, most, 1, lambda _workers: ThreadPoolExecutor(1)
+    )
     return path
 
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory):
-    """Episodes of two policies at two budgets on one seed, and one row that is not as it was played."""
+    """Episodes of two policies at two budgets on one seed, and one row that is not as it was
+    played.
+    """
     configs = grid(["dartout"], ["history", "care", "full"], [0.05, 0.1], [0])
     rows = annotated([run_episode(config) for config in configs])
     rows[0] |= {"detection_distance_m": 1.25, "episode_hash": "0"}
@@ -112,7 +124,14 @@ def test_a_heading_sorts_its_column_up_and_down(opened, played):
 
 
 def test_what_was_never_detected_is_the_least_of_a_column(opened, tmp_path):
-    medians = {"history": None, "care": 9.0, "all-camera": None, "full": 7.0, "random": None, "care-sbf": 8.0}
+    medians = {
+        "history": None,
+        "care": 9.0,
+        "all-camera": None,
+        "full": 7.0,
+        "random": None,
+        "care-sbf": 8.0,
+    }
     made = [each for policy, distance in medians.items() for each in rows(policy, [distance] * 3)]
     table = opened(written(tmp_path, made, "sweep"), "true").locator("table.sortable >> nth=0")
     heading = table.locator("th", has_text="first detection")
@@ -120,7 +139,10 @@ def test_what_was_never_detected_is_the_least_of_a_column(opened, tmp_path):
 
     def sorted_by_a_click():
         heading.locator("button").click()
-        return [text.split(" [")[0] for text in table.locator(f"tbody td:nth-child({column})").all_inner_texts()]
+        return [
+            text.split(" [")[0]
+            for text in table.locator(f"tbody td:nth-child({column})").all_inner_texts()
+        ]
 
     never = ["not detected"] * 3
     assert sorted_by_a_click() == [*never, "7.0", "8.0", "9.0"]
@@ -179,7 +201,11 @@ def test_a_distance_that_is_not_known_is_not_told(opened, tmp_path):
     page = opened(path, READY)
     assert "m away" in page.inner_text(".tale")
     path.write_text(
-        re.sub(r'("story":")([^"]+)', lambda found: found[1] + without_distances(found[2]), path.read_text())
+        re.sub(
+            r'("story":")([^"]+)',
+            lambda found: found[1] + without_distances(found[2]),
+            path.read_text(),
+        )
     )
     assert "m away" not in opened(path, READY).inner_text(".tale")
 
@@ -211,7 +237,9 @@ def test_two_policies_are_watched_side_by_side_and_a_changed_outcome_is_told(ope
     page = opened(path, READY)
     first, beside = page.locator(".view h3").all_inner_texts()
     assert (first, beside) == ("history 5%, dartout, seed 0", "care 5%, dartout, seed 0")
-    assert "Ends otherwise than in the results: detection_distance_m 1.25 →" in page.inner_text(".view >> nth=0")
+    assert "Ends otherwise than in the results: detection_distance_m 1.25 →" in page.inner_text(
+        ".view >> nth=0"
+    )
     detected = f"detected by the LiDAR at 2.6 s ({rows[2]['detection_distance_m']:.1f} m away)"
     assert detected in page.inner_text(".view >> nth=1")
     page.select_option("#beside", "")
@@ -235,7 +263,10 @@ def test_nobody_who_wants_calm_sees_a_body_between_two_keyframes(opened, played)
 def test_a_page_fits_a_phone_and_reads_in_any_light(scheme, opened, played):
     page = opened(played[0], READY, viewport={"width": 360, "height": 740}, color_scheme=scheme)
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
-    ink, paper = (page.evaluate(f"getComputedStyle(document.body).{name}") for name in ("color", "backgroundColor"))
+    ink, paper = (
+        page.evaluate(f"getComputedStyle(document.body).{name}")
+        for name in ("color", "backgroundColor")
+    )
     assert contrast(ink, paper) > 7
     quiet = page.evaluate("getComputedStyle(document.querySelector('.note')).color")
     assert contrast(quiet, paper) > 4.5
@@ -246,7 +277,9 @@ def test_a_colour_names_the_same_policy_in_light_and_dark(opened, played):
     colours = {policy: style.colour for policy, style in drawn.items()}
     for scheme in ("light", "dark"):
         page = opened(played[0], READY, color_scheme=scheme)
-        picture = Image.open(BytesIO(page.locator(".plot[data-drawn]").first.screenshot())).convert("RGB")
+        picture = Image.open(BytesIO(page.locator(".plot[data-drawn]").first.screenshot())).convert(
+            "RGB"
+        )
         shown = np.array(picture).reshape(-1, 3)
         for policy, colour in colours.items():
             assert (shown == ImageColor.getrgb(colour)).all(axis=1).sum() > 50, (scheme, policy)
@@ -290,7 +323,10 @@ def test_every_study_has_a_page(study, opened, tmp_path):
 def test_text_from_outside_is_text(opened, tmp_path):
     evil = "</script><b id=evil>"
     both = [*STUDY, *rows("care", [9.0], budget=0.1), *rows("history", [9.0], budget=0.1)]
-    made = [each | {"policy": evil, "tags": "causal"} if each["policy"] == "history" else each for each in both]
+    made = [
+        each | {"policy": evil, "tags": "causal"} if each["policy"] == "history" else each
+        for each in both
+    ]
     page = opened(written(tmp_path, [{"tags": "causal"} | each for each in made], "sweep"))
     assert page.locator("#evil").count() == 0
     assert evil in page.inner_text("#tables")
@@ -314,5 +350,7 @@ def contrast(one, other):
 
 def luminance(colour):
     parts = [int(part) / 255 for part in re.findall(r"\d+", colour)[:3]]
-    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    linear = [
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+    ]
     return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))

@@ -24,7 +24,13 @@ def test_what_cannot_be_drawn_fails_before_an_episode_is_played(tmp_path, monkey
     monkeypatch.setitem(build.CHARTS, "sweep", broken)
     write_rows(STUDY, tmp_path / "episodes.parquet")
     with pytest.raises(InvalidInput, match="no chart"):
-        write_page(tmp_path, tmp_path / "report.html", 3, 1, lambda _workers: pytest.fail("an episode is played"))
+        write_page(
+            tmp_path,
+            tmp_path / "report.html",
+            3,
+            1,
+            lambda _workers: pytest.fail("an episode is played"),
+        )
 
 
 def test_one_is_singular(tmp_path):

@@ -47,7 +47,14 @@ def test_signed_numbers_sort_as_their_values(values):
 
 
 def test_rows_lie_in_blocks_and_the_papers_numbers_move_with_the_row_above():
-    lines = (("care", "1"), ("First",), ("history", Bold("+2")), (PAPER, "3"), ("Second",), (PAPER, "4"))
+    lines = (
+        ("care", "1"),
+        ("First",),
+        ("history", Bold("+2")),
+        (PAPER, "3"),
+        ("Second",),
+        (PAPER, "4"),
+    )
     top, first, second = blocks(Table("t", ("a", "b"), lines))
     assert (top.heading, [line.attached for line in top.lines]) == ("", [False])
     assert (first.heading, [line.attached for line in first.lines]) == ("First", [False, True])
@@ -66,7 +73,13 @@ def test_the_listing_has_a_line_a_configuration_and_an_entry_a_seed():
     (group,) = groups(played, [])
     assert (group.label, group.seeds, group.watchable) == ("dense", (0, 1, 2, 3, 4), 0)
     by_name = {(line.policy, line.budget): line.outcomes for line in group.configurations}
-    assert [outcome.text for outcome in by_name["history", "3%"]] == ["4.0", "never", "8.0", "6.0", "never"]
+    assert [outcome.text for outcome in by_name["history", "3%"]] == [
+        "4.0",
+        "never",
+        "8.0",
+        "6.0",
+        "never",
+    ]
     assert by_name["care", "5%"][0].collision
     assert by_name["care", "5%"][1:] == (None,) * 4
     assert by_name["history", "3%"][1].about == "never detected, braked"
@@ -76,12 +89,16 @@ CONFIGURATIONS = [{"policy": "care", "seeds": [0, 1, 2, 3, 4]}] * 4
 
 
 def describe(folder, content):
-    (folder / "config.json").write_text(content if isinstance(content, str) else json.dumps(content))
+    (folder / "config.json").write_text(
+        content if isinstance(content, str) else json.dumps(content)
+    )
 
 
 def test_a_whole_folder_lacks_nothing(tmp_path):
     versions = {"code": "abc", "numpy": "2"}
-    describe(tmp_path, {"machine": {"cores": 2}, "versions": versions, "configurations": CONFIGURATIONS})
+    describe(
+        tmp_path, {"machine": {"cores": 2}, "versions": versions, "configurations": CONFIGURATIONS}
+    )
     about = origin(tmp_path, STUDY, EPISODES, [])
     assert (about.missing, about.machine, about.code) == ((), {"cores": 2}, "abc")
 
@@ -92,7 +109,10 @@ def test_a_whole_folder_lacks_nothing(tmp_path):
         (None, "config.json is missing"),
         ("{", "config.json cannot be read"),
         ("[1]", "config.json is not the description of a study"),
-        ({"configurations": [*CONFIGURATIONS, {"seeds": [7]}]}, "1 of 21 episodes are missing from episodes.parquet"),
+        (
+            {"configurations": [*CONFIGURATIONS, {"seeds": [7]}]},
+            "1 of 21 episodes are missing from episodes.parquet",
+        ),
         ({"configurations": [{"seeds": 3}]}, "The configurations in config.json cannot be read"),
     ],
 )
@@ -106,7 +126,10 @@ def test_what_is_missing_is_said(content, says, tmp_path):
 def test_plays_are_counted_by_scene_and_floor(tmp_path):
     describe(tmp_path, {"scenes": ["a", "b"], "configurations": [{"floor_seeds": [0, 1, 2]}]})
     about = origin(tmp_path, STUDY[:5], PLAYS, ["scene c: damaged"])
-    assert about.missing == ("1 of 6 plays are missing from plays.parquet.", "Left out: scene c: damaged.")
+    assert about.missing == (
+        "1 of 6 plays are missing from plays.parquet.",
+        "Left out: scene c: damaged.",
+    )
 
 
 def test_what_failed_is_told_once(tmp_path):
@@ -120,10 +143,16 @@ def test_what_failed_is_told_once(tmp_path):
 
 
 def test_settings_are_what_varies_or_departs_from_the_default():
-    played = [*STUDY, *rows("care", [1.0], false_negative_rate=0.4, scenario_parameters=(("vehicles", 9),))]
+    played = [
+        *STUDY,
+        *rows("care", [1.0], false_negative_rate=0.4, scenario_parameters=(("vehicles", 9),)),
+    ]
     told = settings([{**dict.fromkeys(["scenario.vehicles"]), **row} for row in played])
     assert told["policy"] == "history, all-camera, care, full"
     assert told["false_negative_rate"] == "0, 0.4"
     assert told["scenario.vehicles"] == "not given, 9"
     assert "camera_latency" not in told
-    assert settings([row | {"seed": seed} for seed, row in enumerate(STUDY)])["seed"] == "0 to 19, 20 values"
+    assert (
+        settings([row | {"seed": seed} for seed, row in enumerate(STUDY)])["seed"]
+        == "0 to 19, 20 values"
+    )

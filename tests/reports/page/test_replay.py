@@ -33,7 +33,11 @@ def test_the_replay_is_the_episode(replay, played):
     row, keyframes = played
     assert replay.row["episode_hash"] == row["episode_hash"]
     assert replay.story["found"] == "".join(str(int(frame.detected)) for frame in keyframes)
-    assert replay.story["in_view"].index("1") <= replay.story["found"].index("1") < replay.story["brake"].index("1")
+    assert (
+        replay.story["in_view"].index("1")
+        <= replay.story["found"].index("1")
+        < replay.story["brake"].index("1")
+    )
     assert replay.story["distance"] == [round(100 * frame.distance_m) for frame in keyframes]
     assert replay.story["contact"] is None
 
@@ -42,7 +46,9 @@ def test_there_is_a_moment_before_every_keyframe_and_one_after_the_last(replay, 
     _, keyframes = played
     assert replay.story["time"] == [10 * n for n in range(len(keyframes) + 1)]
     assert replay.story["speed"][:-1] == [round(100 * frame.speed_mps) for frame in keyframes]
-    assert {len(replay.story[name]) for name in ("place", "tracks", "camera", "seen")} == {len(keyframes) + 1}
+    assert {len(replay.story[name]) for name in ("place", "tracks", "camera", "seen")} == {
+        len(keyframes) + 1
+    }
     assert len(replay.story["rays"]) == len(keyframes)
 
 
@@ -62,9 +68,9 @@ def test_distances_are_those_of_the_drawn_places(replay):
         x, y, yaw = replay.story["place"][k]
         ahead = replay.story["ego"]["sensor"]
         sensor = x + ahead * np.cos(yaw / 1000), y + ahead * np.sin(yaw / 1000)
-        assert np.hypot(person["poses"][k][0] - sensor[0], person["poses"][k][1] - sensor[1]) == pytest.approx(
-            distance, abs=2
-        )
+        assert np.hypot(
+            person["poses"][k][0] - sensor[0], person["poses"][k][1] - sensor[1]
+        ) == pytest.approx(distance, abs=2)
 
 
 def test_a_track_lies_where_the_person_is_and_moves_as_the_person_does(replay):
@@ -85,7 +91,9 @@ def test_the_camera_sees_the_person_where_the_person_is(replay):
     assert replay.story["seen"][0][person["n"]] == "0"
     ((left, right, explained),) = replay.story["camera"][k]
     x, y, _ = replay.story["place"][k]
-    azimuth = 1000 * np.arctan2(person["poses"][k][1] - y, person["poses"][k][0] - x - replay.story["ego"]["sensor"])
+    azimuth = 1000 * np.arctan2(
+        person["poses"][k][1] - y, person["poses"][k][0] - x - replay.story["ego"]["sensor"]
+    )
     assert right < azimuth + 15
     assert azimuth - 15 < left
     assert left - right < 60
@@ -95,7 +103,11 @@ def test_the_camera_sees_the_person_where_the_person_is(replay):
 def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
     grid = AngularGrid()
     width = grid.columns // SECTORS
-    third = [row * grid.columns + 2 * width + column for row in range(grid.rows) for column in range(width)]
+    third = [
+        row * grid.columns + 2 * width + column
+        for row in range(grid.rows)
+        for column in range(width)
+    ]
     assert fullness(np.array(third), grid) == "00z" + "0" * (SECTORS - 3)
     assert fullness(np.arange(grid.size), grid) == "z" * SECTORS
     assert fullness(np.array(third[: len(third) // 7]), grid)[2] == "5"
@@ -104,7 +116,9 @@ def test_fullness_counts_the_cells_of_a_sector_in_all_rows():
 def test_a_box_in_the_middle_of_the_picture_is_straight_ahead(seen):
     from care_sim.sensors.camera import FRONT_CAMERA
 
-    detections = seen(("car", 160.0, 80.0, 320.0, 100.0), ("car", 0.0, 80.0, 160.0, 100.0), yaw_change=0.1)
+    detections = seen(
+        ("car", 160.0, 80.0, 320.0, 100.0), ("car", 0.0, 80.0, 160.0, 100.0), yaw_change=0.1
+    )
     lines = sightlines(detections, np.array([True, False]), Rig(cameras=(FRONT_CAMERA,)))
     assert lines == [[-100, -885, 1], [685, -100, 0]]
 
@@ -118,17 +132,32 @@ def test_a_story_is_unpacked_as_it_was_packed(replay):
     "config",
     [
         CONFIG,
-        EpisodeConfig("dense", "care-sbf", 0.05, 1, (("vehicles", 9),), (("k_safe", 0.5),), lidar_dead_rows=(10, 11)),
+        EpisodeConfig(
+            "dense",
+            "care-sbf",
+            0.05,
+            1,
+            (("vehicles", 9),),
+            (("k_safe", 0.5),),
+            lidar_dead_rows=(10, 11),
+        ),
     ],
 )
 def test_a_row_gives_its_configuration_back(config):
     other = EpisodeConfig("dense", "care").row()
-    assert config_of({**dict.fromkeys(["policy.rate", "scenario.gap_m"]), **other, **config.row()}) == config
+    assert (
+        config_of({**dict.fromkeys(["policy.rate", "scenario.gap_m"]), **other, **config.row()})
+        == config
+    )
 
 
 def test_seeds_are_watched_one_after_the_other():
     rows = [{"policy": policy, "seed": seed} for policy in ("history", "care") for seed in (0, 1)]
-    assert [(row["policy"], row["seed"]) for row in chosen(rows, 3)] == [("history", 0), ("care", 0), ("history", 1)]
+    assert [(row["policy"], row["seed"]) for row in chosen(rows, 3)] == [
+        ("history", 0),
+        ("care", 0),
+        ("history", 1),
+    ]
     assert chosen(rows, 0) == []
 
 
@@ -136,12 +165,17 @@ def test_an_episode_that_ends_otherwise_is_told_from_one_that_does_not(replay):
     same = Episode(replay.row, replay)
     assert same.identical
     assert same.differences == []
-    wobbling = Episode(replay.row | {"episode_hash": "0", "clearance_m": replay.row["clearance_m"] + 1e-9}, replay)
+    wobbling = Episode(
+        replay.row | {"episode_hash": "0", "clearance_m": replay.row["clearance_m"] + 1e-9}, replay
+    )
     assert not wobbling.identical
     assert wobbling.differences == []
     other = Episode(replay.row | {"detection_distance_m": None, "braked": False}, replay)
     distance = replay.row["detection_distance_m"]
-    assert other.differences == [f"detection_distance_m none → {distance:.2f}", "braked False → True"]
+    assert other.differences == [
+        f"detection_distance_m none → {distance:.2f}",
+        "braked False → True",
+    ]
     assert Episode(replay.row, "gone").differences == []
     assert not Episode({}, "gone").identical
 

@@ -21,7 +21,9 @@ MARKERS = {
 
 
 def corners(text):
-    return np.array([[float(part) for part in pair.split(",")] for pair in re.findall(r"[ML]([^MLQCZ]+)", text)])
+    return np.array(
+        [[float(part) for part in pair.split(",")] for pair in re.findall(r"[ML]([^MLQCZ]+)", text)]
+    )
 
 
 def test_a_square_and_a_triangle_are_drawn_where_they_are():
@@ -50,7 +52,12 @@ def test_markers_that_matplotlib_fills_are_no_bars():
 
 
 def test_a_chart_holds_every_policy_there_is():
-    played = [each for name in [*BUILT_IN, *MANY] for budget in (0.05, 0.1) for each in rows_of(name, budget)]
+    played = [
+        each
+        for name in [*BUILT_IN, *MANY]
+        for budget in (0.05, 0.1)
+        for each in rows_of(name, budget)
+    ]
     (chart,) = budget_charts(played)
     assert str(chart.spec).count("'range'") >= 3
 

@@ -1,4 +1,6 @@
-"""Differences of two policies with known answers: by scenes, by events where scenes are few, in thirds."""
+"""Differences of two policies with known answers: by scenes, by events where scenes are few, in
+thirds.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,9 @@ def plays(rows):
 
 def test_two_events_more_in_every_scene_of_twenty_are_ten_points():
     same = plays(study({"care": (6, 5), "history": (4, 6)}))
-    assert FIRST.gap(same, 0.1) == Gap(FIRST_SIGHTING, pytest.approx(10.0), pytest.approx((10.0, 10.0, 10.0)))
+    assert FIRST.gap(same, 0.1) == Gap(
+        FIRST_SIGHTING, pytest.approx(10.0), pytest.approx((10.0, 10.0, 10.0))
+    )
     assert Pair("care", "history", OVERALL).gap(same, 0.2).mean == pytest.approx(-10.0)
     assert Pair("care", "history", TTFD).gap(same, 0.35).mean == pytest.approx(-2 * 6 / 20)
     assert Pair("care", "history", FIRST_SIGHTING, "azimuth/side").gap(same, 0.1).sign == 1
@@ -37,11 +41,15 @@ def test_equal_scene_weights_count_scenes():
         for policy, sighted in (("care", ours), ("history", 0))
     ]
     assert FIRST.gap(plays(rows), 0.1).mean == pytest.approx(100 * 3 / 26)
-    assert Pair("care", "history", FIRST_SIGHTING, alike=True).gap(plays(rows), 0.1).mean == pytest.approx(30.0)
+    assert Pair("care", "history", FIRST_SIGHTING, alike=True).gap(
+        plays(rows), 0.1
+    ).mean == pytest.approx(30.0)
 
 
 def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds():
-    """Of 30 events CARE finds 12 and 6 with its two floors, three more a keyframe late, and history none."""
+    """Of 30 events CARE finds 12 and 6 with its two floors, three more a keyframe late, and history
+    none.
+    """
     rows = [
         play(
             f"{n}",
@@ -57,19 +65,27 @@ def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds(
     few = plays(rows)
     of_events = np.tile([100.0] * 2 + [50.0] * 2 + [0.0] * 6, 3)
     assert FIRST.gap(few, 0.1) == Gap(
-        FIRST_SIGHTING, pytest.approx(30.0), pytest.approx(paired_difference(of_events, np.zeros(30))), over_events=True
+        FIRST_SIGHTING,
+        pytest.approx(30.0),
+        pytest.approx(paired_difference(of_events, np.zeros(30))),
+        over_events=True,
     )
     late = Pair("care", "history", TTFD).gap(few, 0.1)
     assert (late.mean, late.sign) == (pytest.approx(-0.3 * 6 - 0.1 * 5), -1)
     assert late.interval.mean == pytest.approx(late.mean)
-    for none in (Pair("care", "history", OVERALL), Pair("care", "history", FIRST_SIGHTING, alike=True)):
+    for none in (
+        Pair("care", "history", OVERALL),
+        Pair("care", "history", FIRST_SIGHTING, alike=True),
+    ):
         assert none.gap(few, 0.1).interval is None
     within = Pair("care", "history", FIRST_SIGHTING, "range/below 20 m").gap(few, 0.1)
     assert (within.interval, within.sign) == (None, 0)
 
 
 def with_events(scenes, played=7):
-    """So many scenes with ten events, of all that were played; CARE finds two events more and two frames more."""
+    """So many scenes with ten events, of all that were played; CARE finds two events more and two
+    frames more.
+    """
     return plays(
         [
             play(f"{n}", policy, found(events, min(sighted, events)), [sighted] * events)
@@ -91,24 +107,34 @@ def test_five_scenes_are_enough_and_four_events_are_too_few():
     five = FIRST.gap(plays(study({"care": (6, 5), "history": (4, 6)}, scenes=5, events=7)), 0.1)
     assert five.interval.low == five.interval.high
     assert not five.over_events
-    few = plays([play("a", policy, found(4, n), [0] * 4) for policy, n in (("care", 3), ("history", 1))])
+    few = plays(
+        [play("a", policy, found(4, n), [0] * 4) for policy, n in (("care", 3), ("history", 1))]
+    )
     assert FIRST.gap(few, 0.1) == Gap(FIRST_SIGHTING, 50.0, None)
 
 
 @pytest.mark.parametrize(
     ("interval", "sign"),
-    [(Interval(2, 1, 3), 1), (Interval(-2, -3, -1), -1), (Interval(0, -1, 1), 0), (Interval(1, 0, 2), 0), (None, 0)],
+    [
+        (Interval(2, 1, 3), 1),
+        (Interval(-2, -3, -1), -1),
+        (Interval(0, -1, 1), 0),
+        (Interval(1, 0, 2), 0),
+        (None, 0),
+    ],
 )
 def test_a_gap_has_a_sign_where_its_interval_excludes_zero(interval, sign):
     assert Gap(FIRST_SIGHTING, 2.0, interval).sign == sign
 
 
 def thirds(scenes, column="tracks"):
-    """CARE finds two object frames more an event than all-camera in the scenes that rank highest."""
+    """CARE finds two object frames per event more than all-camera in the highest-ranked scenes."""
     rows = []
     for n in range(scenes):
         more = {column: float(n)}
-        rows.append(play(f"{n:02d}", "care", found(10, 3), [7 if 3 * n >= 2 * scenes else 5] * 10, **more))
+        rows.append(
+            play(f"{n:02d}", "care", found(10, 3), [7 if 3 * n >= 2 * scenes else 5] * 10, **more)
+        )
         rows.append(play(f"{n:02d}", "all-camera", found(10, 3), [5] * 10))
     return plays(rows)
 
@@ -116,7 +142,9 @@ def thirds(scenes, column="tracks"):
 @pytest.mark.parametrize("column", ["tracks", "explained"])
 def test_thirds_tell_dense_scenes_from_sparse_ones(column):
     played = thirds(15, column)
-    dense, sparse, gap = (Third(which, column, OVERALL).gap(played, 0.1) for which in ("dense", "sparse", GAP))
+    dense, sparse, gap = (
+        Third(which, column, OVERALL).gap(played, 0.1) for which in ("dense", "sparse", GAP)
+    )
     assert (dense.mean, sparse.mean, gap.mean) == pytest.approx((20.0, 0.0, 20.0))
     assert (dense.sign, sparse.sign, gap.sign) == (1, 0, 1)
     assert Third(GAP, column, FIRST_SIGHTING).gap(played, 0.1).mean == 0.0
@@ -135,6 +163,8 @@ def test_scenes_without_events_do_not_make_a_third_large_enough():
         for n, events in enumerate([10] * 13 + [0] * 2)
         for policy, frames in (("care", 6), ("all-camera", 5))
     ]
-    dense, sparse, gap = (Third(which, "tracks", OVERALL).gap(plays(rows), 0.1) for which in ("dense", "sparse", GAP))
+    dense, sparse, gap = (
+        Third(which, "tracks", OVERALL).gap(plays(rows), 0.1) for which in ("dense", "sparse", GAP)
+    )
     assert (dense.interval, gap.interval) == (None, None)
     assert sparse.sign == 1

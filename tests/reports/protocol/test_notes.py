@@ -1,4 +1,6 @@
-"""What the protocol's tables say of their intervals: over scenes, over events where scenes are few, or none."""
+"""What the protocol's tables say of their intervals: over scenes, over events where scenes are few,
+or none.
+"""
 
 from rich.console import Console
 
@@ -64,7 +66,9 @@ def test_the_closing_explains_the_mark_that_it_shows():
 
 def test_intervals_over_scenes_have_no_mark_and_no_note():
     shown = tables(study(BOTH, scenes=5))
-    assert "°" not in "".join(entry for table in shown.values() for row in table.rows for entry in row)
+    assert "°" not in "".join(
+        entry for table in shown.values() for row in table.rows for entry in row
+    )
     assert said_of_intervals(note for table in shown.values() for note in table.notes) == []
     assert len(protocol_closing(study(BOTH, scenes=5))) == 2
 
@@ -93,14 +97,16 @@ def test_the_notes_tell_the_events_by_both_counts_where_the_rows_do():
         rows = study({"care": (5, 5), "history": (4, 5)}, scenes=6, events=20, **more)
         return next(note for note in tables(rows)[CONTRASTS].notes if "events" in note)
 
-    assert note().endswith("6 scenes, 120 events, 1,200 object frames; 3 floor seeds, averaged per scene.")
+    assert note().endswith(
+        "6 scenes, 120 events, 1,200 object frames; 3 floor seeds, averaged per scene."
+    )
     assert note(emerging=2).endswith(
-        "averaged per scene. 12 objects hidden within range at scene start are no event; presence visible counts them "
-        "too, 132 in all."
+        "averaged per scene. 12 objects hidden within range at scene start are no event; presence "
+        "visible counts them too, 132 in all."
     )
     assert note(emerging=2, presence="visible").endswith(
-        "averaged per scene. Of the events, 12 are of objects that were hidden within range at scene start, which "
-        "presence annotated does not count."
+        "averaged per scene. Of the events, 12 are of objects that were hidden within range at "
+        "scene start, which presence annotated does not count."
     )
     alone = protocol_closing([play("a", "full", [0], [1], emerging=1)])
     assert "1 object hidden within range at scene start is no event" in alone[0]

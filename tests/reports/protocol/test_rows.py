@@ -20,7 +20,10 @@ def test_source_detector_and_conditions_make_a_setting_and_floor_seeds_do_not():
     assert setting(source="nuscenes").label == "nuScenes, detector returns"
     near = {"detector": "cluster", "detector.eps": 0.5}
     assert setting(**near) == Setting("streets", "cluster eps=0.5")
-    assert setting(reserve_fraction=0.5).label == "generated streets, detector returns, reserve fraction 0.5"
+    assert (
+        setting(reserve_fraction=0.5).label
+        == "generated streets, detector returns, reserve fraction 0.5"
+    )
     assert setting(camera_latency=1).strict_causal
     assert not setting(camera_latency=1, reserve_fraction=0.5).strict_causal
     assert "strict-causal (camera one keyframe old)" in setting(camera_latency=1).label
@@ -28,7 +31,9 @@ def test_source_detector_and_conditions_make_a_setting_and_floor_seeds_do_not():
 
 def test_a_name_for_files_tells_settings_apart():
     assert Setting("streets", "returns").slug == "streets"
-    slug = Setting("nuscenes", "cluster eps=0.5", (("camera_latency", 1), ("lidar_dead_rows", (3, 4)))).slug
+    slug = Setting(
+        "nuscenes", "cluster eps=0.5", (("camera_latency", 1), ("lidar_dead_rows", (3, 4)))
+    ).slug
     assert slug == "nuscenes-cluster-eps-0.5-camera-latency-1-lidar-dead-rows--3--4-"
 
 
@@ -46,7 +51,10 @@ def test_settings_stay_apart_and_policies_carry_their_parameters():
 
 def test_a_full_scan_serves_every_setting_that_it_does_not_feel():
     full = play("a", "full", [0], [1])
-    late, broken = (play("a", "care", [0], [1], **more) for more in ({"camera_latency": 1}, {"lidar_dropout": 0.5}))
+    late, broken = (
+        play("a", "care", [0], [1], **more)
+        for more in ({"camera_latency": 1}, {"lidar_dropout": 0.5})
+    )
     delayed, dropped = plays_of([full, late, broken])
     assert delayed.full == (full,)
     assert dropped.full == ()
@@ -55,20 +63,31 @@ def test_a_full_scan_serves_every_setting_that_it_does_not_feel():
 
 
 def test_only_full_scans_of_the_scenes_that_were_played_are_borrowed():
-    rows = [play(scene, "full", [0], [1]) for scene in "ab"] + [play("a", "care", [0], [1], camera_latency=1)]
+    rows = [play(scene, "full", [0], [1]) for scene in "ab"] + [
+        play("a", "care", [0], [1], camera_latency=1)
+    ]
     (plays,) = plays_of(rows)
     assert list(plays.scenes) == list(plays.tallies("full", 1.0)) == ["a"]
 
 
 def test_floor_seeds_are_averaged_per_scene():
-    rows = [play("a", "care", found(4, sighted), [sighted] * 4, floor_seed=n) for n, sighted in enumerate((1, 2, 3))]
+    rows = [
+        play("a", "care", found(4, sighted), [sighted] * 4, floor_seed=n)
+        for n, sighted in enumerate((1, 2, 3))
+    ]
     (plays,) = plays_of(rows)
     assert plays.tallies("care", 0.1) == {"a": Tally(4, 2, 6 * 2, 4 * FRAMES, 8)}
-    assert np.mean(plays.delays("care", 0.1, "a") == 0, axis=0) == pytest.approx([1, 2 / 3, 1 / 3, 0])
+    assert np.mean(plays.delays("care", 0.1, "a") == 0, axis=0) == pytest.approx(
+        [1, 2 / 3, 1 / 3, 0]
+    )
 
 
 def test_a_scene_that_one_seed_lacks_is_left_out():
-    rows = [row for row in study({"care": (4, 5)}, scenes=3) if (row["scene"], row["floor_seed"]) != ("scene 001", 2)]
+    rows = [
+        row
+        for row in study({"care": (4, 5)}, scenes=3)
+        if (row["scene"], row["floor_seed"]) != ("scene 001", 2)
+    ]
     (plays,) = plays_of(rows)
     assert sorted(plays.tallies("care", 0.1)) == ["scene 000", "scene 002"]
 
@@ -91,7 +110,8 @@ def test_a_scene_without_an_event_has_no_delays():
 def test_counts_and_differing_allocations_are_read_from_the_plays():
     rows = [play("a", "care", [0], [1], floor_seed=n, tracks=float(n)) for n in range(3)]
     rows += [
-        play("a", "history", [0], [1], floor_seed=n, differing_keyframes=n, differing_cells=10 * n) for n in (1, 2)
+        play("a", "history", [0], [1], floor_seed=n, differing_keyframes=n, differing_cells=10 * n)
+        for n in (1, 2)
     ]
     rows += [play("b", "history", [0], [1], differing_keyframes=None, differing_cells=None)]
     (plays,) = plays_of(rows)

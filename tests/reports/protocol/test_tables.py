@@ -36,7 +36,9 @@ def tables(rows=ROWS):
 def block(table, heading):
     """The lines under a heading."""
     start = table.rows.index((heading,)) + 1
-    stop = next((n for n, row in enumerate(table.rows[start:], start) if len(row) == 1), len(table.rows))
+    stop = next(
+        (n for n, row in enumerate(table.rows[start:], start) if len(row) == 1), len(table.rows)
+    )
     return table.rows[start:stop]
 
 
@@ -56,7 +58,9 @@ def test_contrasts_stand_above_the_papers():
     assert bold == [True, False, False, False, True, True, False]
     assert block(table, "Overall recall")[0] == ("history", *["-10.0 [-10.0,-10.0]"] * 3)
     assert block(table, "Censored TTFD")[0] == ("history", *["-0.60 [-0.60,-0.60]"] * 3)
-    assert any("6 scenes, 120 events, 1,200 object frames; 3 floor seeds" in note for note in table.notes)
+    assert any(
+        "6 scenes, 120 events, 1,200 object frames; 3 floor seeds" in note for note in table.notes
+    )
     assert any(note.startswith("†") for note in table.notes)
     assert any(quote.startswith('Paper: "Table 1') for quote in table.quotes)
 
@@ -75,7 +79,10 @@ def test_every_policy_is_held_against_history_right_after_care():
         ("history-oracle †", *["+0.0 [0.0,0.0]"] * 3),
         ("(paper)", *["tied, at most 0.5"] * 3),
     )
-    assert [isinstance(line[1], Bold) for line in block(table, "First sightings")][3:5] == [True, False]
+    assert [isinstance(line[1], Bold) for line in block(table, "First sightings")][3:5] == [
+        True,
+        False,
+    ]
     overall = {line[0]: line[1] for line in block(table, "Overall recall")}
     assert overall["mine"] == "-10.0 [-10.0,-10.0]"
     assert block(table, "Censored TTFD")[-1] == ("history-oracle †", *["+0.00 [0.00,0.00]"] * 3)
@@ -84,7 +91,9 @@ def test_every_policy_is_held_against_history_right_after_care():
 
 def test_an_idea_is_held_against_history_without_care():
     shown = tables(study({"history": (4, 6), "mine": (5, 5)}))
-    assert block(shown["each policy minus history"], "First sightings") == (("mine", *["+5.0 [5.0,5.0]"] * 3),)
+    assert block(shown["each policy minus history"], "First sightings") == (
+        ("mine", *["+5.0 [5.0,5.0]"] * 3),
+    )
     assert "care minus each policy" not in shown
     assert "each policy minus history" not in tables(study({"care": (6, 5), "mine": (5, 5)}))
 
@@ -129,7 +138,11 @@ def test_the_share_of_the_ceiling_is_of_the_scenes_that_both_have():
 
 
 def test_a_scene_without_a_play_is_out_of_that_policys_contrasts_and_counted():
-    lacking = [row for row in ROWS if (row["scene"], row["policy"], row["budget"]) != ("scene 001", "mine", 0.2)]
+    lacking = [
+        row
+        for row in ROWS
+        if (row["scene"], row["policy"], row["budget"]) != ("scene 001", "mine", 0.2)
+    ]
     shown = tables(lacking)
     note = "Left out where a play is missing, of 6 scenes: mine 1 at 20%."
     assert note in shown["care minus each policy"].notes
@@ -141,27 +154,47 @@ def test_a_scene_without_a_play_is_out_of_that_policys_contrasts_and_counted():
 def test_statements_are_judged_at_the_papers_budgets():
     table = tables()["the paper's statements"]
     lines = {line[0]: line[1::2] for line in block(table, "First sightings")}
-    assert lines["care minus history"] == ("+10.0 met (+5.2)", "+10.0 met (+5.2)", "+10.0 met (+4.3)")
+    assert lines["care minus history"] == (
+        "+10.0 met (+5.2)",
+        "+10.0 met (+5.2)",
+        "+10.0 met (+4.3)",
+    )
     assert lines["care minus all-camera"] == ("+0.0 met (tied)",) * 3
     assert lines["history-oracle minus history"] == ("+0.0 met (tied)",) * 3
     overall = {line[0]: line for line in block(table, "Overall recall")}
     assert overall["care minus history"][5:] == ("-10.0 not met (+0.6)", "[-10.0,-10.0]")
     assert overall["care minus all-camera"][1] == "+0.0 undecided (-0.13)"
     assert table.notes[0] == "Of 27, each budget counted: 20 met, 1 not met, 6 undecided."
-    assert any("not played: uncertainty, beam-reduce, learned-scorer" in note for note in table.notes)
+    assert any(
+        "not played: uncertainty, beam-reduce, learned-scorer" in note for note in table.notes
+    )
     assert "the paper's statements" not in tables(study(FOUND, budgets=(0.05,)))
     assert "the paper's statements" not in tables(study(FOUND, reserve_fraction=0.5))
 
 
-GAPS = {"above": Interval(1, 0.5, 2), "below": Interval(-1, -2, -0.5), "zero": Interval(0.2, -1, 1), "none": None}
+GAPS = {
+    "above": Interval(1, 0.5, 2),
+    "below": Interval(-1, -2, -0.5),
+    "zero": Interval(0.2, -1, 1),
+    "none": None,
+}
 
 
 @pytest.mark.parametrize(
     ("gap", "claimed", "says"),
     [
-        *((gap, 1, says) for gap, says in zip(GAPS, ("met", "not met", "undecided", "undecided"), strict=True)),
-        *((gap, -1, says) for gap, says in zip(GAPS, ("not met", "met", "undecided", "undecided"), strict=True)),
-        *((gap, 0, says) for gap, says in zip(GAPS, ("not met", "not met", "met", "undecided"), strict=True)),
+        *(
+            (gap, 1, says)
+            for gap, says in zip(GAPS, ("met", "not met", "undecided", "undecided"), strict=True)
+        ),
+        *(
+            (gap, -1, says)
+            for gap, says in zip(GAPS, ("not met", "met", "undecided", "undecided"), strict=True)
+        ),
+        *(
+            (gap, 0, says)
+            for gap, says in zip(GAPS, ("not met", "not met", "met", "undecided"), strict=True)
+        ),
     ],
 )
 def test_the_rule_of_met(gap, claimed, says):
@@ -178,7 +211,10 @@ def test_every_entry_of_the_paper_says_a_sign_or_nothing():
 def test_the_strict_causal_variant_has_the_papers_own_numbers():
     late = study({"care": (6, 5), "history": (4, 6)}, camera_latency=1)
     shown = {table.title: table for table in protocol_tables([*ROWS, *late])}
-    title = "generated streets, detector returns, strict-causal (camera one keyframe old): care minus each policy"
+    title = (
+        "generated streets, detector returns, strict-causal (camera one keyframe old): "
+        "care minus each policy"
+    )
     assert shown[title].rows[2] == ("(paper)", "+4.6", "+5.3", "+2.6")
     levels = shown[title.replace("care minus each policy", "levels")]
     assert [line[3] for line in levels.rows if line[1] == "care"] == ["75"] * 3
@@ -212,7 +248,14 @@ def dense(scenes):
     """CARE finds two frames more an event than all-camera in the third with the most tracks."""
     better = [n >= 2 * scenes / 3 for n in range(scenes)]
     care = [
-        play(f"{n:02d}", "care", found(10, 3), [7 if better[n] else 5] * 10, tracks=float(n), explained=float(n % 3))
+        play(
+            f"{n:02d}",
+            "care",
+            found(10, 3),
+            [7 if better[n] else 5] * 10,
+            tracks=float(n),
+            explained=float(n % 3),
+        )
         for n in range(scenes)
     ]
     return [*care, *(play(f"{n:02d}", "all-camera", found(10, 3), [5] * 10) for n in range(scenes))]
@@ -238,7 +281,10 @@ def test_thirds_are_shown_with_what_they_are_ranked_by():
 
 
 def test_thirds_that_are_left_out_are_missed_once():
-    note = "No thirds of the scenes by traffic: they take all-camera and at least 9 scenes at every budget."
+    note = (
+        "No thirds of the scenes by traffic: they take all-camera and at least 9 scenes at every "
+        "budget."
+    )
 
     def missed(rows):
         shown = tables(rows)
@@ -262,17 +308,28 @@ def test_differing_allocations_stand_above_the_papers():
 
 def test_one_policy_without_care_has_levels_and_strata():
     shown = tables(study({"history": (4, 6), "full": (8, 8)}))
-    assert list(shown) == ["levels", "first-sighting recall by stratum", "overall recall by stratum"]
-    assert shown["overall recall by stratum"].columns == ("stratum", "budget", "object frames", "history")
+    assert list(shown) == [
+        "levels",
+        "first-sighting recall by stratum",
+        "overall recall by stratum",
+    ]
+    assert shown["overall recall by stratum"].columns == (
+        "stratum",
+        "budget",
+        "object frames",
+        "history",
+    )
     assert list(tables(study({"full": (8, 8)}))) == ["levels"]
 
 
 def test_the_closing_counts_and_holds_the_gain_against_the_papers_gate():
     size, gate = protocol_closing(ROWS)
-    assert size == ("Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 276.")
+    assert size == (
+        "Scenes: 6, with 120 first sightings and 1,200 object frames in 240 keyframes; plays: 276."
+    )
     assert gate.endswith(
-        "Here, generated streets, detector returns: +10.0 [10.0,10.0] at 10% (met), +10.0 [10.0,10.0] at 20% (met), "
-        "+10.0 [10.0,10.0] at 35% (met)."
+        "Here, generated streets, detector returns: +10.0 [10.0,10.0] at 10% (met), +10.0 "
+        "[10.0,10.0] at 20% (met), +10.0 [10.0,10.0] at 35% (met)."
     )
     small = protocol_closing(study({"care": (5, 5), "history": (4, 5)}, events=25, budgets=(0.1,)))
     assert small[1].endswith("+4.0 [4.0,4.0] at 10% (not met).")
@@ -281,7 +338,9 @@ def test_the_closing_counts_and_holds_the_gain_against_the_papers_gate():
 
 def test_the_gate_is_held_to_the_papers_budgets():
     both = {"care": (6, 5), "history": (4, 6)}
-    assert protocol_closing(study(both, budgets=(0.05, 0.1)))[1].endswith("returns: +10.0 [10.0,10.0] at 10% (met).")
+    assert protocol_closing(study(both, budgets=(0.05, 0.1)))[1].endswith(
+        "returns: +10.0 [10.0,10.0] at 10% (met)."
+    )
     assert len(protocol_closing(study(both, budgets=(0.05,)))) == 1
 
 
@@ -324,7 +383,9 @@ def test_positive_favours_the_first_named():
 
 def test_at_budgets_of_which_the_paper_does_not_speak_it_has_no_line():
     scarce = study(
-        {"care": (5, 5), "history": (4, 5), "all-camera": (5, 5), "full": (9, 9)}, scenes=9, budgets=(0.03, 0.05)
+        {"care": (5, 5), "history": (4, 5), "all-camera": (5, 5), "full": (9, 9)},
+        scenes=9,
+        budgets=(0.03, 0.05),
     )
     for table in protocol_tables(scarce):
         if "levels" not in table.title:

@@ -9,8 +9,8 @@ SEEDS = range(5)
 
 
 def distance(config):
-    """A made-up law: CARE loses with a small reserve, history is late, the rest sees as far as the full scan; the
-    dense street lies 4 m nearer.
+    """A made-up law: CARE loses with a small reserve, history is late, the rest sees as far as the
+    full scan; the dense street lies 4 m nearer.
     """
     nearer = 4.0 if config.scenario == "dense" else 0.0
     if config.policy == "history":
@@ -59,7 +59,10 @@ def test_a_level_is_compared_with_the_usual_one_and_with_others_at_its_level(tab
 
 
 def test_the_levels_are_the_papers():
-    levels = {ablation.title.partition(",")[0]: [level.label for level in ablation.levels] for ablation in ABLATIONS}
+    levels = {
+        ablation.title.partition(",")[0]: [level.label for level in ablation.levels]
+        for ablation in ABLATIONS
+    }
     assert levels["reserve fraction rho"] == ["0.15", "0.3", "0.5"]
     assert levels["scale k_safe of the guard"] == ["0", "0.25", "0.5", "1", "1.5", "2"]
     assert len(levels["margin forgotten a keyframe"]) == 4
@@ -70,7 +73,11 @@ def test_the_levels_are_the_papers():
 def test_every_level_is_played_once_and_the_defaults_without_parameters():
     configs = configurations([3])
     assert len(configs) == len(set(configs)) == 162
-    guards = {dict(c.policy_parameters)["k_safe"] for c in configs if "k_safe" in dict(c.policy_parameters)}
+    guards = {
+        dict(c.policy_parameters)["k_safe"]
+        for c in configs
+        if "k_safe" in dict(c.policy_parameters)
+    }
     assert guards == {0, 0.25, 0.5, 1, 1.5}
     assert ForgettingRules().k_safe == 2.0
     assert {(c.azimuth_margin, c.elevation_margin) for c in configs} == {(1, 1), (2, 1), (4, 2)}
@@ -90,7 +97,12 @@ def test_a_further_policy_stands_beside_the_papers_in_conditions_that_it_feels()
 def test_every_further_policy_that_is_played_is_shown_and_marked(policy):
     rows = [row(config, distance(config)) for config in configurations(range(2), [policy])]
     tags = {"history-oracle": "privileged"}
-    table = ablation_tables([each | {"tags": tags.get(each["policy"], "causal")} for each in rows])[0]
-    assert table.columns[-1] == {"care-sbf": "minus care-sbf", "history-oracle": "minus history-oracle †"}[policy]
+    table = ablation_tables([each | {"tags": tags.get(each["policy"], "causal")} for each in rows])[
+        0
+    ]
+    assert (
+        table.columns[-1]
+        == {"care-sbf": "minus care-sbf", "history-oracle": "minus history-oracle †"}[policy]
+    )
     assert bool(table.notes) == (policy == "history-oracle")
     assert table.files_only == ("quartiles m", "braked", table.columns[-1])

@@ -3,7 +3,14 @@ import pytest
 from care_sim.core.conditions import Sensing
 from care_sim.reports.figures.faults import NAMES, fault_figures
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.faults import FAULTS, PLACES, Played, configurations, fault_tables, order
+from care_sim.reports.tables.faults import (
+    FAULTS,
+    PLACES,
+    Played,
+    configurations,
+    fault_tables,
+    order,
+)
 from tests.helpers.made_rows import row
 
 SEEDS = range(5)
@@ -23,7 +30,10 @@ def distance(config):
 
 @pytest.fixture(scope="module")
 def rows():
-    return [row(config, distance(config), braked=config.policy != "history") for config in configurations(SEEDS)]
+    return [
+        row(config, distance(config), braked=config.policy != "history")
+        for config in configurations(SEEDS)
+    ]
 
 
 def test_the_strength_at_which_the_order_changes_is_found(rows):
@@ -59,7 +69,11 @@ def test_the_tables_hold_every_fault_place_policy_and_strength(rows):
 
 def test_one_miss_in_thirty_does_not_change_the_order():
     missed = BY_TITLE["missed objects"]
-    made = [row(config, distance(config)) for config in configurations(range(30)) if config.scenario == "dartout"]
+    made = [
+        row(config, distance(config))
+        for config in configurations(range(30))
+        if config.scenario == "dartout"
+    ]
     for each in made:
         if (each["policy"], each["seed"], each["false_negative_rate"]) == ("care", 3, 0.4):
             each |= {"detection_distance_m": None, "undetected_to_m": 3.0}
@@ -104,7 +118,9 @@ def test_a_figure_for_every_place_and_measure(rows):
         assert all(bottom <= height <= top for height in drawn if height == height)
         assert not any(axes.axison for axes in figure.axes if axes not in panels)
     missed = figures["faults-dartout-detection"].axes[0]
-    hollow = [list(line.get_xdata()) for line in missed.lines if line.get_markerfacecolor() == "white"]
+    hollow = [
+        list(line.get_xdata()) for line in missed.lines if line.get_markerfacecolor() == "white"
+    ]
     assert [5] in hollow
 
 

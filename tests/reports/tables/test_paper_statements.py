@@ -10,7 +10,11 @@ def distance(config):
     """First detections as the paper has them."""
     if config.policy == "history":
         return 11.9
-    return 10.3 if (config.scenario, config.policy, config.budget) == ("dense", "all-camera", 0.03) else 15.1
+    return (
+        10.3
+        if (config.scenario, config.policy, config.budget) == ("dense", "all-camera", 0.03)
+        else 15.1
+    )
 
 
 def outcome(config):
@@ -54,13 +58,21 @@ DARTOUT = {"scenario": "dartout", "budget": 0.1, "false_negative_rate": 0.0, "ca
         (DARTOUT | {"policy": "history"}, {"braked": True}, "brakes in 3 of 5"),
         (DARTOUT | {"policy": "all-camera"}, {"min_distance_m": 5.0}, "5.7 m or more"),
         (DARTOUT | {"policy": "history"}, {"min_distance_m": 5.5}, "history at 4.0 m"),
-        ({"scenario": "dense", "policy": "full"}, {"detection_distance_m": 16.0}, "within 0.5 m of full"),
+        (
+            {"scenario": "dense", "policy": "full"},
+            {"detection_distance_m": 16.0},
+            "within 0.5 m of full",
+        ),
         (
             {"scenario": "dense", "policy": "all-camera", "budget": 0.03},
             {"detection_distance_m": 13.0},
             "3 m later than care",
         ),
-        ({"scenario": "dense", "policy": "care", "budget": 0.2}, {"detection_distance_m": 16.0}, "dense from 5%"),
+        (
+            {"scenario": "dense", "policy": "care", "budget": 0.2},
+            {"detection_distance_m": 16.0},
+            "dense from 5%",
+        ),
         ({"scenario": "cutin", "policy": "history"}, {"detection_distance_m": 18.0}, "cut-in"),
         ({"policy": "care", "false_negative_rate": 0.4}, MISSED, "missed detections"),
         ({"scenario": "dense", "policy": "care", "budget": 0.2}, MISSED, "dense from 5%"),
@@ -76,7 +88,10 @@ def test_each_statement_can_differ(where, values, text):
 
 def test_both_sides_are_shown():
     texts = [str(statement) for statement in statements(STUDY)]
-    assert "agrees: dense 3%: all-camera detects at least 3 m later than care. Paper: 10.3 against 15.1. " in texts[6]
+    assert (
+        "agrees: dense 3%: all-camera detects at least 3 m later than care. Paper: 10.3 against "
+        "15.1. " in texts[6]
+    )
     assert texts[6].endswith("Here: 10.3 against 15.1.")
 
 

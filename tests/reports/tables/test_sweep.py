@@ -11,7 +11,11 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.row_reading import setting_of
 from tests.helpers.made_rows import STUDY, row, rows
 
-ORACLE = rows("history", [9.0, 10.0, 11.0, 12.0, 13.0], changes={"policy": "history-oracle", "tags": "privileged"})
+ORACLE = rows(
+    "history",
+    [9.0, 10.0, 11.0, 12.0, 13.0],
+    changes={"policy": "history-oracle", "tags": "privileged"},
+)
 
 
 def levels(study=STUDY):
@@ -60,12 +64,19 @@ def test_a_quantile_on_a_miss_reads_not_detected(distances, text):
 
 
 def test_care_is_compared_with_every_policy_at_every_budget():
-    study = [*STUDY, *rows("care", [15.0] * 5, budget=0.1), *rows("history", [14.0] * 5, budget=0.1)]
+    study = [
+        *STUDY,
+        *rows("care", [15.0] * 5, budget=0.1),
+        *rows("history", [14.0] * 5, budget=0.1),
+    ]
     found = blocks(study)
     assert sweep_tables(study)[1].columns == ("care minus", "3%", "10%")
     assert found["First detection, m", "all-camera"] == ("+5.0* [5.0,5.0]", "")
     assert found["First detection, m", "history"][1] == "+1.0 [1.0,1.0]"
-    assert [isinstance(entry, Bold) for entry in found["First detection, m", "history"]] == [True, True]
+    assert [isinstance(entry, Bold) for entry in found["First detection, m", "history"]] == [
+        True,
+        True,
+    ]
     assert found["First detection, m", "history"][0].startswith("≥+12.2* [")
     assert found["First detection, m", "full"][0].startswith("-0.1 [-0.3,0.0]")
     assert not isinstance(found["First detection, m", "full"][0], Bold)
@@ -81,7 +92,9 @@ def test_the_full_scan_alone_has_nothing_to_regret():
 
 
 def test_what_is_learned_is_compared_with_every_policy_too():
-    learned = rows("learned-scorer", [14.0, 15.0, 16.0, 17.0, 18.0], changes={"tags": "causal+learned"})
+    learned = rows(
+        "learned-scorer", [14.0, 15.0, 16.0, 17.0, 18.0], changes={"tags": "causal+learned"}
+    )
     found = {table.title: table for table in sweep_tables([*STUDY, *learned])}
     assert [title for title in found if "minus" in title] == [
         "dense: care minus each policy",
@@ -112,15 +125,22 @@ def test_policies_that_no_car_can_have_are_marked():
     table, contrasts = sweep_tables([*STUDY, *ORACLE])
     assert "history-oracle †" in {line[1] for line in table.rows}
     assert "history-oracle †" in {line[0] for line in contrasts.rows}
-    assert all("† knows the truth: no policy of a car." in each.notes for each in (table, contrasts))
+    assert all(
+        "† knows the truth: no policy of a car." in each.notes for each in (table, contrasts)
+    )
     assert not any("‡" in note for note in table.notes)
 
 
 def test_the_terminal_shows_every_cell_in_80_columns():
     terminal = io.StringIO()
-    Console(width=80, file=terminal).print(*(table.rich() for table in sweep_tables([*STUDY, *ORACLE])))
+    Console(width=80, file=terminal).print(
+        *(table.rich() for table in sweep_tables([*STUDY, *ORACLE]))
+    )
     shown = terminal.getvalue()
-    assert all(part in shown for part in ("history-oracle †", "12.0 [11.0, 13.0]", "2/5", "15.1", "+5.0* [5.0,5.0]"))
+    assert all(
+        part in shown
+        for part in ("history-oracle †", "12.0 [11.0, 13.0]", "2/5", "15.1", "+5.0* [5.0,5.0]")
+    )
     assert "…" not in shown
     assert max(map(len, shown.splitlines())) <= 80
 
