@@ -1,5 +1,5 @@
-"""The action of the environments: a score per cell, the cells that it fires, and the share of the
-budget of each.
+"""The action of the environments: scores of the cells, which of them fire, and which share of the
+budget each of these came from.
 """
 
 import numpy as np
@@ -10,9 +10,13 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
 
+SHARES = ("not fired", "exploitation", "reserve", "floor", "chosen")
+NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN = range(len(SHARES))
+"""Places in SHARES."""
+
 
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
-    """The action (E, A) that makes `fired_cells` choose `cells`, earlier ones scored higher."""
+    """The action (E, A) that makes `fired_cells` choose `cells` (n,); the earlier, the higher."""
     scores = np.zeros(shape[0] * shape[1], np.float32)
     scores[cells] = np.arange(len(cells), 0, -1, dtype=np.float32) / max(len(cells), 1)
     return scores.reshape(shape)
@@ -21,33 +25,28 @@ def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
 def fired_cells(
     scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, floor: Cells | None
 ) -> Cells:
-    """The cells an action fires, ascending: the `budget` highest strictly positive scores, ties by
-    ascending index, topped up from `floor` when there are fewer (None leaves them unspent).
+    """The cells that an action fires, ascending.
+
+    They are the `budget` highest strictly positive `scores` (E, A), ties by ascending index. Where
+    there are fewer, `floor` tops them up; None leaves the rest unspent.
     """
     flat = scores.ravel().astype(np.float32, copy=False)
     chosen = np.flatnonzero(flat > 0)
     if len(chosen) > budget:
         chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]
     elif floor is not None and len(chosen) < budget:
-        free = floor[
-            :budget
-        ]  # enough of it, whatever is chosen: of these at most len(chosen) are taken
+        # So much of the floor is enough: at most len(chosen) of these cells are taken.
+        free = floor[:budget]
         chosen = np.concatenate([chosen, free[flat[free] <= 0][: budget - len(chosen)]])
     return np.sort(chosen)
 
 
-SHARES = ("not fired", "exploitation", "reserve", "floor", "chosen")
-
-
-NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN = range(len(SHARES))
-
-
 def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> NDArray[np.uint8]:
-    """(E, A) the share of every cell, an index into `SHARES`.
+    """(E, A) the share of the budget that each of the cells `fired` came from, an index into
+    `SHARES`.
 
-    Exploitation fills first, whatever the layers ask for, so that the allocator without the layers
-    tells where it ended. Without the `demand` behind the `action`, or if it is not the one behind
-    it, what the action scored is no more than "chosen".
+    `demand` is what the policy asked for. If it is None, or not the one behind the `action`, what
+    the action scored is "chosen", since more is not known.
     """
     shares = np.zeros(rig.grid.size, np.uint8)
     shares[fired] = FLOOR
@@ -56,8 +55,9 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
     if demand is not None:
         taken = allocate(demand, rig.budget, rig.reserve_fraction)
         if np.array_equal(np.sort(taken), scored):
+            # Exploitation fills first, whatever the layers ask for: without them, the allocator
+            # takes its cells and no others.
+            first = allocate(Demand(demand.exploitation), rig.budget, rig.reserve_fraction)
             shares[taken] = RESERVE
-            shares[allocate(Demand(demand.exploitation), rig.budget, rig.reserve_fraction)] = (
-                EXPLOITATION
-            )
+            shares[first] = EXPLOITATION
     return shares.reshape(rig.grid.shape)

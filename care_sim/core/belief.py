@@ -52,7 +52,8 @@ class Belief:
         """
         if not (isinstance(observation, Mapping) and all(key in observation for key in OBSERVED)):
             raise InvalidInput(
-                "an observation of CARE-Sim's environments is needed, as they give it without wrappers"
+                "an observation of CARE-Sim's environments is needed,"
+                " as they give it without wrappers"
             )
         ego = _vector(observation, "ego", 3)
         (budget,) = _vector(observation, "budget", 1)
@@ -130,8 +131,8 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
         or not all(map(float.is_integer, leads))
     ):
         raise InvalidInput(
-            f"{key} of an observation: a row must begin with a whole number, -1 where it is padding,"
-            f" and be of a class 0 to {len(CLASSES) - 1}"
+            f"{key} of an observation: a row must begin with a whole number, -1 where it is"
+            f" padding, and be of a class 0 to {len(CLASSES) - 1}"
         )
     return rows
 

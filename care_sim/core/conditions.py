@@ -22,11 +22,11 @@ MIN_RETURNS = 3
 CAMERA_CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
 MOST_FALSE_BOXES = 64
-"""False detections a picture, on average: half as many as a policy is shown at most."""
+"""False detections per picture, on average: half as many as a policy is shown at most."""
 MOST_KEYFRAMES = 1200
-"""Of an episode: a minute in steps of 0.05 s. No fault needs to last longer."""
+"""No fault needs to last longer: a minute in steps of 0.05 s, as long as an episode may be."""
 LONGEST_BLACKOUT_S = 3600.0
-"""Far beyond the end of any episode or recorded scene."""
+"""Latest begin and longest time of a blackout: far beyond the end of any episode or scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,32 +40,32 @@ class CameraFaults:
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
     false_positive_rate: float = bounded(0.0, 0, MOST_FALSE_BOXES)
-    """Mean number of boxes in a picture that show nothing; each by itself is much like the true
-    ones, which they are drawn from (`care_sim.sensors.false_boxes`), so that where the camera never
-    sees anybody there are none.
+    """Mean number of boxes per picture that show nothing. Each by itself is much like the true ones.
+    They are drawn from these (`care_sim.sensors.false_boxes`), so there are none where the camera
+    never sees anybody.
     """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
     blackout_start_s: float = bounded(0.0, 0, LONGEST_BLACKOUT_S)
-    """When the camera goes black, seconds from the start; it does only with `blackout_s`."""
+    """When the camera goes black, seconds from the start; only with `blackout_s`."""
     blackout_s: float = bounded(0.0, 0, LONGEST_BLACKOUT_S)
     """How long the camera's pictures are black, seconds."""
     camera_rotation_sigma_deg: float = bounded(0.0, 0, 180)
-    """Spread of the error in yaw and pitch with which the camera is mounted, degrees; drawn once an
-    episode.
+    """Spread of the error in yaw and pitch with which the camera is mounted, degrees; drawn once
+    per episode.
     """
     camera_position_sigma_m: float = bounded(0.0, 0, 10)
-    """Spread of the error in x, y and z with which the camera is mounted, metres; drawn once an
+    """Spread of the error in x, y and z with which the camera is mounted, metres; drawn once per
     episode.
     """
 
     def black_at(self, time_s: float) -> bool:
         """Whether a picture taken at `time_s` is black."""
-        return (
-            self.blackout_start_s - 1e-9 <= time_s < self.blackout_start_s + self.blackout_s - 1e-9
-        )
+        # Times are sums of steps: a keyframe on the edge of the blackout may miss it by a last bit.
+        begin, end = self.blackout_start_s - 1e-9, self.blackout_start_s + self.blackout_s - 1e-9
+        return begin <= time_s < end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,15 +73,15 @@ class LidarFaults:
     """What the LiDAR gets wrong."""
 
     lidar_range_sigma: float = bounded(0.0, 0, 50)
-    """Gaussian noise on every range, metres, folded back at 0 and at the reach; policies meet it,
-    the proxy detector, whose boxes are true, does not.
+    """Gaussian noise on every range, metres, folded back at 0 and at the reach. Policies meet it;
+    the proxy detector does not, since its boxes are true.
     """
     lidar_dropout: float = bounded(0.0, 0, 1)
     """Share of returns that are lost, 0 to 1."""
     lidar_dead_rows: tuple[int, ...] = ()
     """Elevation rows that fire and return nothing; row 0 is the highest."""
 
-    def _settle_rows(self) -> None:
+    def _check_rows(self) -> None:
         rows: Any = self.lidar_dead_rows
         if not (
             isinstance(rows, list | tuple) or (isinstance(rows, np.ndarray) and rows.ndim == 1)
@@ -99,12 +99,12 @@ class Sensing(CameraFaults, LidarFaults):
     """
 
     ego_speed_sigma: float = bounded(0.0, 0, 10)
-    """Gaussian noise on the car's own speed, as policy and controller read it, m/s; it never turns
+    """Gaussian noise on the car's own speed as policy and controller read it, m/s; it never changes
     the sign. The acceleration beside it is exact.
     """
     engine: str = "fast"
-    """What casts the rays and draws the pictures of the closed loop: `fast`, compiled, or `bullet`,
-    PyBullet's own, the reference.
+    """What casts the rays and draws the pictures of the closed loop: `fast`, which is compiled, or
+    `bullet`, PyBullet's own and the reference.
     """
     min_returns: int = bounded(MIN_RETURNS, 1, LARGEST_INTEGER)
     """Fired rays that must hit an object for it to be detected."""
@@ -115,15 +115,15 @@ class Sensing(CameraFaults, LidarFaults):
 
     def __post_init__(self) -> None:
         check_fields(self)
-        self._settle_rows()
+        self._check_rows()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions(Sensing):
     """All conditions: sensing, and how the budget is spent.
 
-    `care_sim.core.rig.Rig` checks what the allocator is given, the environments whether engine and
-    rows exist.
+    `care_sim.core.rig.Rig` checks what the allocator is given; the environments check whether
+    engine and rows exist.
     """
 
     reserve_fraction: float = bounded(RESERVE_FRACTION, 0, 1)
@@ -149,4 +149,5 @@ UNUSED_BY_FULL_SCAN = (
     "azimuth_margin",
     "elevation_margin",
 )
-"""A scan of every cell asks neither the camera nor the allocator."""
+"""Conditions that change nothing for a scan of every cell: it asks neither the camera nor the
+allocator."""

@@ -1,4 +1,7 @@
-"""Algorithm 3 of the paper: safety-bounded forgetting (SBF) shrinks the hulls of harmless tracks."""
+"""Algorithm 3 of the paper, with Eqs. 3 and 4: safety-bounded forgetting (SBF).
+
+The hulls of harmless tracks shrink and are served after the full ones.
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +10,8 @@ from numpy.typing import NDArray
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.core.frames import Floats
-from care_sim.core.grid import AZIMUTH_MARGIN, Cells
+from care_sim.core.grid import Cells
+from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks
 
 
@@ -39,38 +43,55 @@ class ForgettingRules:
 
 
 class Forgetting:
-    """Streak counters of Algorithm 3; one instance lives as long as an episode."""
+    """Algorithm 3: streak counters of the tracks, and the hulls that follow from them. One instance
+    lives as long as an episode.
+    """
 
-    def __init__(self, rules: ForgettingRules, column_width: float, margin: int = AZIMUTH_MARGIN):
+    def __init__(self, rules: ForgettingRules, rig: Rig):
         self.rules = rules
-        self.column_width = column_width
-        self.margin = margin
+        self._rig = rig
         self._streaks: dict[int, int] = {}
 
+    def exploitation(self, tracks: Tracks, ego: Ego) -> list[Cells]:
+        """Advance the streaks by one keyframe: the exploitation sets for Algorithm 1, full hulls
+        first, shrunk hulls second, each in the order of the tracks.
+        """
+        margins, low = self.margins(tracks, ego)
+        hulls = self._rig.hulls(tracks.boxes, margins)
+        full = [hull for hull, is_low in zip(hulls, low, strict=True) if not is_low]
+        shrunk = [hull for hull, is_low in zip(hulls, low, strict=True) if is_low]
+        return [*full, *shrunk]
+
     def margins(self, tracks: Tracks, ego: Ego) -> tuple[Cells, NDArray[np.bool_]]:
-        """Advance the streaks by one keyframe: (n,) azimuth margins and (n,) which tracks are
-        low-critical.
+        """Advance the streaks by one keyframe: (n,) azimuth margins in columns, and (n,) which
+        tracks are of low criticality. The margin in elevation is never dropped.
         """
         low = self._low_criticality(tracks, ego)
         ids = tracks.ids.tolist()
+        # A track that is gone is no key any more: if its id came back, its streak would begin anew.
         self._streaks = {
             track: self._streaks.get(track, 0) + 1 if is_low else 0
             for track, is_low in zip(ids, low.tolist(), strict=True)
         }
         streaks = np.array([self._streaks[track] for track in ids], dtype=float)
-        decayed = np.ceil(self.margin - self.rules.decay_per_keyframe * streaks)
-        shrunk = np.clip(np.maximum(decayed, self._uncertainty(tracks.ranges)), 0, self.margin)
-        return np.where(low, shrunk, self.margin).astype(np.int64), low
+        margin = self._rig.azimuth_margin
+        decayed = np.ceil(margin - self.rules.decay_per_keyframe * streaks)
+        shrunk = np.clip(np.maximum(decayed, self._uncertainty(tracks.ranges)), 0, margin)
+        return np.where(low, shrunk, margin).astype(np.int64), low
 
     def _low_criticality(self, tracks: Tracks, ego: Ego) -> NDArray[np.bool_]:
+        """(n,) which tracks recede or stand still, beyond the guard distance."""
         ranges = np.maximum(tracks.ranges, 1e-9)
+        # Velocities are over ground, but what recedes does so from the car, which drives along x.
         relative = tracks.velocities - [ego.speed, 0.0]
         range_rate = np.einsum("ij,ij->i", relative, tracks.boxes[:, :2]) / ranges
         receding = range_rate > self.rules.receding_mps
         static = np.hypot(*tracks.velocities.T) < self.rules.static_mps
+        # A track seen once has no velocity yet: its 0 says nothing.
         harmless: NDArray[np.bool_] = (receding | static) & (tracks.hits > 1)
         return harmless & (ranges > self.rules.guard_distance(ego.speed))
 
     def _uncertainty(self, ranges: Floats) -> Floats:
         """m_unc of Eq. 4, in columns."""
-        return np.ceil(self.rules.position_sigma_m / np.maximum(ranges, 1e-9) / self.column_width)
+        angle = self.rules.position_sigma_m / np.maximum(ranges, 1e-9)
+        return np.ceil(angle / self._rig.grid.column_width)

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
 
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
-    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z (one angle, or one a vector)."""
+    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z (one angle, or one per vector)."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
@@ -27,15 +28,11 @@ _LOCKED = 1 - 1e-13
 """Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it is told
 as yaw.
 """
+_AROUND = ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
+_CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in _AROUND])
 
-_CORNERS = np.array(
-    [
-        [x, y, z]
-        for z in (-0.5, 0.5)
-        for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
-    ]
-)
-
+# A corner is joined to the one above it, and to the next and the one before in its own square of
+# four: their numbers there differ by 1 or 3.
 BOX_EDGES = np.array(
     [(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)]
 )
@@ -85,7 +82,7 @@ class Frame:
         return cls(x, y, z, yaw, roll, pitch)
 
     def holding(self, origin: Floats, rotation: Rotation | None = None) -> "Frame":
-        """The world frame of what is fixed in this one at `origin` (3,) and turned by `rotation`."""
+        """The world frame of what is fixed in this one at `origin` (3,), turned by `rotation`."""
         turn = self.rotation if rotation is None else self.rotation * rotation
         return Frame.turned_by(turn, self.origin + self.vectors_to_world(origin))
 
@@ -112,19 +109,20 @@ class Frame:
         plane.
         """
         if self._upright:
-            return _moved(boxes - self._offset, -self.yaw)
-        return _replaced(
-            boxes, self.vectors_to_local(boxes[:, :3] - self.origin), self.vectors_to_local
-        )
+            return _centres_turned(boxes - self._offset, -self.yaw)
+        centres = self.vectors_to_local(boxes[:, :3] - self.origin)
+        return _boxes_turned(boxes, centres, self.vectors_to_local)
 
     def boxes_to_world(self, boxes: Floats) -> Floats:
-        """Boxes (n, 7) of this frame in the world: exact centres, headings projected on the ground."""
+        """Boxes (n, 7) of this frame in the world: exact centres, headings projected on the
+        ground.
+        """
         if self._upright:
-            return _moved(boxes, self.yaw) + self._offset
-        return _replaced(
-            boxes, self.origin + self.vectors_to_world(boxes[:, :3]), self.vectors_to_world
-        )
+            return _centres_turned(boxes, self.yaw) + self._offset
+        centres = self.origin + self.vectors_to_world(boxes[:, :3])
+        return _boxes_turned(boxes, centres, self.vectors_to_world)
 
+    # A car on level ground is by far the most frequent frame, and needs no matrices.
     @property
     def _upright(self) -> bool:
         return self.roll == 0 and self.pitch == 0
@@ -134,15 +132,13 @@ class Frame:
         return np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0, self.yaw])
 
 
-def _moved(boxes: Floats, yaw: float) -> Floats:
+def _centres_turned(boxes: Floats, yaw: float) -> Floats:
+    """Boxes (n, 7) whose centres are turned about the origin; headings as they are."""
     return np.concatenate([turned(boxes[:, :3], yaw), boxes[:, 3:]], axis=1)
 
 
-def _replaced(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:
+def _boxes_turned(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:
     """Boxes of the same sizes at `centres` (n, 3), their headings turned by `turn`."""
     yaw = boxes[:, 6]
     heading = turn(np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))]))
     return np.column_stack([centres, boxes[:, 3:6], np.arctan2(heading[:, 1], heading[:, 0])])
-
-
-Integers = NDArray[np.int64]

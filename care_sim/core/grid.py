@@ -26,7 +26,7 @@ AZIMUTH_MARGIN = 2
 ELEVATION_MARGIN = 1
 """Dilation of hulls and wedges, in rows (paper, Remark 2)."""
 MOST_COLUMNS, MOST_ROWS = 2**14, 2**10
-"""Of a grid: a thousand times the cells of the paper's."""
+"""Bounds of a grid: a thousand times the cells of the paper's."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ class AngularGrid:
         """(N, 3) unit vectors of the rays, one through the centre of every cell."""
         (cos_az, sin_az), (cos_el, sin_el) = (angles.T for angles in self.fan)
         level = np.broadcast_to(sin_el[:, None], self.shape)
-        directions = np.stack(
-            [np.outer(cos_el, cos_az), np.outer(cos_el, sin_az), level], axis=-1
-        ).reshape(-1, 3)
+        forward, left = np.outer(cos_el, cos_az), np.outer(cos_el, sin_az)
+        directions = np.stack([forward, left, level], axis=-1).reshape(-1, 3)
+        # Whoever asks shares the table, and a write would change the grid of all.
         directions.flags.writeable = False
         return directions
 
@@ -147,16 +147,15 @@ class AngularGrid:
         return self._rectangles(azimuths, elevations, margins, elevation_margin)
 
     def _row(self, elevation: Floats) -> Cells:
-        """The row of every elevation, as the rays' are equally far apart; any whole number."""
+        """The row whose ray is nearest to every elevation; on the grid or beyond it."""
         return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
 
     def _rectangles(
         self, azimuths: Floats, elevations: Floats, margins: Cells, elevation_margin: int
     ) -> list[Cells]:
         """The cells of every rectangle; see `care_sim.core.grid_kernels.rectangle_cells`."""
-        cells, ends = rectangle_cells(
-            azimuths, elevations, margins, elevation_margin, self._spacing
-        )
+        spacing = self._spacing
+        cells, ends = rectangle_cells(azimuths, elevations, margins, elevation_margin, spacing)
         return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
 
     @cached_property

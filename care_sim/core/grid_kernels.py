@@ -1,4 +1,6 @@
-"""The cells of dilated angular rectangles, compiled: hulls and wedges are such (paper, Remark 2)."""
+"""The cells of dilated angular rectangles, compiled: every hull and every wedge is one (paper,
+Remark 2).
+"""
 
 import math
 from typing import NamedTuple

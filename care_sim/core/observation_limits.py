@@ -1,25 +1,24 @@
-"""What an observation can hold: the bounds of its numbers, and which rows its tables keep. Both
-loops ask here.
+"""What an observation can hold: the bounds of its numbers, and which rows its tables keep.
 
-A bound is what the sensors can tell. What goes beyond is mended before a policy or the controller
-reads it, column by column:
+Both loops ask here. A bound is what the sensors can tell. What goes beyond is mended before a
+policy or the controller reads it, column by column:
 
 | columns | bound | beyond it |
 |---|---|---|
-| ego speed, acceleration | 100 m/s, 100 m/s^2; the speed is signed, since the gear tells the way | clipped |
-| ego yaw rate | two turns a second | clipped |
-| image box | its own camera's picture | clipped; a box wholly outside shows nothing and is left out |
+| ego speed, acceleration | 100 m/s, 100 m/s^2; the speed has a sign: below 0 backwards | clipped |
+| ego yaw rate | two turns per second | clipped |
+| image box | its own camera's picture | clipped; left out if wholly outside |
 | age | an hour | clipped |
-| yaw, yaw change | two turns | brought back by whole turns, which change no direction |
-| x, y, z | 100 m, twice the reach: further off a LiDAR track is a guess | shortened, the bearing stays |
-| vx, vy | 100 m/s: more is a track that jumped from one object to another | shortened, the heading stays |
+| yaw, yaw change | two turns | brought back by whole turns: the direction stays |
+| x, y, z | 100 m, twice the reach; further off, a track is a guess | shortened: the bearing stays |
+| vx, vy | 100 m/s; more is a track that changed its object | shortened: the heading stays |
 | length, width, height | 50 m | clipped |
-| ids and counts | 2^24, the largest whole number that float32 holds beside all smaller ones | clipped |
+| ids and counts | 2^24: float32 holds all whole numbers up to it | clipped |
 
-The tables have `MAX_DETECTIONS` and `MAX_TRACKS` rows. Of more detections the first stay: the
-camera gives the surest first. Of more tracks there stay, for every detection, the nearest forecast
-that explains it, so that Eq. 2 finds explained what it would with all of them, and then the
-nearest; nearest first, as ever.
+The tables have `MAX_DETECTIONS` and `MAX_TRACKS` rows. If there are more detections, the first
+stay: the camera gives the surest first. If there are more tracks, the nearest forecast that
+explains a detection stays for every detection, so that Eq. 2 has the same answers as with all
+tracks. The nearest of the others fill the table. The order stays: nearest first.
 """
 
 from dataclasses import dataclass
@@ -66,7 +65,8 @@ class Limits:
     @cached_property
     def tracks(self) -> Floats:
         """Of `Tracks.COLUMNS`; id -1 pads."""
-        far, classes, counts = 2 * self.rig.grid.range_m, len(CLASSES) - 1, [HIGHEST] * 2
+        far, classes = 2 * self.rig.grid.range_m, len(CLASSES) - 1
+        counts = [HIGHEST, HIGHEST]
         moving = [MAX_TURN, MAX_SPEED_MPS, MAX_SPEED_MPS]
         most = np.array([HIGHEST, classes, *[far] * 3, *[MAX_SIZE_M] * 3, *moving, *counts])
         least = np.array([-1, 0, *[-far] * 3, *[0] * 3, *np.negative(moving), 0, 0])
@@ -78,12 +78,11 @@ class Limits:
         """What a policy is told of a keyframe, within the limits. `tracks` come nearest first,
         `ranges` (E, A) lie between 0 and the reach.
         """
-        seen = self._seen(detections)
-        return Belief(
-            self._own(ego), self.rig.budget, seen, self._kept(self._followed(tracks), seen), ranges
-        )
+        detections = self._limited_detections(detections)
+        tracks = self._fitting(self._limited_tracks(tracks), detections)
+        return Belief(self._limited_ego(ego), self.rig.budget, detections, tracks, ranges)
 
-    def _own(self, ego: Ego) -> Ego:
+    def _limited_ego(self, ego: Ego) -> Ego:
         values = ego.speed, ego.yaw_rate, ego.acceleration
         if all(abs(value) <= most for value, most in zip(values, _EGO, strict=True)):
             return ego
@@ -92,12 +91,13 @@ class Limits:
     @cached_property
     def _pictured(self) -> tuple[Floats, Floats]:
         """The least (9,) and for every camera the most (k, 9) of a detection."""
-        cameras, last = self.rig.cameras, max(len(self.rig.cameras) - 1, 1)
+        cameras = self.rig.cameras
+        last = max(len(cameras) - 1, 1)
         edges = [[camera.width, camera.height] * 2 for camera in cameras]
         most = np.array([[len(CLASSES) - 1, 1, *edge, last, MAX_AGE_S, MAX_TURN] for edge in edges])
         return np.array([0, 0, *[0] * 4, 0, 0, -MAX_TURN]), most
 
-    def _seen(self, detections: ImageDetections) -> ImageDetections:
+    def _limited_detections(self, detections: ImageDetections) -> ImageDetections:
         rows, (least, most) = detections.rows(), self._pictured
         most = most[detections.cameras]
         if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
@@ -106,29 +106,29 @@ class Limits:
         left, top, right, bottom = rows[:, _BOX].T
         width, height = most[:, _BOX][:, 2:].T
         shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
-        rows[:, _YAW_CHANGE] = _unwound(rows[:, _YAW_CHANGE])
+        rows[:, _YAW_CHANGE] = _without_turns(rows[:, _YAW_CHANGE])
         return ImageDetections.from_rows(np.clip(rows, least, most)[shown][:MAX_DETECTIONS])
 
-    def _followed(self, tracks: Tracks) -> Tracks:
+    def _limited_tracks(self, tracks: Tracks) -> Tracks:
         rows, (least, most) = tracks.rows(), self.tracks
         if _within(rows, least, most):
             return tracks
         rows = rows.copy()
-        rows[:, _YAW] = _unwound(rows[:, _YAW])
+        rows[:, _YAW] = _without_turns(rows[:, _YAW])
         for columns in (_PLACE, _VELOCITY):
             rows[:, columns] = _shortened(rows[:, columns], most[columns.start])
         return Tracks.from_rows(np.clip(rows, least, most))
 
-    def _kept(self, tracks: Tracks, seen: ImageDetections) -> Tracks:
-        """As many of the tracks as the table holds."""
+    def _fitting(self, tracks: Tracks, detections: ImageDetections) -> Tracks:
+        """As many of the tracks as the table holds; see above which."""
         if len(tracks) <= MAX_TRACKS:
             return tracks
         # A centre on the edge of a box may move across it in float32, so the matching is that of
         # what will be shown.
         shown = Tracks.from_rows(tracks.rows().astype(np.float32))
-        first = explaining_tracks(
-            ImageDetections.from_rows(seen.rows().astype(np.float32)), shown, self.rig
-        )
+        seen = ImageDetections.from_rows(detections.rows().astype(np.float32))
+        first = explaining_tracks(seen, shown, self.rig)
+        # Those that explain something come first; a stable sort leaves both kinds nearest first.
         order = np.ones(len(tracks), np.int64)
         order[first[first >= 0]] = 0
         return tracks.take(np.sort(np.argsort(order, kind="stable")[:MAX_TRACKS]))
@@ -138,7 +138,7 @@ def _within(rows: Floats, least: Floats, most: Floats) -> bool:
     return bool((rows >= least).all() and (rows <= most).all())
 
 
-def _unwound(angles: Floats) -> Floats:
+def _without_turns(angles: Floats) -> Floats:
     """Angles beyond `MAX_TURN`, less whole turns; the others as they are."""
     return np.where(np.abs(angles) > MAX_TURN, np.remainder(angles, 2 * np.pi), angles)
 

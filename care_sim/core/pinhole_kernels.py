@@ -173,7 +173,7 @@ def _lay_corners(box: Floats, camera: CameraModel, corners: Floats) -> None:
 
 @compiled()
 def _widened(span: Numbers4, point: Floats, camera: CameraModel) -> Numbers4:
-    """A span (left, top, right, bottom) that holds the pixel of a point (depth, left, up) as well."""
+    """A span (left, top, right, bottom), widened to hold the pixel of a point (depth, left, up)."""
     u = camera.centre[0] - camera.focal * point[1] / point[0]
     v = camera.centre[1] - camera.focal * point[2] / point[0]
     return min(span[0], u), min(span[1], v), max(span[2], u), max(span[3], v)

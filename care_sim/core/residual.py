@@ -20,11 +20,14 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
     U is the reserve layer of CARE. Both are in the order of the detections.
     """
     unexplained: list[Cells] = []
-    known: list[Cells] = []
-    is_known = explained(belief.detections, belief.tracks, rig).tolist()
-    for wedge, one_is_known in zip(wedges(belief.detections, rig), is_known, strict=True):
-        (known if one_is_known else unexplained).append(wedge)
-    return unexplained, known
+    by_memory: list[Cells] = []
+    is_explained = explained(belief.detections, belief.tracks, rig).tolist()
+    for wedge, known in zip(wedges(belief.detections, rig), is_explained, strict=True):
+        if known:
+            by_memory.append(wedge)
+        else:
+            unexplained.append(wedge)
+    return unexplained, by_memory
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[np.bool_]:

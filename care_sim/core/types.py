@@ -18,11 +18,11 @@ from care_sim.core.grid import Cells
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
 """The five driving classes shared by both detectors and the scoring (paper, Sec. 5.1)."""
-
 _EXACT = 2.0**53
 """Up to this a float holds every whole number."""
 
 Action = NDArray[np.float32]
+"""A score per cell, (E, A); see `care_sim.core.actions`."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Ego:
 
 @dataclass(frozen=True)
 class Detections:
-    """3D detections of one keyframe: `classes` (n,), `boxes` (n, 7), `returns` (n,) fired rays that
-    hit.
+    """3D detections of one keyframe, in the sensor frame; `len()` is their number n.
 
-    `scores` (n,) are confidences from 0 to 1; None of a detector that has none.
+    `classes` (n,) index into `CLASSES`, `boxes` (n, 7), `returns` (n,) count the fired rays that
+    hit. `scores` (n,) are confidences from 0 to 1; None of a detector that has none.
     """
 
     classes: Cells
@@ -70,16 +70,8 @@ class ImageDetections:
     yaw_changes: Floats
 
     COLUMNS = (
-        "class",
-        "confidence",
-        "left",
-        "top",
-        "right",
-        "bottom",
-        "camera",
-        "age",
-        "yaw_change",
-    )
+        "class", "confidence", "left", "top", "right", "bottom", "camera", "age", "yaw_change",
+    )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -116,9 +108,10 @@ class ImageDetections:
 class Tracks:
     """Tracked objects as columns of one table; `len()` is their number n.
 
-    Nearest first. `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame, `velocities` (n,
-    2) over ground, `misses` (n,) keyframes since the object was last detected, `hits` (n,)
-    keyframes at which it was; with fewer than two the velocity is not known and reads 0.
+    The nearest comes first. `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame and
+    `velocities` (n, 2) over ground. `misses` (n,) are the keyframes since the object was last
+    detected, `hits` (n,) the keyframes at which it was. With fewer than two hits the velocity is
+    not known and reads 0.
     """
 
     ids: Cells
@@ -129,20 +122,9 @@ class Tracks:
     hits: Cells
 
     COLUMNS = (
-        "id",
-        "class",
-        "x",
-        "y",
-        "z",
-        "length",
-        "width",
-        "height",
-        "yaw",
-        "vx",
-        "vy",
-        "misses",
+        "id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses",
         "hits",
-    )
+    )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.ids)

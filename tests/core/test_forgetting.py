@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.forgetting import Forgetting, ForgettingRules
+from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
 
 WIDTH = 2 * np.pi / 512
@@ -11,7 +12,7 @@ STANDING = Ego()
 
 
 def forgetting(**rules):
-    return Forgetting(ForgettingRules(**rules), WIDTH)
+    return Forgetting(ForgettingRules(**rules), Rig())
 
 
 def settled(tracks, ego=STANDING, keyframes=6, **rules):

@@ -87,7 +87,9 @@ def crowd_film(count):
     cloud = Cloud(cells, np.repeat(boxes[:, :3], 3, axis=0), np.repeat(people.objects, 3))
     identified = IdentifiedDetections(detections_of(*rows), people.objects)
     sensor = Frame(0.0, 0.0, 1.84, 0.0)
-    shots = tuple(Shot(0.5 * k, f"{k}", sensor, STANDING, people, identified, cloud) for k in range(2))
+    shots = tuple(
+        Shot(0.5 * k, f"{k}", sensor, STANDING, people, identified, cloud) for k in range(2)
+    )
     return Film("crowd", SURROUND_CAMERAS, 1.84, 0.5, shots)
 
 

@@ -33,12 +33,9 @@ class CareSbf(Policy):
 
     def reset(self) -> None:
         """Forget the streaks."""
-        self._forgetting = Forgetting(self._rules, self.rig.grid.column_width, self.rig.azimuth_margin)
+        self._forgetting = Forgetting(self._rules, self.rig)
 
     def demand(self, belief: Belief) -> Demand:
         """Full hulls, shrunk hulls, then the layers (U, M)."""
-        margins, low = self._forgetting.margins(belief.tracks, belief.ego)
-        hulls = self.rig.hulls(belief.tracks.boxes, margins)
-        full = [hull for hull, is_low in zip(hulls, low, strict=True) if not is_low]
-        shrunk = [hull for hull, is_low in zip(hulls, low, strict=True) if is_low]
-        return Demand([*full, *shrunk], camera_layers(belief, self.rig))
+        hulls = self._forgetting.exploitation(belief.tracks, belief.ego)
+        return Demand(hulls, camera_layers(belief, self.rig))
