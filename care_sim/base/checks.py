@@ -15,12 +15,8 @@ from care_sim.base.text import shown
 
 LARGEST_INTEGER = 2**31 - 1
 """What a whole number may be where nothing else is said."""
-
-
 LARGEST_SEED = 2**63 - 1
 """What a column of a results file holds."""
-
-
 LONGEST_PATH, LONGEST_NAME = 4095, 255
 """Bytes of a path and of a name in it (Linux)."""
 
@@ -51,12 +47,11 @@ def check_number(
 ) -> None:
     """Raise InvalidInput unless `value` is a finite number within `least` and `most`."""
     if not (is_number(value) and least <= _finite(value) <= most):
+        allowed = "be a finite number"
         if most < math.inf:
             allowed = f"lie in [{least:g}, {most:g}]"
-        else:
-            allowed = (
-                f"be a finite number >= {least:g}" if least > -math.inf else "be a finite number"
-            )
+        elif least > -math.inf:
+            allowed = f"be a finite number >= {least:g}"
         raise InvalidInput(f"{name} must {allowed}, got {shown(value)}")
 
 
@@ -75,11 +70,9 @@ def check_whole(name: str, value: object, least: float, most: float = LARGEST_IN
     """
     whole = int(value) if isinstance(value, Integral) and is_number(value) else None
     if whole is None or not least <= whole <= most:
-        upper = (
-            f" and <= {most}"
-            if most < LARGEST_INTEGER or (whole is not None and whole > most)
-            else ""
-        )
+        # The common bound goes without saying, unless it is what the value breaks.
+        is_told = most < LARGEST_INTEGER or (whole is not None and whole > most)
+        upper = f" and <= {most}" if is_told else ""
         raise InvalidInput(f"{name} must be a whole number >= {least}{upper}, got {shown(value)}")
 
 
@@ -110,20 +103,21 @@ def check_path(name: str, value: object) -> None:
         path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
     except (TypeError, UnicodeError) as error:
         raise InvalidInput(f"{name} must be a path, got {shown(value)}") from error
-    too_long = len(path) > LONGEST_PATH or any(
-        len(part) > LONGEST_NAME for part in path.split(b"/")
-    )
-    if not path or b"\0" in path or too_long:
-        least = (
-            "empty"
-            if not path
-            else "longer than a file system allows"
-            if too_long
-            else "with a null character"
-        )
+    wrong = _wrong_path(path)
+    if wrong:
         raise InvalidInput(
-            f"{name} must be a path, none that is {least}, got {shown(os.fsdecode(path))}"
+            f"{name} must be a path, none that is {wrong}, got {shown(os.fsdecode(path))}"
         )
+
+
+def _wrong_path(path: bytes) -> str:
+    """What makes a path impossible; empty where nothing does."""
+    if not path:
+        return "empty"
+    names = path.split(b"/")
+    if len(path) > LONGEST_PATH or any(len(name) > LONGEST_NAME for name in names):
+        return "longer than a file system allows"
+    return "with a null character" if b"\0" in path else ""
 
 
 def as_array(name: str, value: Any) -> NDArray[Any]:

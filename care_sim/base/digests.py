@@ -9,7 +9,7 @@ from pathlib import Path
 from care_sim.base.package_files import files_below
 
 MOST_FILES = 10_000
-"""Files of a folder whose content is hashed: a second of work."""
+"""A folder with more files is not read: hashing so many takes a second."""
 
 
 def file_digest(path: Path) -> str | None:

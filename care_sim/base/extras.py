@@ -38,7 +38,7 @@ def import_mujoco() -> ModuleType:
 
 
 def import_panda_gym() -> ModuleType:
-    """panda-gym, which registers its environments. Raises MissingExtra with the extra to install."""
+    """panda-gym, whose environments are then registered. Raises MissingExtra with the extra."""
     return _import("panda_gym", "panda-gym", "bench")
 
 
@@ -53,7 +53,7 @@ def import_rerun() -> ModuleType:
 
 
 def vega_bundle() -> str:
-    """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra to install."""
+    """Vega, Vega-Lite and Vega-Embed as one script. Raises MissingExtra with the extra."""
     bundle: str = _import("vl_convert", "A page", "page").javascript_bundle()
     return bundle
 

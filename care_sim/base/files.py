@@ -1,5 +1,5 @@
-"""Files that are there whole or not at all: every file that CARE-Sim writes, but for journals, goes
-through here.
+"""Files that are there whole or not at all. Every file that CARE-Sim writes goes through here, but
+for journals.
 """
 
 import errno
@@ -16,15 +16,16 @@ from tempfile import TemporaryDirectory
 
 from care_sim.base.errors import InvalidInput
 
-PNG, GIF, WEBP, MP4 = rb"\x89PNG", rb"GIF8", rb"RIFF", rb".{4}ftyp"
-HTML, JSON, SVG, ZIP, PARQUET, RERUN = (
-    rb"<!DOCTYPE",
-    rb"\s*[{[]",
-    rb"<\?xml|<svg",
-    rb"PK",
-    rb"PAR1",
-    rb"RRF",
-)
+PNG = rb"\x89PNG"
+GIF = rb"GIF8"
+WEBP = rb"RIFF"
+MP4 = rb".{4}ftyp"
+HTML = rb"<!DOCTYPE"
+JSON = rb"\s*[{[]"
+SVG = rb"<\?xml|<svg"
+ZIP = rb"PK"
+PARQUET = rb"PAR1"
+RERUN = rb"RRF"
 """What files of these kinds begin with, as patterns. Weights and checkpoints are ZIP."""
 
 _MORE_BYTES = 2**16
@@ -34,8 +35,8 @@ _being_written: set[Path] = set()
 @contextmanager
 def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
     """A file to write to, with the same ending, which takes the place of `path` in one move at the
-    end: readers see the old file or the new. A link stays a link to it. What cannot be replaced, a
-    device or a pipe, is written into.
+    end: readers see the old file or the new one. A link stays a link to it. What cannot be
+    replaced, such as a device or a pipe, is written into.
 
     Raises what `check_output` does, before anything is computed; an error of writing names `path`.
     """
@@ -46,8 +47,8 @@ def replacing(path: Path, kind: bytes = b"") -> Iterator[Path]:
 
 def check_output(path: Path, kind: bytes = b"") -> None:
     """Raise InvalidInput for a `path` that nothing can be written to, that this process is writing
-    already, or where there is a file that does not begin like one of `kind`, OSError where writing
-    is not allowed. The folder is made.
+    already, or that holds a file which does not begin like one of `kind`. Raise OSError where
+    writing is not allowed. The folder is made.
     """
     _resolved(path)
     if _is_stream(path):
@@ -76,7 +77,8 @@ def _check_old(path: Path, kind: bytes) -> None:
         head = old.read(64)
     if head and not re.match(kind, head, re.DOTALL):
         raise InvalidInput(
-            f"{path} holds something else than what would be written there: remove it first, or name another file"
+            f"{path} holds something else than what would be written there: remove it first, or"
+            " name another file"
         )
 
 
@@ -108,9 +110,7 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
 
 
 def why_unwritable(path: Path) -> str | None:
-    """Why a file cannot grow, which libraries that wrote to it may not have told; None where it
-    can.
-    """
+    """Why a file cannot grow, None where it can. Libraries that write to it may not have told."""
     try:
         with path.open("ab", buffering=0) as file:
             written = file.write(bytes(_MORE_BYTES))

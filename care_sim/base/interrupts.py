@@ -119,7 +119,7 @@ def _come_again(lost: "sys.UnraisableHookArgs") -> None:
 
 
 def _is_command() -> bool:
-    """Whether this process is the command `care-sim`, and none that it started with its arguments."""
+    """Whether this process is the command `care-sim`, not one that it started."""
     name = os.path.basename((getattr(sys, "argv", None) or [""])[0])
     return name == "care-sim" and "--multiprocessing-fork" not in sys.orig_argv
 

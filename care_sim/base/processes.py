@@ -60,7 +60,7 @@ def following(make: Callable[[], T]) -> T:
 
 
 def end_with_starter(starter: int) -> None:
-    """End this process, an interpreter that the process `starter` started, as soon as that is gone."""
+    """End this process, which the process `starter` started, as soon as that is gone."""
     threading.Thread(
         target=_end_without, args=[starter], name="end with starter", daemon=True
     ).start()

@@ -1,4 +1,7 @@
-"""Text of others, such as names of installed policies, made fit to be shown."""
+"""Text made fit to be shown: on one line, not too long, without what a terminal would obey."""
+
+_QUOTED = 120
+"""Characters of a value that a message quotes."""
 
 
 def printable(text: str) -> str:
@@ -22,12 +25,8 @@ def counted(count: int, unit: str) -> str:
     return f"{count:,} {unit}{'' if count == 1 else 's'}"
 
 
-_SHOWN = 120
-"""Characters of a value that a message quotes."""
-
-
 def one_line(text: str) -> str:
-    """The text on one line, what a terminal would not show written out."""
+    """The text on one line; what a terminal would not show is written as escapes."""
     return printable(" ".join(text.split()))
 
 
@@ -37,7 +36,7 @@ def shown(value: object) -> str:
         text = one_line(repr(value))
     except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
         text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
-    return shortened(text, _SHOWN)
+    return shortened(text, _QUOTED)
 
 
 def shortened(text: str, most: int) -> str:

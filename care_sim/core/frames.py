@@ -16,7 +16,7 @@ Pose = tuple[float, float, float]
 
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
-    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z (one angle, or one per vector)."""
+    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z: one angle, or one each."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]

@@ -1,15 +1,15 @@
 """The fixed braking controller: the same for every policy, and stated here in full.
 
-A track counts when its box, widened by `side_margin_m` on both sides, overlaps the strip the ego
-sweeps straight ahead, now or at any time within `horizon_s` if it keeps its velocity; only what
+A track counts when its box, widened by `side_margin_m` on both sides, overlaps the strip that the
+ego sweeps straight ahead, now or at any time within `horizon_s` if it keeps its velocity. Only what
 lies ahead of the front bumper counts. A track seen once has no velocity and counts only where it
 is.
 
-The brake goes on when the gap to a counting track is at most the ego's stopping distance v *
-t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself, v_x^2 / (2
-b) (Shalev-Shwartz et al. 2017, RSS). It acts with `b` at the first keyframe at least `reaction_s`
-later. It stays on while any counting track is not faster than the ego, and for `release_s` after
-the last one; then the ego gains speed at `comfort` up to its cruising speed.
+The brake goes on when the gap to a counting track is at most the ego's stopping distance,
+v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself,
+v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first keyframe that is at
+least `reaction_s` later. It stays on while any counting track is not faster than the ego, and for
+`release_s` after the last one. Then the ego gains speed at `comfort` up to its cruising speed.
 """
 
 from dataclasses import dataclass
@@ -76,6 +76,7 @@ class BrakingController:
             self._braking_s += self._keyframe_s
             blocked = bool(np.any(counting & (tracks.velocities[:, 0] <= ego.speed)))
             self._free_s = 0.0 if blocked else self._free_s + self._keyframe_s
+            # Times are sums of keyframes, which may miss a round number by their last bits.
             if self._free_s > self._rules.release_s - 1e-9:
                 self._braking_s = None
         return self._act(ego.speed)
@@ -83,23 +84,24 @@ class BrakingController:
     def _act(self, speed: float) -> Command:
         if self._braking_s is None:
             wanted = (self._cruise_mps - speed) / self._keyframe_s
-            return Command(
-                float(min(max(wanted, -self._rules.comfort), self._rules.comfort)), False
-            )
+            comfort = self._rules.comfort
+            return Command(float(min(max(wanted, -comfort), comfort)), False)
         acting = self._braking_s >= self._rules.reaction_s - 1e-9
         return Command(-self._rules.deceleration if acting else 0.0, True)
 
     def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> NDArray[np.bool_]:
+        """(n,) which tracks count; `half_x` and `half_y` (n,) are half the extents of their boxes."""
         rules = self._rules
         ahead = tracks.boxes[:, 0] + half_x > self._front_m
         reach = self._half_width_m + rules.side_margin_m + half_y
-        now, then = (
-            tracks.boxes[:, 1],
-            tracks.boxes[:, 1] + tracks.velocities[:, 1] * rules.horizon_s,
-        )
+        # Sideways motion is even, so that a track is in the strip at some time of the horizon
+        # exactly if the stretch between where it is now and where it is then meets the strip.
+        now = tracks.boxes[:, 1]
+        then = now + tracks.velocities[:, 1] * rules.horizon_s
         return ahead & (np.minimum(now, then) <= reach) & (np.maximum(now, then) >= -reach)
 
     def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
+        """(n,) gaps in metres at which the ego must begin to brake."""
         rules = self._rules
         own = speed * rules.reaction_s + speed**2 / (2 * rules.deceleration) + rules.standstill_m
         theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.deceleration)

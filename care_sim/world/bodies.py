@@ -14,7 +14,10 @@ Shape = Literal["box", "cylinder", "sphere"]
 
 @dataclass(frozen=True)
 class Part:
-    """One primitive of a compound: full extents `size` (for a cylinder or sphere its bounding box)."""
+    """One primitive of a body: full extents `size`, those of the bounding box where it is round.
+
+    `centre` is in the body frame, metres; `colour` is red, green and blue from 0 to 1.
+    """
 
     shape: Shape
     size: Triple
@@ -32,7 +35,8 @@ class BodyKind:
     parts: tuple[Part, ...]
 
 
-TYRE, GLASS = (0.08, 0.08, 0.09), (0.25, 0.32, 0.38)
+TYRE = (0.08, 0.08, 0.09)
+GLASS = (0.25, 0.32, 0.38)
 
 
 def _box(
@@ -47,14 +51,15 @@ def _box(
 def _two_box(
     name: str, label: str, size: Triple, waist: float, cabin: tuple[float, float], colour: Triple
 ) -> BodyKind:
-    """A passenger vehicle: full-length body up to `waist`, cabin between two shares of the length."""
+    """A passenger vehicle: full-length body up to `waist`, and a cabin above it. `cabin` says from
+    where to where it reaches, as shares of the length from the rear.
+    """
     length, width, height = size
     half, side = length / 2, width / 2
     body = _box((-half, half), (-side, side), (0.0, waist), colour)
     ends = (-half + cabin[0] * length, -half + cabin[1] * length)
-    return BodyKind(
-        name, label, size, (body, _box(ends, (0.1 - side, side - 0.1), (waist, height), GLASS))
-    )
+    glass = _box(ends, (0.1 - side, side - 0.1), (waist, height), GLASS)
+    return BodyKind(name, label, size, (body, glass))
 
 
 def _lorry(

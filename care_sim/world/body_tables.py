@@ -42,7 +42,7 @@ class Footprints:
         self._halves[bodies] = np.stack(extents, axis=1) / 2
 
     def near(self, body: int, within: float) -> Integers:
-        """Ids of the other bodies that may be within `within` metres of one. None that is so near is
+        """Ids of the other bodies that may be within `within` metres of one. None of those is
         missing; some may be further away, since rectangles along x and y stand for the footprints.
         """
         gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (

@@ -1,4 +1,7 @@
-"""The one owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance."""
+"""The one owner of a PyBullet client: bodies, poses, rays, pictures of ids and colours, clearance.
+
+World frame: x along the road, y left, z up; metres and radians.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -18,7 +21,8 @@ PixelWindow = tuple[int, int, int, int]
 """Left, top, right, bottom in whole pixels."""
 
 NO_BODY = -1
-RAYS_A_CALL = 8192
+"""The id where there is no body."""
+RAYS_PER_CALL = 8192
 """`rayTestBatch` returns nothing, silently, for a batch of 16,384 rays or more."""
 
 _SHAPES = {
@@ -32,13 +36,15 @@ FAR_M = 120.0
 
 
 class BulletWorld:
-    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False. Not to be
-    shared between processes. Whoever forgets to close it leaves the client with the last reference.
+    """Bodies in one DIRECT client, over a ground plane at z = 0 unless `ground` is False.
 
-    The ground, transparent bodies and backdrops have no look: no camera needs their ids, and
+    It is not to be shared between processes. Where it is not closed, the client is given back with
+    the last reference.
+
+    The ground, transparent bodies and backdrops are not drawn: no camera needs their ids, and
     rendering them costs more than everything else in the picture.
 
-    `primitives` know every pose at once. PyBullet learns of it when it is asked about the body.
+    `primitives` know every pose at once. PyBullet learns of a pose when it is asked about the body.
     """
 
     def __init__(self, ground: bool = True) -> None:
@@ -52,7 +58,8 @@ class BulletWorld:
 
     def _lay_ground(self) -> int:
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
-        ground = pybullet.createMultiBody(0, plane, self._no_look(), physicsClientId=self._client)
+        unseen = self._no_visual_shape()
+        ground = pybullet.createMultiBody(0, plane, unseen, physicsClientId=self._client)
         self._set_group(ground, _OPAQUE)
         return int(ground)
 
@@ -78,10 +85,8 @@ class BulletWorld:
         seen = () if transparent or backdrop else kind.parts
         body = pybullet.createMultiBody(
             0,
-            pybullet.createCollisionShapeArray(
-                physicsClientId=self._client, **_collision(kind.parts)
-            ),
-            self._look(seen) if seen else self._no_look(),
+            self._collision_shape(kind.parts),
+            self._visual_shape(seen) if seen else self._no_visual_shape(),
             physicsClientId=self._client,
         )
         self._set_group(body, _TRANSPARENT if transparent else _OPAQUE)
@@ -100,7 +105,8 @@ class BulletWorld:
         """Put bodies (n,) at poses (n, 3) on the ground plane: x, y, heading."""
         half = poses[:, 2] / 2
         rows = np.zeros((len(poses), 7))
-        rows[:, :2], rows[:, 5], rows[:, 6] = poses[:, :2], np.sin(half), np.cos(half)
+        rows[:, :2] = poses[:, :2]
+        rows[:, 5], rows[:, 6] = np.sin(half), np.cos(half)
         self.primitives.poses[bodies] = rows
         self._moved.update(bodies.tolist())
 
@@ -113,8 +119,8 @@ class BulletWorld:
         self._tell(self._moved)
         targets = origin + directions * reach
         hits: list[tuple[Any, ...]] = []
-        for start in range(0, len(targets), RAYS_A_CALL):
-            batch = targets[start : start + RAYS_A_CALL]
+        for start in range(0, len(targets), RAYS_PER_CALL):
+            batch = targets[start : start + RAYS_PER_CALL]
             sources = np.broadcast_to(origin, batch.shape)
             hits += pybullet.rayTestBatch(
                 sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client
@@ -130,11 +136,11 @@ class BulletWorld:
     ) -> Integers:
         """(height, width) id of the body each pixel of `camera` shows, NO_BODY where there is none.
 
-        The camera is mounted in the frame `sensor`. Of a `window` only its own rows and columns.
+        The camera is mounted in the frame `sensor`. With a `window`, only its own rows and columns
+        are rendered and returned.
         """
-        left, top, right, bottom = (
-            window if window is not None else (0, 0, camera.width, camera.height)
-        )
+        whole = 0, 0, camera.width, camera.height
+        left, top, right, bottom = whole if window is None else window
         if left >= right or top >= bottom:
             return np.empty((0, 0), np.int64)
         rendered = self._render(camera, sensor, (left, top, right, bottom))[4]
@@ -166,6 +172,7 @@ class BulletWorld:
         self._tell(self._moved)
         eye, (forward, _, up) = camera.stance(sensor)
         left, top, right, bottom = window
+        # The sides of the frustum of the window alone, where it cuts the near plane.
         scale = NEAR_M / camera.focal
         across = [(u - camera.width / 2) * scale for u in (left, right)]
         upward = [(camera.height / 2 - v) * scale for v in (bottom, top)]
@@ -183,12 +190,18 @@ class BulletWorld:
     def _set_group(self, body: int, group: int) -> None:
         pybullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=self._client)
 
-    def _look(self, parts: Sequence[Part]) -> int:
+    def _collision_shape(self, parts: Sequence[Part]) -> int:
+        shapes = _collision(parts)
+        return int(pybullet.createCollisionShapeArray(physicsClientId=self._client, **shapes))
+
+    def _visual_shape(self, parts: Sequence[Part]) -> int:
         return int(pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(parts)))
 
-    def _no_look(self) -> int:
+    def _no_visual_shape(self) -> int:
         """A speck deep below: without a visual shape PyBullet would draw the collision shape."""
-        return self._look([Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))])
+        return self._visual_shape(
+            [Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))]
+        )
 
 
 def _standing(pose: Pose | Frame) -> Sequence[float]:

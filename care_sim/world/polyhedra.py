@@ -1,14 +1,13 @@
-"""Bodies as PyBullet's renderer draws them: convex polyhedra, which only stand near to round parts."""
+"""Bodies as PyBullet's renderer draws them: convex polyhedra, which come close to round parts."""
 
 import math
 from collections.abc import Sequence
 from functools import cache, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.world.bodies import Part
 
 RING = 32
@@ -18,7 +17,6 @@ RIM_M = 0.001
 SAME_FACE = 9
 """Decimals to which two triangles of one face agree."""
 
-Integers = NDArray[np.int64]
 Mesh = tuple[Floats, Floats, Integers]
 Tables = tuple[Floats, Floats, Integers, Integers, Integers]
 
@@ -41,10 +39,10 @@ class Polyhedra:
 
     @property
     def tables(self) -> Tables:
-        """All parts in one: corners (c, 3) in metres; faces (f, 4) outward unit normals and
-        distances from the body's origin in metres; edges (e, 2) the two faces that meet in each,
-        counted within the part; (k + 1, 3) where the rows of each part begin in these three; (k,)
-        body ids.
+        """All k parts in one: corners (c, 3) in metres; faces (f, 4), outward unit normals and
+        distances from the body's origin in metres; edges (e, 2), the two faces that meet in each,
+        counted within the part. Then (k + 1, 3) where the rows of each part begin in these three,
+        and (k,) the body ids.
         """
         if self._tables is None:
             meshes = [_NOTHING, *map(_mesh, self._parts)]
@@ -58,11 +56,8 @@ def _mesh(part: Part) -> Mesh:
     """A part's polyhedron in the frame of its body."""
     corners, faces, edges = polyhedron(part.shape, part.size)
     centre = np.array(part.centre)
-    return (
-        corners + centre,
-        np.column_stack([faces[:, :3], faces[:, 3] + faces[:, :3] @ centre]),
-        edges,
-    )
+    distances = faces[:, 3] + faces[:, :3] @ centre
+    return corners + centre, np.column_stack([faces[:, :3], distances]), edges
 
 
 @lru_cache(maxsize=256)
@@ -70,10 +65,11 @@ def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
     """Corners, faces and edges of a primitive about its centre; see `Polyhedra.tables`."""
     corners = _corners(shape, np.array(size))
     hull = ConvexHull(corners)
+    # Qhull gives triangles. Those of one face have one equation, up to the last bits, and two
+    # triangles that meet on an edge of the polyhedron have different ones.
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
-    meets = np.stack(
-        [np.repeat(number, hull.neighbors.shape[1]), number[hull.neighbors].ravel()], axis=1
-    )
+    mine, other = np.repeat(number, hull.neighbors.shape[1]), number[hull.neighbors].ravel()
+    meets = np.stack([mine, other], axis=1)
     edges = np.unique(meets[meets[:, 0] < meets[:, 1]], axis=0)
     return corners, equations * (1, 1, 1, -1), edges
 
@@ -84,11 +80,11 @@ def _corners(shape: str, size: Floats) -> Floats:
     if shape == "sphere":
         return np.multiply(directions(), size / 2)
     angles = 2 * np.pi * np.arange(RING) / RING
-    rims = [
-        np.column_stack([np.sin(angles), np.cos(angles), np.full(RING, side)])
-        for side in (1.0, -1.0)
-    ]
+    sin, cos = np.sin(angles), np.cos(angles)
+    rims = [np.column_stack([sin, cos, np.full(RING, side)]) for side in (1.0, -1.0)]
     points = np.concatenate(rims) * size / 2
+    # Bullet draws the hull of the points that it finds furthest in some directions, each moved out
+    # by its margin.
     furthest = np.argmax(np.round(directions() @ points.T, SAME_FACE), axis=1)
     drawn: Floats = points[furthest] + RIM_M * directions()
     return drawn
@@ -96,12 +92,13 @@ def _corners(shape: str, size: Floats) -> Floats:
 
 @cache
 def directions() -> Floats:
-    """(42, 3) the unit vectors in which Bullet's `btShapeHull` feels for the surface of a round
+    """(42, 3) the unit vectors in which Bullet's `btShapeHull` looks for the surface of a round
     shape: the corners of an icosahedron that stands on one of them, and the middles of its edges.
     """
     azimuths = np.deg2rad(np.arange(0, 360, 72))
     rings = [_ring(azimuths + np.deg2rad(36), -1.0), _ring(azimuths, 1.0)]
     corners = np.concatenate([[(0.0, 0.0, -1.0)], *rings, [(0.0, 0.0, 1.0)]])
+    # Neighbours among the corners of an icosahedron are those whose cosine is 1 / sqrt(5).
     one, other = np.nonzero(np.triu(np.isclose(corners @ corners.T, 1 / np.sqrt(5))))
     middles = corners[one] + corners[other]
     middles /= np.linalg.norm(middles, axis=1, keepdims=True)
@@ -110,7 +107,9 @@ def directions() -> Floats:
 
 
 def _ring(azimuths: Floats, side: float) -> Floats:
-    points: Floats = np.column_stack(
-        [2 * np.cos(azimuths), 2 * np.sin(azimuths), np.full(len(azimuths), side)]
-    )
+    """(n, 3) unit vectors of these azimuths; they rise (`side` 1) or fall (-1) by half their
+    length in the plane.
+    """
+    heights = np.full(len(azimuths), side)
+    points: Floats = np.column_stack([2 * np.cos(azimuths), 2 * np.sin(azimuths), heights])
     return points / math.sqrt(5)

@@ -91,14 +91,17 @@ class Traffic:
         self._road = Road(network, np_random=np.random.RandomState(0))
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
-        """The car that carries the sensors, in lane 0 at `x`, driven by `RoadVehicle.accelerate`."""
+        """The car with the sensors, in lane 0 at `x`; `RoadVehicle.accelerate` drives it."""
         ego = self._make(Vehicle, x, 0, speed, kind)
         ego.enter()
         ego.forget_lane()
         return ego
 
     def add_driver(self, x: float, lane: int, speed: float, kind: BodyKind) -> "RoadVehicle":
-        """A vehicle that keeps its lane and follows the intelligent driver model (IDM) at `speed`."""
+        """A vehicle that keeps its lane and follows the intelligent driver model (IDM).
+
+        It drives at `speed` m/s, and wants to.
+        """
         vehicle = self._make(LaneDriver, x, lane, speed, kind)
         vehicle.enter()
         return vehicle

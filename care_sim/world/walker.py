@@ -9,10 +9,9 @@ from care_sim.core.frames import Pose
 
 @dataclass(frozen=True)
 class Walk:
-    """A straight walk: from `start` (x, y) along `heading` for `length_m`, setting off at
-    `starts_s`.
+    """A straight walk from `start` (x, y) along `heading` for `length_m`, begun at `starts_s`.
 
-    The person gains speed at `acceleration` until `speed`. Metres, seconds, world frame.
+    The person gains speed at `acceleration` until `speed`. Metres, seconds, radians, world frame.
     """
 
     start: tuple[float, float]
@@ -35,6 +34,7 @@ class Walk:
 
     def duration_to(self, distance: float) -> float:
         """Seconds from setting off until `distance` metres are covered."""
+        # While speed is gained, distance = acceleration * time^2 / 2; afterwards it grows evenly.
         run_up = self.speed**2 / (2 * self.acceleration)
         if distance <= run_up:
             return float(np.sqrt(2 * distance / self.acceleration))

@@ -15,7 +15,7 @@ from care_sim.world.bullet import BulletWorld
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
-"""World step. Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
+"""Half a keyframe of the closed loop: nobody here moves further than 0.5 m in it."""
 CONTACT_REACH_M = 0.5
 """Contact is looked for among bodies this close: far more than the centimetres by which hulls are
 padded.
@@ -42,11 +42,11 @@ class Actor:
 
 
 @dataclass(frozen=True)
-class Passage:
+class ClosestApproach:
     """How close the ego came to the first-sighting actor while the world advanced.
 
-    `nearest_m` centre to centre and `clearance_m` hull to hull; `impact_speed_mps` is the ego's
-    speed at its first contact with any body, else None.
+    `nearest_m` is from centre to centre and `clearance_m` from hull to hull, inf without such an
+    actor. `impact_speed_mps` is the ego's speed at its first contact with any body, else None.
     """
 
     nearest_m: float
@@ -119,13 +119,15 @@ class World:
         """(n, 7) boxes of bodies (n,) in the world frame."""
         return self._footprints.boxes[bodies]
 
-    def advance(self, acceleration: float, duration: float) -> Passage:
-        """Move everything by `duration` seconds, a whole number of world steps."""
-        passages = [self._step(acceleration) for _ in range(whole_steps(duration))]
-        impacts = (p.impact_speed_mps for p in passages if p.impact_speed_mps is not None)
-        return Passage(
-            min(p.nearest_m for p in passages),
-            min(p.clearance_m for p in passages),
+    def advance(self, acceleration: float, duration: float) -> ClosestApproach:
+        """Move everything by `duration` seconds, a whole number of world steps. The ego holds
+        `acceleration` (m/s^2) meanwhile.
+        """
+        steps = [self._step(acceleration) for _ in range(whole_steps(duration))]
+        impacts = (step.impact_speed_mps for step in steps if step.impact_speed_mps is not None)
+        return ClosestApproach(
+            min(step.nearest_m for step in steps),
+            min(step.clearance_m for step in steps),
             next(impacts, None),
         )
 
@@ -133,10 +135,11 @@ class World:
         """Free the simulator."""
         self.bullet.close()
 
-    def _step(self, acceleration: float) -> Passage:
+    def _step(self, acceleration: float) -> ClosestApproach:
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
         self.traffic.step(WORLD_STEP_S)
+        # Counted and rounded, so that no sum of steps drifts away from the times of events.
         self._steps += 1
         self.time = round(self._steps * WORLD_STEP_S, 9)
         for event in [event for due, event in self._events if due <= self.time]:
@@ -147,20 +150,21 @@ class World:
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
         self.bullet.move_all(bodies, poses)
         self._footprints.move_all(bodies, poses)
-        return self._passage()
+        return self._approach()
 
-    def _passage(self) -> Passage:
+    def _approach(self) -> ClosestApproach:
+        # The exact distance is PyBullet's; asking it about every body would take most of a step.
         near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
         touched = any(
             self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0 for body in near
         )
-        nearest, clearance = np.inf, np.inf
+        nearest = clearance = np.inf
         if self.first_sighting is not None:
             x, y, _ = self.first_sighting.pose_at(self.time)
             ego_x, ego_y, _ = self.ego.pose
             nearest = float(np.hypot(x - ego_x, y - ego_y))
             clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
-        return Passage(nearest, clearance, self.ego.speed if touched else None)
+        return ClosestApproach(nearest, clearance, self.ego.speed if touched else None)
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
@@ -172,9 +176,7 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 
 
 def whole_steps(duration: float) -> int:
-    """World steps in `duration` seconds. Raises InvalidInput when the world step does not divide
-    it.
-    """
+    """World steps in `duration` seconds. Raises InvalidInput unless they are whole."""
     steps = round(duration / WORLD_STEP_S)
     if steps < 1 or abs(steps * WORLD_STEP_S - duration) > 1e-9:
         raise InvalidInput(

@@ -353,7 +353,7 @@ DAMAGES = {
     "a class too high": lambda seen: seen["detections"].__setitem__((0, 0), 5),
     "half a class": lambda seen: seen["detections"].__setitem__((0, 0), 0.5),
     "a track's class below 0": lambda seen: seen["tracks"].__setitem__((0, 1), -1),
-    "padding that begins with another number": lambda seen: seen["detections"].__setitem__((-1, 0), -2),
+    "padding that begins with -2": lambda seen: seen["detections"].__setitem__((-1, 0), -2),
     "a camera too high": lambda seen: seen["detections"].__setitem__((0, 6), 1),
 }  # fmt: skip
 
@@ -454,7 +454,11 @@ def test_a_scenario_without_an_environment_is_named(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "text", ["{[1]}", "-" * 8000 + "1", "[" * 3000, "(1," * 2000, "9" * 5000, "1" + "+1" * 3000, "\0", "1if 1else 2"],
+    "text",
+    [
+        "{[1]}", "-" * 8000 + "1", "[" * 3000, "(1," * 2000, "9" * 5000, "1" + "+1" * 3000, "\0",
+        "1if 1else 2",
+    ],
     ids=shown,
 )  # fmt: skip
 def test_what_is_no_literal_is_text(text, recwarn):

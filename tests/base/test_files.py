@@ -165,7 +165,8 @@ def test_nothing_is_written_but_through_one_door():
     """
     package = Path(care_sim.__file__).parent
     writes = re.compile(
-        r"(\w+)\.write_(?:text|bytes)\(|(\w+)\.open\(\s*\"[wax]|\bopen\((\w+), \"[wax]|savefig\((\w+)|to_parquet"
+        r"(\w+)\.write_(?:text|bytes)\(|(\w+)\.open\(\s*\"[wax]|\bopen\((\w+), \"[wax]"
+        r"|savefig\((\w+)|to_parquet"
     )
     found = {
         (file.name, next(filter(None, match.groups()), ""))

@@ -122,14 +122,20 @@ def test_an_interrupt_finds_all_handlers_changed_or_none(moment, monkeypatch):
 
 
 def test_a_library_does_not_touch_the_handlers_of_its_user():
-    program = "import signal, care_sim; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    program = (
+        "import signal, care_sim; "
+        "print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    )
     with Marked([sys.executable, "-c", program]) as started:
         assert started.process.communicate(timeout=60)[0] == "True\n"
 
 
 def test_what_is_ignored_stays_ignored():
     """As under nohup."""
-    program = "import signal; from care_sim.base import interrupts; interrupts.raise_them(); print(signal.getsignal(1))"
+    program = (
+        "import signal; from care_sim.base import interrupts; "
+        "interrupts.raise_them(); print(signal.getsignal(1))"
+    )
     ignoring = f"import signal; signal.signal(1, signal.SIG_IGN)\n{program}"
     with Marked([sys.executable, "-c", ignoring]) as started:
         assert started.process.communicate(timeout=60)[0].strip() == str(int(signal.SIG_IGN))

@@ -55,7 +55,10 @@ def test_fewer_features_of_the_processor_give_the_same_hashes():
 
 
 def test_the_features_that_are_left_out_change_last_bits():
-    line = "import numpy as np; x = np.linspace(0.1, 9, 5000); print(np.arctan2(x, 10 - x).tobytes().hex())"
+    line = (
+        "import numpy as np; x = np.linspace(0.1, 9, 5000); "
+        "print(np.arctan2(x, 10 - x).tobytes().hex())"
+    )
     child = subprocess.run(
         [sys.executable, "-c", line],
         cwd=ROOT,

@@ -262,7 +262,7 @@ def assert_wedge_covers_box(camera, box):
 
 
 def test_wedge_worked_by_hand():
-    """The right half of a level 90-degree picture, around the horizon: azimuths -45 to 0 degrees."""
+    """The right half of a level 90-degree picture, around the horizon: azimuths -45 to 0."""
     camera = PinholeCamera()
     (wedge,) = GRID.wedges(camera.box_rays([[160, 80, 320, 100]]), 0, 0)
     rows, columns = rows_and_columns(wedge)

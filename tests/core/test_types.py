@@ -60,8 +60,8 @@ def test_columns_keep_their_meaning():
     row = [3, 4, 10, 11, 12, 1, 2, 3, 0.5, -1, 1, 2, 6]
     tracks = belief([row]).tracks
     assert dict(zip(Tracks.COLUMNS, tracks.rows()[0].tolist(), strict=True)) == {
-        "id": 3, "class": 4, "x": 10, "y": 11, "z": 12, "length": 1, "width": 2, "height": 3, "yaw": 0.5,
-        "vx": -1, "vy": 1, "misses": 2, "hits": 6,
+        "id": 3, "class": 4, "x": 10, "y": 11, "z": 12, "length": 1, "width": 2, "height": 3,
+        "yaw": 0.5, "vx": -1, "vy": 1, "misses": 2, "hits": 6,
     }  # fmt: skip
     assert tracks.velocities.tolist() == [[-1, 1]]
     assert tracks.ranges[0] == pytest.approx(np.hypot(10, 11))

@@ -128,7 +128,8 @@ def test_the_ground_returns_rays(bullet):
 
 def street(bullet):
     places = {
-        "car": (12, 3, 0.1), "van": (16, -4, 0.0), "truck": (30, 5, 0.4), "pedestrian": (9, -1, 1.5),
+        "car": (12, 3, 0.1), "van": (16, -4, 0.0), "truck": (30, 5, 0.4),
+        "pedestrian": (9, -1, 1.5),
         "trailer": (35, -7, 0.0), "bicycle": (14, 0.5, 0.8), "building": (60, 10, 0.0),
     }  # fmt: skip
     return {bullet.add(CATALOGUE[name], pose): name for name, pose in places.items()}

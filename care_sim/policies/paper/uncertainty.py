@@ -10,7 +10,9 @@ from care_sim.core.types import Demand, Ego
 from care_sim.policies.base import Policy
 
 CLEARANCE_M = 0.3
-"""Returns lower than this above the road are ground (the threshold of the Argoverse 2 map API)."""
+"""Returns lower than this above the level road are ground (the threshold of the Argoverse 2 map API).
+Detectors, which fit the road's plane, can stand closer: `care_sim.perception.cluster.road.ROAD_M`.
+"""
 BOX_MARGIN_M = 0.2
 """Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a keyframe of
 0.1 s, and three deviations of a ranging noise of 2 to 3 cm another 0.1 m."""
