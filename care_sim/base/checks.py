@@ -28,13 +28,14 @@ def check_known(kind: str, name: object, known: Iterable[str]) -> None:
 
 
 def check_arguments(of: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise InvalidInput for a name that is none of the arguments of something; it tells the nearest."""
+    """Raise InvalidInput for a name that is no argument of something; it tells the nearest."""
     known = [*known]
     for name in given:
         if name not in known:
             nearest = get_close_matches(name, known, 1)
             hint = f", the nearest is {nearest[0]}" if nearest else ""
-            raise InvalidInput(f"unknown argument of {of} {shown(name)}{hint}; known: {', '.join(sorted(known))}")
+            named = ", ".join(sorted(known))
+            raise InvalidInput(f"unknown argument of {of} {shown(name)}{hint}; known: {named}")
 
 
 def is_number(value: object) -> bool:

@@ -18,7 +18,7 @@ _WRAPPED = (staticmethod, classmethod, type(cache(lambda: None)))
 
 
 def names(values: list[Held], own: Own) -> Iterator[tuple[Name, Path, bool]]:
-    """The texts and paths that values hold; of modules, classes and functions where they are `own`."""
+    """The texts and paths that values hold; modules, classes and functions only where `own`."""
     waiting, seen = values[::-1], dict[int, object]()
     while waiting:
         value, home, loose = waiting.pop()

@@ -18,17 +18,16 @@ from types import ModuleType
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
+from care_sim.base.checks import LONGEST_PATH
 from care_sim.base.code_texts import Name, names
 
-LONGEST_PATH = 4096
-"""Characters of a path on Linux."""
 _OF_INSTALLERS = (".dist-info", ".egg-info")
 _SCRIPTS = (["bin"], ["Scripts"])
 _SITES = {"site-packages", "dist-packages"}
 _OF_THE_SYSTEM = tuple(
     map(Path, ("/proc", "/sys", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"))
 )
-"""What is no file of anybody, and another one at every look."""
+"""No files of anybody: they change from one moment to the next."""
 
 
 def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
@@ -210,11 +209,8 @@ def _roots(top: str) -> list[Path]:
         spec = find_spec(top)
     except (ImportError, ValueError):
         return []
-    roots = (
-        [Path(place) for place in spec.submodule_search_locations or [spec.origin or ""]]
-        if spec
-        else []
-    )
+    places = (spec.submodule_search_locations or [spec.origin or ""]) if spec else []
+    roots = [Path(place) for place in places]
     return roots if all(root.name and root.exists() for root in roots) else []
 
 

@@ -34,14 +34,17 @@ def secret_entropy(what: str, entropy: tuple[int, ...], secret: str) -> int:
 
 
 def check_secret(secret: object) -> None:
-    """Raise InvalidInput unless it is False, for none, or a text that can be encoded. An empty text and None are what
-    an environment variable gives that is not set; they would leave everything open.
+    """Raise InvalidInput unless it is False, for none, or a text that can be encoded. An empty text
+    and None are what an environment variable gives that is not set; they would leave everything
+    open.
     """
     if secret is False:
         return
     if not isinstance(secret, str):
         raise InvalidInput(f"secret must be a text, got one of type {type(secret).__name__}")
     if not secret:
-        raise InvalidInput("secret must not be empty: leave it out, or give False, where there is none")
+        raise InvalidInput(
+            "secret must not be empty: leave it out, or give False, where there is none"
+        )
     if not secret.isascii():
         raise InvalidInput("secret must be of ASCII characters alone")

@@ -40,9 +40,9 @@ class CameraFaults:
     false_negative_burst: int = bounded(1, 1, MOST_KEYFRAMES)
     """Keyframes that a miss lasts; the share of misses stays what it is."""
     false_positive_rate: float = bounded(0.0, 0, MOST_FALSE_BOXES)
-    """Mean number of boxes per picture that show nothing. Each by itself is much like the true ones.
-    They are drawn from these (`care_sim.sensors.false_boxes`), so there are none where the camera
-    never sees anybody.
+    """Mean number of boxes per picture that show nothing. Each by itself is much like a true one.
+    They are drawn from true ones (`care_sim.sensors.false_boxes`), so there are none where the
+    camera never sees anybody.
     """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""

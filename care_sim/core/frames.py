@@ -70,12 +70,10 @@ class Frame:
         i, j, k, w = rotation.as_quat().tolist()
         lowers = 2 * (w * j - i * k)
         if abs(lowers) > _LOCKED:
+            # The angles of such a rotation are not unique: with roll 0, yaw is where left points.
             left = rotation.as_matrix()[:, 1].tolist()
-            yaw, pitch, roll = (
-                math.atan2(-left[0], left[1]),
-                math.copysign(math.pi / 2, lowers),
-                0.0,
-            )
+            yaw, roll = math.atan2(-left[0], left[1]), 0.0
+            pitch = math.copysign(math.pi / 2, lowers)
         else:
             yaw, pitch, roll = rotation.as_euler("ZYX").tolist()
         x, y, z = origin.tolist()

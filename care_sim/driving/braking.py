@@ -90,7 +90,7 @@ class BrakingController:
         return Command(-self._rules.deceleration if acting else 0.0, True)
 
     def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> NDArray[np.bool_]:
-        """(n,) which tracks count; `half_x` and `half_y` (n,) are half the extents of their boxes."""
+        """(n,) which tracks count; `half_x` and `half_y` (n,) are the half extents of boxes."""
         rules = self._rules
         ahead = tracks.boxes[:, 0] + half_x > self._front_m
         reach = self._half_width_m + rules.side_margin_m + half_y

@@ -61,9 +61,12 @@ def zeros(path, size):
 
 
 @pytest.mark.parametrize(
-    ("more", "reason"), [(1, r"it holds \d+ bytes and may hold \d+"), (None, "it is no regular file")]
+    ("more", "reason"),
+    [(1, r"it holds \d+ bytes and may hold \d+"), (None, "it is no regular file")],
 )
-def test_every_reader_refuses_what_is_too_large_before_it_is_read(tmp_path, monkeypatch, more, reason):
+def test_every_reader_refuses_what_is_too_large_before_it_is_read(
+    tmp_path, monkeypatch, more, reason
+):
     monkeypatch.setattr(Path, "read_text", lambda *_, **__: pytest.fail("it is read"))
     path = tmp_path / CONFIG
     zeros(path, more and LARGEST_TABLE + more)

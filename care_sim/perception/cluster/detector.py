@@ -13,7 +13,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.types import Detections
 from care_sim.perception.cluster.box_fitting import DECIMALS, fit_sides
 from care_sim.perception.cluster.grouping import clusters_of
-from care_sim.perception.cluster.road import ROAD_M, heights_above, road_plane
+from care_sim.perception.cluster.road import KERB_CLEARANCE_M, heights_above, road_plane
 from care_sim.perception.cluster.size_classes import MOST_MISFIT, Guess, best_guess
 
 OWN_ROOF_M = 2.0
@@ -63,7 +63,7 @@ class ClusterDetector:
         points = points[np.hypot(points[:, 0], points[:, 1]) > OWN_ROOF_M]
         plane = road_plane(points, sensor_height_m)
         heights = heights_above(points, plane)
-        above = heights > ROAD_M
+        above = heights > KERB_CLEARANCE_M
         standing, heights = points[above], heights[above]
         clusters = [
             rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS

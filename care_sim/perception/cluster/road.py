@@ -17,7 +17,7 @@ kerb climbed.
 """
 ROUGHNESS_M = 0.05
 """Noise of ranges and unevenness; what lies much further off the plane has next to no vote."""
-ROAD_M = 0.25
+KERB_CLEARANCE_M = 0.25
 """Nothing lower than this above the plane is an object: a kerb (0.15 m) and twice the roughness."""
 
 

@@ -13,7 +13,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
-from care_sim.policies.paper.uncertainty import CLEARANCE_M
+from care_sim.policies.paper.uncertainty import GROUND_CLEARANCE_M
 
 MARKS = (
     "in the wedge of a camera detection that no forecast explains",
@@ -65,7 +65,7 @@ class Cues:
         rig, cells = self.rig, self.rig.grid.size
         seen = Seen(np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32))
         mark(seen.codes, seen.sizes, *self._sets(belief, hulls))
-        limits = np.float32(rig.grid.range_m), np.float32(CLEARANCE_M - rig.sensor_height_m)
+        limits = np.float32(rig.grid.range_m), np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m)
         margins = rig.azimuth_margin, rig.elevation_margin
         mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, limits, margins)
         return seen

@@ -12,6 +12,7 @@ from care_sim.core.belief import Belief, Observation
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
+from care_sim.perception.cluster.road import KERB_CLEARANCE_M
 from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
@@ -19,9 +20,9 @@ CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetecte
 EGO = ("speed", "yaw_rate", "acceleration", "budget")
 EGO_SCALES = np.array([30.0, 1.0, 10.0, 1.0], np.float32)
 """m/s, rad/s, m/s^2 and the share of the cells that are shown as 1."""
-STANDING_M = (0.25, 4.0)
-"""Heights above the road between which a return stands for something: over kerbs (`care_sim.perception.cluster.road`), under
-the bodies of bridges and the crowns of trees; the tallest of the five classes are lower.
+STANDING_M = (KERB_CLEARANCE_M, 4.0)
+"""Heights above the road between which a return stands for something: over kerbs, under the bodies of bridges and the
+crowns of trees. The tallest of the five classes are lower.
 """
 
 

@@ -9,9 +9,9 @@ from care_sim.core.grid import Cells
 from care_sim.core.types import Demand, Ego
 from care_sim.policies.base import Policy
 
-CLEARANCE_M = 0.3
-"""Returns lower than this above the level road are ground (the threshold of the Argoverse 2 map API).
-Detectors, which fit the road's plane, can stand closer: `care_sim.perception.cluster.road.ROAD_M`.
+GROUND_CLEARANCE_M = 0.3
+"""Returns lower than this above a level road are ground (the threshold of the Argoverse 2 map API). A detector that
+fits the road's plane knows it better: see `care_sim.perception.cluster.road.KERB_CLEARANCE_M`.
 """
 BOX_MARGIN_M = 0.2
 """Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a keyframe of
@@ -41,7 +41,7 @@ class Uncertainty(Policy):
         cells = np.flatnonzero((belief.ranges > 0) & (belief.ranges < self.rig.grid.range_m))
         ranges = belief.ranges.ravel()[cells].astype(np.float64)
         points = self.rig.grid.directions[cells] * ranges[:, None]
-        unexplained = points[:, 2] + self.rig.sensor_height_m >= CLEARANCE_M
+        unexplained = points[:, 2] + self.rig.sensor_height_m >= GROUND_CLEARANCE_M
         for box in self._detected_boxes(belief):
             unexplained &= ~_inside(points, box)
         return cells[unexplained], ranges[unexplained]
