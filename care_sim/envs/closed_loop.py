@@ -30,42 +30,45 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     """A scenario in which the agent chooses the LiDAR's cells and a fixed controller brakes.
 
     ### Action
-    `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest strictly
-    positive scores fire, ties by ascending cell index; when there are fewer, the random floor shared by
-    all policies fills up (`floor=False` leaves them unspent). No action can overspend.
+    `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest
+    strictly positive scores fire, ties by ascending cell index; when there are fewer, the random
+    floor shared by all policies fills up (`floor=False` leaves them unspent). No action can
+    overspend.
 
     ### Observation
-    A `Dict` of float32 arrays, padded to fixed shapes, that `care_sim.Belief.from_observation` reads:
+    A `Dict` of float32 arrays, padded to fixed shapes, that `care_sim.Belief.from_observation`
+    reads:
 
     | key | shape | content |
     |---|---|---|
     | `ego` | (3,) | speed m/s (below 0 backwards), yaw rate rad/s, acceleration m/s^2 |
     | `budget` | (1,) | B / N, the share of cells that may fire |
-    | `detections` | (128, 9) | camera detections, columns `ImageDetections.COLUMNS`; class -1 pads |
+    | `detections` | (128, 9) | detections, columns `ImageDetections.COLUMNS`; class -1 pads |
     | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
-    What is kept of more rows, and of numbers that no sensor can tell: `care_sim.core.observation_limits`.
+    What is kept of more rows, and of numbers that no sensor can tell:
+    `care_sim.core.observation_limits`.
 
     ### Reward
-    A weighted sum of `care_sim.envs.reward.terms`: undetected time in view, clearance, collision, needless braking, and,
-    with `reward_weights={"gain": ...}`, the first-detection distance against the full-scan bound. Every term is at
-    most 0, so is the best return. It knows what no observation shows: a learner may learn from it, no policy may read
-    it while it plays.
+    A weighted sum of `care_sim.envs.reward.terms`: undetected time in view, clearance, collision,
+    needless braking, and, with `reward_weights={"gain": ...}`, the first-detection distance against
+    the full-scan bound. Every term is at most 0, so is the best return. It knows what no
+    observation shows: a learner may learn from it, no policy may read it while it plays.
 
     ### Episode end
     Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes).
 
     ### Info
-    What is for scoring alone tells of the world what no observation does, with a blind camera too: never a policy's
-    input. `scoring_info=False` leaves it out, but for the `outcome`.
+    What is for scoring alone tells of the world what no observation does, with a blind camera too:
+    never a policy's input. `scoring_info=False` leaves it out, but for the `outcome`.
 
     | key | content | whose |
     |---|---|---|
     | `fired` | the cells of this keyframe (1) | the car's own |
     | `braking` | whether the brake is on | the car's own |
     | `time_s` | time of the keyframe, seconds from the start | the car's own |
-    | `detected` | whether the first-sighting actor is among what was detected at this keyframe (2) | scoring alone |
+    | `detected` | whether this keyframe detected the first-sighting actor (2) | scoring alone |
     | `in_view` | whether a faultless camera shows that actor | scoring alone |
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
@@ -73,24 +76,27 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `seed` | of `reset`: repeats the episode, and so tells all of it | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
 
-    (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector environments stack arrays of
-    one length. (2) A car knows what it detected, and has it as tracks; which one the episode is about it does not know.
+    (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector
+    environments stack arrays of one length. (2) A car knows what it detected, and has it as tracks;
+    which one the episode is about it does not know.
 
     ### Arguments
-    `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode` None or
-    "rgb_array"; `scoring_info` (above); `secret`, a text that enters everything that a seed draws, so that an agent
-    that holds this package cannot look its episodes up (`care_sim.base.random_streams`; False, for none, unless given;
-    at least 16 random bytes, since a word can be tried like a seed); any field of the scenario; and the conditions, any
-    field of `care_sim.core.conditions.Conditions`. Of these, the allocator:
-    `reserve_fraction` rho, `floor`, `floor_seed`, `azimuth_margin`, `elevation_margin`. The detectors: `engine`,
-    `min_returns`, `camera_confidence`. Camera faults: `false_negative_rate`, `false_negative_per_m`,
-    `false_negative_burst` (keyframes), `false_positive_rate` (a picture), `camera_latency` and `camera_jitter` (whole
-    keyframes), `blackout_start_s`, `blackout_s`, `camera_rotation_sigma_deg`, `camera_position_sigma_m`. LiDAR faults:
-    `lidar_range_sigma` (m), `lidar_dropout`, `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are off by
-    default and drawn by the seed. A value that is not allowed raises `care_sim.InvalidInput`.
+    `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode`
+    None or "rgb_array"; `scoring_info` (above); `secret`, a text that enters everything that a seed
+    draws, so that an agent that holds this package cannot look its episodes up
+    (`care_sim.base.random_streams`; False, for none, unless given; at least 16 random bytes, since
+    a word can be tried like a seed); any field of the scenario; and the conditions, any field of
+    `care_sim.core.conditions.Conditions`. Of these, the allocator: `reserve_fraction` rho, `floor`,
+    `floor_seed`, `azimuth_margin`, `elevation_margin`. The detectors: `engine`, `min_returns`,
+    `camera_confidence`. Camera faults: `false_negative_rate`, `false_negative_per_m`,
+    `false_negative_burst` (keyframes), `false_positive_rate` (a picture), `camera_latency` and
+    `camera_jitter` (whole keyframes), `blackout_start_s`, `blackout_s`,
+    `camera_rotation_sigma_deg`, `camera_position_sigma_m`. LiDAR faults: `lidar_range_sigma` (m),
+    `lidar_dropout`, `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are off by default
+    and drawn by the seed. A value that is not allowed raises `care_sim.InvalidInput`.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's interface)
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
     scenario_name: ClassVar[str]
 
     def __init__(
@@ -108,10 +114,14 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         whole_steps(keyframe_s)
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
         kind = SCENARIOS[self.scenario_name]
-        check_arguments(type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__])
+        check_arguments(
+            type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__]
+        )
         conditions = conditions_of(parameters)
         check_engine(conditions.engine)
-        super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info)
+        super().__init__(
+            conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info
+        )
         self.scenario = make_scenario(self.scenario_name, **parameters)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
@@ -123,7 +133,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed.
 
-        `info` holds the seed that repeats the episode, unless `scoring_info` is off; there are no `options`.
+        `info` holds the seed that repeats the episode, unless `scoring_info` is off; there are no
+        `options`.
         """
         super().reset(seed=seed)
         entropy = self.entropy(seed)
@@ -138,7 +149,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         return self.begin(loop, floor), self.told({}, {"seed": entropy})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
+        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as
+        `chosen` does.
+        """
         loop = self.loop
         fired = self.chosen(action)
         measured = bool(self._weights["gain"]) and self._potential.bound_m is None
@@ -170,14 +183,16 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             self._running = None
 
     def _pool(self, entropy: int) -> BoxPool:
-        """Of false boxes, if there are any: another world of this scenario, of a stream of its own, so that nothing of
-        it tells of this episode's.
+        """Of false boxes, if there are any: another world of this scenario, of a stream of its own,
+        so that nothing of it tells of this episode's.
         """
         if not self.conditions.false_positive_rate:
             return EMPTY_POOL
         _, camera, lidar, _, odometry, another = self.streams(entropy, count=6)
         world = self.scenario.build(np.random.default_rng(another))
-        return seen_on_a_drive(world, self.scenario.duration_s, self.rig, self.conditions, (camera, lidar, odometry))
+        return seen_on_a_drive(
+            world, self.scenario.duration_s, self.rig, self.conditions, (camera, lidar, odometry)
+        )
 
     def _terms(self, frame: Keyframe, detectable: bool) -> dict[str, float]:
         self._in_view |= frame.in_view
@@ -186,7 +201,11 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         return rewards.terms(frame, self._in_view, self._detected, lost)
 
     def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
-        own = {"fired": self.reported(frame.fired), "braking": frame.braking, "time_s": frame.time_s}
+        own = {
+            "fired": self.reported(frame.fired),
+            "braking": frame.braking,
+            "time_s": frame.time_s,
+        }
         scoring = {
             "detected": frame.detected,
             "in_view": frame.in_view,
@@ -198,11 +217,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
 
 class DartoutEnv(ClosedLoopEnv):
-    """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty 30 km/h street.
+    """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty 30 km/h
+    street.
 
     The paper's first closed-loop scene. The seed draws the speeds, the place and the timing; see
-    `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources, all of which can be
-    passed as arguments. `occluder="truck", occluder_reported=True` parks a vehicle that
+    `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources, all of which
+    can be passed as arguments. `occluder="truck", occluder_reported=True` parks a vehicle that
     perception reports instead.
     """
 
@@ -211,7 +231,8 @@ class DartoutEnv(ClosedLoopEnv):
 
 
 class DenseEnv(ClosedLoopEnv):
-    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (7) tracked ones, five in the camera's view.
+    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (7) tracked ones, five in the
+    camera's view.
 
     At 3% of the cells a reserve for every camera box starves the person; `care_sim.scenarios.dense`
     reckons why, cell by cell.

@@ -37,20 +37,25 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     """A scene in which the agent chooses the LiDAR's cells and nothing reacts to what is seen.
 
     ### Action
-    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score for every cell.
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`: `Box(0, 1, (E, A), float32)`, a score for every
+    cell.
 
     ### Observation
-    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs in both loops.
+    As in `care_sim.envs.closed_loop.ClosedLoopEnv`, with the cameras of the scene: one policy runs
+    in both loops.
 
     ### Reward
-    Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at best. It knows what no
-    observation shows: a learner may learn from it, no policy may read it while it plays.
+    Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at
+    best. It knows what no observation shows: a learner may learn from it, no policy may read it
+    while it plays.
 
     ### Episode end
-    Truncated after the last keyframe. `env.unwrapped.score` then holds event by event what was found.
+    Truncated after the last keyframe. `env.unwrapped.score` then holds event by event what was
+    found.
 
     ### Info
-    What is for scoring alone is never a policy's input; `scoring_info=False` leaves it out, but for the `outcome`.
+    What is for scoring alone is never a policy's input; `scoring_info=False` leaves it out, but for
+    the `outcome`.
 
     | key | content | whose |
     |---|---|---|
@@ -62,16 +67,16 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     | `outcome` | at the end: a dict of `care_sim.evaluation.recall.Tally` | scoring alone |
 
     ### Arguments
-    `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in the closed loop;
-    `detector` by name (`care_sim.perception.detectors.detector_names`) and `detector_parameters`; `presence`
-    "annotated" or "visible", who is present at scene start and so never a first sighting
-    (`care_sim.evaluation.sightings`); any field of
-    `care_sim.core.conditions.Conditions` but those for which the scene would have to be filmed anew: an error of the
-    cameras' mount, the engine. `min_returns` is the `returns` detector's. A value that is not allowed raises
-    `care_sim.InvalidInput`.
+    `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in
+    the closed loop; `detector` by name (`care_sim.perception.detectors.detector_names`)
+    and `detector_parameters`; `presence` "annotated" or "visible", who is present at scene start and so
+    never a first sighting (`care_sim.evaluation.sightings`); any field of
+    `care_sim.core.conditions.Conditions` but those for which the scene would have to be filmed
+    anew: an error of the cameras' mount, the engine. `min_returns` is the `returns` detector's. A
+    value that is not allowed raises `care_sim.InvalidInput`.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 (Gymnasium's interface)
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 (Gymnasium's)
 
     def __init__(
         self,
@@ -94,12 +99,20 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         conditions = conditions_of(parameters)
         check_detector(detector)
         if detector != PROXY and conditions.min_returns != MIN_RETURNS:
-            raise InvalidInput(f"min_returns is of the detector {PROXY}, {detector} does not know it")
-        super().__init__(conditions, cameras, sensor_height_m, budget, keyframe_s, secret, scoring_info)
+            raise InvalidInput(
+                f"min_returns is of the detector {PROXY}, {detector} does not know it"
+            )
+        super().__init__(
+            conditions, cameras, sensor_height_m, budget, keyframe_s, secret, scoring_info
+        )
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
         if not isinstance(detector_parameters, Mapping | None):
-            raise InvalidInput(f"detector_parameters must map names to values, got {shown(detector_parameters)}")
-        self._detector = make_detector(detector, sensor_height_m, **own | dict(detector_parameters or {}))
+            raise InvalidInput(
+                f"detector_parameters must map names to values, got {shown(detector_parameters)}"
+            )
+        self._detector = make_detector(
+            detector, sensor_height_m, **own | dict(detector_parameters or {})
+        )
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
         self.render_mode = render_mode
         self.presence = presence
@@ -112,19 +125,23 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         return SceneScore.of(self._sightings, self._masks)
 
     def start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode over a film. Camera faults, noise and floor have independent streams, which the scene's
-        name and the seed decide.
+        """Begin an episode over a film. Camera faults, noise and floor have independent streams,
+        which the scene's name and the seed decide.
         """
         camera, lidar, floor, odometry = self.streams(seed, crc32(film.name.encode()), count=4)
         self._sightings = _sightings(film, self.presence)
-        self.keyframes, self._masks = [], []
+        self.keyframes = []
+        self._masks = []
         loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._detector)
         return self.begin(loop, floor), self.told({}, {"seed": seed, "scene": film.name})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as `chosen` does."""
+        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as
+        `chosen` does.
+        """
         loop = self.loop
-        fired, shot = self.chosen(action), loop.shot
+        fired = self.chosen(action)
+        shot = loop.shot
         record = loop.keyframe(fired)
         found = matching.found_objects(shot.annotations, record.detections)
         self.keyframes.append(record)
@@ -139,7 +156,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         return self.observed(), reward, False, self._over, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture (H, W, 3) of the last keyframe from above: who was found, what returned, what fired."""
+        """A picture (H, W, 3) of the last keyframe from above: who was found, what returned, what
+        fired.
+        """
         if self.render_mode is None:
             return None
         from care_sim.viewer.pictures.scene_from_above import draw_plan
@@ -152,7 +171,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
 
 class FilmEnv(OpenLoopEnv):
-    """The open loop over a film that is there already; `care_sim.study` plays all policies of a scene so."""
+    """The open loop over a film that is there already; `care_sim.study` plays all policies of a
+    scene so.
+    """
 
     def __init__(self, film: Film, **parameters: Any):
         if not isinstance(film, Film):
@@ -171,22 +192,27 @@ class FilmEnv(OpenLoopEnv):
 def _check_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -> None:
     for name in UNFILMED:
         if name in parameters:
-            raise InvalidInput(f"{name} is no argument of the open loop: its films are made without")
+            raise InvalidInput(
+                f"{name} is no argument of the open loop: its films are made without"
+            )
     known = [name for name in arguments_of(kind) if name not in UNFILMED]
     check_arguments(kind.__name__, parameters, known)
 
 
 @lru_cache(maxsize=1)
 def _sightings(film: Film, presence: str) -> Sightings:
-    return Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden, presence=presence)
+    return Sightings.of(
+        film.name, [shot.annotations for shot in film.shots], hidden=film.hidden, presence=presence
+    )
 
 
 class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
-    The seed of `reset` draws the street (`care_sim.sources.streets`) and everything else that is random. Seeds 0 to 149 are the
-    evaluation's: train on others. `learned-scorer` learned from 1000 to 1019, the calibration's. With a `secret`
-    all are other streets, none of them in the published tables.
+    The seed of `reset` draws the street (`care_sim.sources.streets`) and everything else that is
+    random. Seeds 0 to 149 are the evaluation's: train on others. `learned-scorer` learned from 1000
+    to 1019, the calibration's. With a `secret` all are other streets, none of them in the published
+    tables.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -197,7 +223,9 @@ class StreetEnv(OpenLoopEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode in the street of a seed. `info` holds what repeats it; there are no `options`."""
+        """Begin an episode in the street of a seed. `info` holds what repeats it; there are no
+        `options`.
+        """
         super().reset(seed=seed)
         entropy = self.entropy(seed)
         return self.start(street_film(entropy, self._secret), entropy)
@@ -206,10 +234,11 @@ class StreetEnv(OpenLoopEnv):
 class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
-    `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of their scenes by name;
-    the first, unless given. `split`, `version` and `camera_detections` are those of
-    `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token that points nowhere, raises
-    `care_sim.InvalidInput` with its name. The seed of `reset` draws faults, noise and floor.
+    `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of
+    their scenes by name; the first, unless given. `split`, `version` and `camera_detections` are
+    those of `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token
+    that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
+    faults, noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -229,4 +258,6 @@ class ReplayEnv(FilmEnv):
             raise InvalidInput(f"scene must be a name, got {shown(scene)}")
         options = {"split": split, "version": version, "camera_detections": camera_detections}
         recorded = recordings(source, options)
-        super().__init__(film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters)
+        super().__init__(
+            film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters
+        )

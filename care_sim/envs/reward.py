@@ -1,4 +1,6 @@
-"""The reward: named weights over metrics of a keyframe, each at most 0, so that 0 is the best return there is."""
+"""The reward: named weights over metrics of a keyframe, each at most 0, so that 0 is the best
+return there is.
+"""
 
 from collections.abc import Mapping
 
@@ -10,16 +12,24 @@ from care_sim.loops.records import Keyframe
 KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""
 
-WEIGHTS: dict[str, float] = {"delay": 1.0, "clearance": 1.0, "collision": 10.0, "braking": 0.1, "gain": 0.0}
-"""Default weight of every term. `gain` is off, since the reward of these environments was published without it;
-then it is not measured, which would cost rays, and reads 0."""
+WEIGHTS: dict[str, float] = {
+    "delay": 1.0,
+    "clearance": 1.0,
+    "collision": 10.0,
+    "braking": 0.1,
+    "gain": 0.0,
+}
+"""Default weight of every term. `gain` is off, since the reward of these environments was published
+without it; then it is not measured, which would cost rays, and reads 0."""
 
 HEAVIEST = 1e6
 """A return stays far from where sums of floats lose the other terms."""
 
 
 def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
-    """The default weights with some changed. Raises InvalidInput for an unknown term or no finite number."""
+    """The default weights with some changed. Raises InvalidInput for an unknown term or no finite
+    number.
+    """
     changes = {} if changes is None else changes
     if not isinstance(changes, Mapping):
         raise InvalidInput(f"reward_weights must map terms to numbers, got {shown(changes)}")
@@ -32,20 +42,20 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
 def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> dict[str, float]:
     """The terms of one keyframe.
 
-    `in_view` and `detected` say whether the first-sighting actor has been so by now, at least once; `lost` is what
-    `Potential.lost` gives.
+    `in_view` and `detected` say whether the first-sighting actor has been so by now, at least once;
+    `lost` is what `Potential.lost` gives.
 
     | term | of a keyframe | of an episode |
     |---|---|---|
-    | `delay` | -1 while it has come into view and was never detected | 0 down to -(keyframes in view) |
-    | `clearance` | from 0 at KEEP_CLEAR_M to -1 at contact with it, once in view | 0 down to -(keyframes in view) |
+    | `delay` | -1 while it has been in view and never detected | 0 down to -(keyframes in view) |
+    | `clearance` | 0 at KEEP_CLEAR_M, -1 at contact, in view | 0 down to -(keyframes in view) |
     | `collision` | -1 at a contact with any body, which ends the episode | 0 or -1 |
-    | `braking` | -1 while the brake is on before it has come into view (needless) | 0 down to -(keyframes before) |
-    | `gain` | -`lost` | first-detection distance as a share of the full-scan bound, less 1: 0 down to -1 |
+    | `braking` | -1 while the brake is on before it is in view | 0 down to -(keyframes before) |
+    | `gain` | -`lost` | first-detection distance over the full-scan bound, less 1: 0 down to -1 |
 
-    Each is at most 0; with weights of 0 or more the best return is 0. Where a full scan too is late, as the first rays
-    that return lag behind the first pixels in view, `delay` stays below 0; `gain` reaches 0 there, but for faults of
-    the LiDAR, which the bound does not know.
+    Each is at most 0; with weights of 0 or more the best return is 0. Where a full scan too is
+    late, as the first rays that return lag behind the first pixels in view, `delay` stays below 0;
+    `gain` reaches 0 there, but for faults of the LiDAR, which the bound does not know.
     """
     closeness = 1.0 - min(max(frame.clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
     return {
@@ -58,22 +68,25 @@ def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> 
 
 
 class Potential:
-    """The share of the full-scan bound that is lost so far, as a potential; one instance an episode.
+    """The share of the full-scan bound that is lost so far, as a potential; one instance an
+    episode.
 
-    The bound is the distance at the first keyframe at which a scan of every cell would have detected the
-    first-sighting actor. From then on, while it is undetected, 1 - distance / bound is lost, and at the end of an
-    episode without a detection everything. The potential never falls, and `gain` is its difference from keyframe to
-    keyframe (Ng, Harada and Russell 1999, with a discount of 1): the differences sum to the metric itself, however
-    they are spread over the episode. A learner that discounts more weighs early losses more.
+    The bound is the distance at the first keyframe at which a scan of every cell would have
+    detected the first-sighting actor. From then on, while it is undetected, 1 - distance / bound is
+    lost, and at the end of an episode without a detection everything. The potential never falls,
+    and `gain` is its difference from keyframe to keyframe (Ng, Harada and Russell 1999, with a
+    discount of 1): the differences sum to the metric itself, however they are spread over the
+    episode. A learner that discounts more weighs early losses more.
     """
 
     def __init__(self) -> None:
         self.bound_m: float | None = None
-        self._lost, self._found = 0.0, False
+        self._lost = 0.0
+        self._found = False
 
     def lost(self, frame: Keyframe, detectable: bool, over: bool) -> float:
-        """By how much the potential grows at a keyframe, at which a scan of every cell would detect the actor, or not;
-        `over`: the episode ends with it.
+        """By how much the potential grows at a keyframe, at which a scan of every cell would detect
+        the actor, or not; `over`: the episode ends with it.
         """
         before = self._lost
         if self.bound_m is None and (detectable or frame.detected):

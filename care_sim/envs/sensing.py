@@ -1,4 +1,6 @@
-"""What the environments of both loops share: a rig, its spaces, and a budget that no action can overspend."""
+"""What the environments of both loops share: a rig, its spaces, and a budget that no action can
+overspend.
+"""
 
 import inspect
 from typing import Any, Generic, TypeVar
@@ -33,7 +35,8 @@ AnyLoop = TypeVar("AnyLoop", bound=Loop)
 class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     """An environment whose action scores the cells of the angular grid.
 
-    `acted` is the last action that it took: scores (E, A) of the cells, whatever wrappers made of it.
+    `acted` is the last action that it took: scores (E, A) of the cells, whatever wrappers made of
+    it.
     """
 
     acted: NDArray[np.float32]
@@ -51,10 +54,13 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         check_secret(secret)
         check_flag("scoring_info", scoring_info)
         if not cameras:
-            raise InvalidInput("cameras must be at least one, got none: observations tell of each what it sees")
+            raise InvalidInput(
+                "cameras must be at least one, got none: observations tell of each what it sees"
+            )
         grid = AngularGrid()
         dead_cells(grid, conditions.lidar_dead_rows)
-        self.conditions, self.scoring_info = conditions, scoring_info
+        self.conditions = conditions
+        self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""
         self.rig = Rig(
             grid,
@@ -80,19 +86,21 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def truth(self) -> Truth:
-        """What privileged policies may ask for; `make_policy` hands it to them and to nobody else."""
+        """What privileged policies may ask for; `make_policy` hands it to them alone."""
         return EpisodeTruth(lambda: self.loop)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Begin the environment's own generator anew where there is a seed. Raises InvalidInput unless it is a whole
-        number of 0 to 2^63 - 1.
+        """Begin the environment's own generator anew where there is a seed. Raises InvalidInput
+        unless it is a whole number of 0 to 2^63 - 1.
         """
         if seed is not None:
             check_seed(seed)
             super().reset(seed=int(seed))
 
     def entropy(self, seed: int | None) -> int:
-        """The seed of an episode: the given one, else one that the environment's own generator draws."""
+        """The seed of an episode: the given one, else one that the environment's own generator
+        draws.
+        """
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
@@ -100,12 +108,15 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return streams(entropy, count, self._secret)
 
     def told(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
-        """`info`: what the car itself knows, and, unless `scoring_info` is off, what only the scoring may."""
+        """`info`: what the car itself knows, and, unless `scoring_info` is off, what only the
+        scoring may.
+        """
         return own | scoring if self.scoring_info else own
 
     def begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
-        self._running, self._over = loop, False
+        self._running = loop
+        self._over = False
         self._floor = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
         return self.observed()
 
@@ -115,7 +126,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def belief(self) -> Belief:
-        """What the last observation said, for wrappers, whatever was made of it since; raises as `loop` does."""
+        """What the last observation said, for wrappers, whatever was made of it since; raises as
+        `loop` does.
+        """
         return Belief.from_observation(self.observed())
 
     def chosen(self, action: Action) -> Cells:
@@ -131,21 +144,27 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
 
     def reported(self, fired: Cells) -> Cells | list[int]:
-        """The fired cells as `info` holds them, a copy: without the floor a list, since Gymnasium's vector environments
-        stack arrays of one length.
+        """The fired cells as `info` holds them, a copy: without the floor a list, since Gymnasium's
+        vector environments stack arrays of one length.
         """
         return fired.copy() if self.conditions.floor else fired.tolist()
 
 
 def conditions_of(parameters: dict[str, Any]) -> Conditions:
-    """The conditions among keyword arguments, which lose them. Raises InvalidInput for a value not allowed."""
+    """The conditions among keyword arguments, which lose them. Raises InvalidInput for a value not
+    allowed.
+    """
     names = [name for name in parameters if name in Conditions.__dataclass_fields__]
     return Conditions(**{name: parameters.pop(name) for name in names})
 
 
 def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
     """What an environment's class takes by name: its own arguments and the conditions."""
-    made = [vars(one)["__init__"] for one in kind.__mro__ if issubclass(one, SensingEnv) and "__init__" in vars(one)]
+    made = [
+        vars(one)["__init__"]
+        for one in kind.__mro__
+        if issubclass(one, SensingEnv) and "__init__" in vars(one)
+    ]
     named = [each for make in made for each in inspect.signature(make).parameters.values()]
     own = [each.name for each in named if each.kind is each.KEYWORD_ONLY]
     return [*dict.fromkeys([*own, *Conditions.__dataclass_fields__])]

@@ -15,8 +15,11 @@ from care_sim.core.rig import Rig
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:
-    """The bounded observation space of a rig; keys and columns as in `care_sim.core.types`, bounds of `care_sim.core.observation_limits`."""
-    grid, limits = rig.grid, Limits(rig)
+    """The bounded observation space of a rig; keys and columns as in `care_sim.core.types`, bounds
+    of `care_sim.core.observation_limits`.
+    """
+    grid = rig.grid
+    limits = Limits(rig)
     return spaces.Dict(
         {
             "ego": _box(limits.ego),
@@ -38,7 +41,9 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDAr
     with np.errstate(over="ignore"):
         scores = scores.astype(np.float32, copy=False)
     if not np.isfinite(scores).all():
-        raise InvalidInput("action must not hold NaN or infinity (of float32); score a cell 0 to leave it out")
+        raise InvalidInput(
+            "action must not hold NaN or infinity (of float32); score a cell 0 to leave it out"
+        )
     return scores
 
 

@@ -1,4 +1,6 @@
-"""Policies by name: the built-in ones and those that installed packages add (`care_sim.policies.installed`)."""
+"""Policies by name: the built-in ones and those that installed packages add
+(`care_sim.policies.installed`).
+"""
 
 import gymnasium
 
@@ -25,7 +27,15 @@ from care_sim.policies.paper.random_points import RandomPoints
 from care_sim.policies.paper.uncertainty import Uncertainty
 from care_sim.policies.parameters import Maker, check_parameters, is_privileged
 
-__all__ = ["BUILT_IN", "ENTRY_POINTS", "check_policy", "contenders", "make_policy", "policy_names", "tags_of"]
+__all__ = [
+    "BUILT_IN",
+    "ENTRY_POINTS",
+    "check_policy",
+    "contenders",
+    "make_policy",
+    "policy_names",
+    "tags_of",
+]
 
 BUILT_IN: dict[str, Maker] = {
     policy.name: policy
@@ -68,7 +78,7 @@ def check_policy(name: str) -> None:
 
 
 def tags_of(name: str) -> tuple[str, ...]:
-    """What the policy is (of `care_sim.policies.base.TAGS`); nothing for one that cannot be loaded."""
+    """What the policy is, of `care_sim.policies.base.TAGS`; empty for one that cannot be loaded."""
     try:
         tags: tuple[str, ...] = getattr(maker(name), "tags", Policy.tags)
     except InvalidInput:
@@ -77,11 +87,12 @@ def tags_of(name: str) -> tuple[str, ...]:
 
 
 def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy:
-    """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its rig alone.
+    """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its
+    rig alone.
 
-    Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an environment without
-    a rig, or one behind wrappers that change what is seen or done; BrokenPolicy for one that cannot be loaded or made;
-    MissingExtra for one whose library is not installed.
+    Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an
+    environment without a rig, or one behind wrappers that change what is seen or done; BrokenPolicy
+    for one that cannot be loaded or made; MissingExtra for one whose library is not installed.
     """
     check_policy(name)
     try:
@@ -94,7 +105,8 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
     if is_privileged(make):
         given.append(_of_environment(name, env, "truth"))
     if make is SeedFinder:
-        # A rig does not say through which scenario it drives, and scenarios share their first speeds.
+        # A rig does not say through which scenario it drives, and scenarios share their first
+        # speeds.
         parameters = {"scenario": getattr(env.unwrapped, "scenario_name", None), **parameters}
     try:
         policy = make(*given, **parameters)
@@ -102,7 +114,8 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
         raise
     except Exception as error:
         raise BrokenPolicy(
-            f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: {type(error).__name__}: {error}"
+            f"policy {name} refuses {shown(parameters) if parameters else 'to start'}: "
+            f"{type(error).__name__}: {error}"
         ) from error
     if not isinstance(policy, Policy):
         raise BrokenPolicy(f"policy {name} is no Policy but of type {type(policy).__name__}")
@@ -121,7 +134,8 @@ def _check_bare(name: str, env: gymnasium.Env) -> None:
     inner = env.unwrapped
     if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
         raise InvalidInput(
-            f"policy {name} plays the environment itself, not behind wrappers that change what is seen or done: "
+            f"policy {name} plays the environment itself, not behind wrappers that change what "
+            "is seen or done: "
             "give and step env.unwrapped"
         )
 

@@ -12,17 +12,18 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
-"""What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan, learned, playing by the
-generator of the scenes, or no contender but a control, which `all` leaves out.
+"""What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan,
+learned, playing by the generator of the scenes, or no contender but a control, which `all` leaves
+out.
 """
 
 
 class Policy(ABC):
     """A scripted policy. Subclasses state the idea and its source, and implement `demand`.
 
-    `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction, keyframe. `tags` are
-    some of `TAGS`, `source` is the citation in one line. `demanded` is what `demand` last answered a call with, for
-    those who watch.
+    `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
+    keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `demanded` is what
+    `demand` last answered a call with, for those who watch.
     """
 
     name: ClassVar[str] = ""
@@ -43,8 +44,8 @@ class Policy(ABC):
     def __call__(self, observation: Observation) -> Action:
         """The action (E, A) of the environments for an observation.
 
-        Raises InvalidInput for what is no observation of its rig, and when `demand` returns no Demand, or a cell that
-        the grid does not have.
+        Raises InvalidInput for what is no observation of its rig, and when `demand` returns no
+        Demand, or a cell that the grid does not have.
         """
         belief = self.rig.read(observation)
         try:

@@ -1,7 +1,7 @@
 """Policies of installed packages, found through the entry-point group `care_sim.policies`.
 
-The entry's name is the policy's, its object a `Policy` subclass or another callable that takes a `Rig`
-and parameters. Of two entries with one name the first on the path counts, as for modules.
+The entry's name is the policy's, its object a `Policy` subclass or another callable that takes a
+`Rig` and parameters. Of two entries with one name the first on the path counts, as for modules.
 """
 
 import inspect
@@ -52,7 +52,8 @@ def _faults(made: Any) -> Iterator[str]:
         inspect.signature(made)
     except (TypeError, ValueError):
         yield "tells no parameters"
-    tags, source = getattr(made, "tags", TAGS), getattr(made, "source", "")
+    tags = getattr(made, "tags", TAGS)
+    source = getattr(made, "source", "")
     if not (isinstance(tags, tuple) and tags and all(tag in TAGS for tag in tags)):
         yield f"has tags {tags!r}; allowed is a tuple of {', '.join(TAGS)}"
     if not isinstance(source, str):

@@ -15,7 +15,7 @@ WIDTH = 80
 
 
 def listing() -> Iterator[str]:
-    """A paragraph a policy, then the entries of packages that another policy of their name hides."""
+    """One paragraph per policy, then the entries that another policy of the same name hides."""
     for name in policy_names():
         yield _paragraph(name)
     counting: dict[str, EntryPoint] = {}
@@ -30,7 +30,9 @@ def listing() -> Iterator[str]:
 def parameters_of(make: Maker) -> list[str]:
     """The parameters as NAME=DEFAULT; a bare name must be given."""
     return [
-        parameter.name if parameter.default is parameter.empty else f"{parameter.name}={parameter.default!r}"
+        parameter.name
+        if parameter.default is parameter.empty
+        else f"{parameter.name}={parameter.default!r}"
         for parameter in settable(make)
         if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
     ]
@@ -50,7 +52,9 @@ def _paragraph(name: str) -> str:
 
 
 def _summary(name: str, make: Maker) -> str:
-    """The line that the module of a built-in policy begins with; of another its own, and its package."""
+    """The line that the module of a built-in policy begins with; of another its own, and its
+    package.
+    """
     if name in BUILT_IN:
         return (inspect.getdoc(inspect.getmodule(make)) or "").partition("\n")[0]
     said = (make.__doc__ or "").strip().partition("\n")[0]
@@ -58,10 +62,16 @@ def _summary(name: str, make: Maker) -> str:
 
 
 def _hidden(entry: EntryPoint, winner: str) -> str:
-    return _lines(f"{entry.name} (hidden)", f"Not used: {winner} has its name. [{package_of(entry)}]")
+    return _lines(
+        f"{entry.name} (hidden)", f"Not used: {winner} has its name. [{package_of(entry)}]"
+    )
 
 
 def _lines(title: str, *texts: str) -> str:
     said = map(one_line, texts)
-    indented = (line for text in said for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    "))
+    indented = (
+        line
+        for text in said
+        for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    ")
+    )
     return "\n".join([one_line(title), *indented])

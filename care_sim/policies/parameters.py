@@ -24,10 +24,14 @@ def settable(make: Maker) -> list[inspect.Parameter]:
 
 
 def check_parameters(name: str, make: Maker, parameters: Mapping[str, object]) -> None:
-    """Raise InvalidInput for a parameter that the policy does not have or that is not the user's to set."""
+    """Raise InvalidInput for a parameter that the policy does not have or that is not the user's to
+    set.
+    """
     for given in list(inspect.signature(make).parameters)[: _given(make)]:
         if given in parameters:
-            raise InvalidInput(f"{given} of policy {name} comes from the environment and is no parameter")
+            raise InvalidInput(
+                f"{given} of policy {name} comes from the environment and is no parameter"
+            )
     accepted = settable(make)
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return

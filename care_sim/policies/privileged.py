@@ -8,10 +8,11 @@ from care_sim.policies.base import Policy
 
 
 class PrivilegedPolicy(Policy):
-    """A policy that may ask for the truth about the coming keyframe: a bound or a reference, no policy of a car.
+    """A policy that may ask for the truth about the coming keyframe: a bound or a reference, no
+    policy of a car.
 
-    `make_policy` hands `truth` to subclasses of this class and to nobody else. They are never tagged
-    causal, and always privileged or non-causal, whatever they claim.
+    `make_policy` hands `truth` to subclasses of this class and to nobody else. They are never
+    tagged causal, and always privileged or non-causal, whatever they claim.
     """
 
     tags: ClassVar[tuple[str, ...]] = ("privileged",)

@@ -17,8 +17,8 @@ from care_sim.world.bullet import BulletWorld
 
 @dataclass(frozen=True)
 class Prop:
-    """An annotated box: its `number` in the film, its class name (None outside the five classes), length, width and
-    height, and the frame in its centre, seen from the sensor.
+    """An annotated box: its `number` in the film, its class name (None outside the five classes),
+    length, width and height, and the frame in its centre, seen from the sensor.
     """
 
     number: int
@@ -46,10 +46,11 @@ class Prop:
 def shoot(
     props: Sequence[Prop], sensor: Frame, height_m: float, grid: AngularGrid
 ) -> tuple[Annotations, IdentifiedDetections, Cloud]:
-    """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell fired.
+    """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell
+    fired.
 
-    The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing: real roads undulate, and a
-    plane in the world would bury what stands where they fall.
+    The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing: real
+    roads undulate, and a plane in the world would bury what stands where they fall.
     """
     reported = [prop for prop in props if prop.label is not None]
     annotations = annotations_of(reported)
@@ -60,7 +61,11 @@ def shoot(
         seen = surround_detections(world, SURROUND_CAMERAS, sensor, labels, annotations.boxes)
         swept = full_sweep(world, grid, sensor, _table([prop.bounds for prop in props]), height_m)
     identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
-    return annotations, identified, Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
+    return (
+        annotations,
+        identified,
+        Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers)),
+    )
 
 
 def annotations_of(props: Sequence[Prop]) -> Annotations:
@@ -77,4 +82,6 @@ def _table(boxes: list[tuple[float, ...]]) -> Floats:
 
 def _add(world: BulletWorld, prop: Prop, sensor: Frame) -> int:
     foot = prop.foot
-    return world.add(sized("prop", prop.label, prop.size), sensor.holding(foot.origin, foot.rotation))
+    return world.add(
+        sized("prop", prop.label, prop.size), sensor.holding(foot.origin, foot.rotation)
+    )

@@ -8,17 +8,19 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.types import Ego
 
 SPAN_S = 0.5
-"""How far back the poses count: a keyframe. At 10 Hz these are six, which average out the centimetres by which
-recorded poses err; longer spans lag behind a driver who begins to brake."""
+"""How far back the poses count: a keyframe. At 10 Hz these are six, which average out the
+centimetres by which recorded poses err; longer spans lag behind a driver who begins to brake."""
 LEAST_POSES = 3
 """The fewest that tell a steady acceleration without lag; at 2 Hz they reach back a second."""
 
 
 def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
-    """The car's motion at every pose, from it and those before: speed along its heading, yaw rate, acceleration.
+    """The car's motion at every pose, from it and those before: speed along its heading, yaw rate,
+    acceleration.
 
-    Parabolas are fitted to places and headings of the last SPAN_S. `times_s` (n,) ascend strictly. The first two
-    poses have too little of a past: theirs are the parabolas through the first three. A single pose has no motion.
+    Parabolas are fitted to places and headings of the last SPAN_S. `times_s` (n,) ascend strictly.
+    The first two poses have too little of a past: theirs are the parabolas through the first three.
+    A single pose has no motion.
     """
     if len(poses) < 2:
         return [Ego() for _ in poses]
@@ -29,9 +31,12 @@ def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
 
 def _motion(times_s: Floats, places: Floats, now: int) -> Ego:
     """The motion at row `now` of `places` (n, 3: x, y, heading)."""
-    first = min(int(np.searchsorted(times_s, times_s[now] - 1.01 * SPAN_S)), max(now + 1 - LEAST_POSES, 0))
+    first = min(
+        int(np.searchsorted(times_s, times_s[now] - 1.01 * SPAN_S)), max(now + 1 - LEAST_POSES, 0)
+    )
     window = slice(first, max(now + 1, LEAST_POSES))
-    times, degree = times_s[window] - times_s[now], min(len(times_s), LEAST_POSES) - 1
+    times = times_s[window] - times_s[now]
+    degree = min(len(times_s), LEAST_POSES) - 1
     rates = np.polynomial.polynomial.polyfit(times, places[window] - places[now], degree)
     heading = np.array([np.cos(places[now, 2]), np.sin(places[now, 2])])
     acceleration = 2 * rates[2, :2] @ heading if degree == 2 else 0.0

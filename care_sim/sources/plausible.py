@@ -1,7 +1,7 @@
 """What a recording can hold: the ranges of boxes, poses and times, alike for every source.
 
-They are wide. What lies beyond is damage: further on it would become infinities and NaN, or a body that ends Bullet
-(round ones without a radius do).
+They are wide. What lies beyond is damage: further on it would become infinities and NaN, or a body
+that ends Bullet (round ones without a radius do).
 """
 
 from pathlib import Path
@@ -14,7 +14,9 @@ from care_sim.core.frames import Floats
 Range = tuple[float, float]
 
 SIZES_M: Range = (0.01, 200.0)
-"""Length, width and height of an annotated box: a tenth of the smallest, and twice the longest train in a street."""
+"""Length, width and height of an annotated box: a tenth of the smallest, and twice the longest
+train in a street.
+"""
 AWAY_M: Range = (-1e4, 1e4)
 """x, y and z of an annotated box from the car: forty times as far as boxes are annotated."""
 MAP_M: Range = (-1e8, 1e8)
@@ -34,12 +36,14 @@ UNIT = (0.9, 1.1)
 def check_span(path: Path, seconds: float) -> None:
     """Raise InvalidInput for a drive longer than `LONGEST_S`."""
     if seconds > LONGEST_S:
-        raise InvalidInput(f"{path}: its times span {seconds:g} s, and a drive may last {LONGEST_S} s")
+        raise InvalidInput(
+            f"{path}: its times span {seconds:g} s, and a drive may last {LONGEST_S} s"
+        )
 
 
 def turn_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str] | None:
-    """The first of quaternions (n, 4: x, y, z, w) that turns nothing, or leaves no heading where there must be one: its
-    row, and what is wrong with it.
+    """The first of quaternions (n, 4: x, y, z, w) that turns nothing, or leaves no heading where
+    there must be one: its row, and what is wrong with it.
     """
     lengths = np.linalg.norm(np.clip(turns, -2, 2), axis=1)  # squares of larger ones overflow
     unit = (lengths >= UNIT[0]) & (lengths <= UNIT[1])

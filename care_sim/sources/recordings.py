@@ -1,4 +1,6 @@
-"""Folders of recorded drives by a text, such as `argoverse2:FOLDER`: which scenes they hold, and their films."""
+"""Folders of recorded drives by a text, such as `argoverse2:FOLDER`: which scenes they hold, and
+their films.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -20,7 +22,9 @@ from care_sim.sources.nuscenes.tables import FIELDS, Database, Row
 
 @dataclass(frozen=True)
 class Recordings(ABC):
-    """The recorded scenes in a folder. Raises InvalidInput, with file and token, for what cannot be read."""
+    """The recorded scenes in a folder. Raises InvalidInput, with file and token, for what cannot be
+    read.
+    """
 
     kind: ClassVar[str]
     folder: Path
@@ -35,8 +39,8 @@ class Recordings(ABC):
 
     @abstractmethod
     def files(self, scene: str) -> list[Path]:
-        """The files that say what is in a scene, those that are missing too; the sweeps of nuScenes are not among
-        them.
+        """The files that say what is in a scene, those that are missing too; the sweeps of nuScenes
+        are not among them.
         """
 
 
@@ -65,8 +69,9 @@ class Argoverse2(Recordings):
 
 @dataclass(frozen=True)
 class NuScenes(Recordings):
-    """A nuScenes v1.0 database: the scenes of a `split`, of a `version` where the folder holds several; the cameras'
-    boxes come from the file `camera_detections`, else from projected annotations.
+    """A nuScenes v1.0 database: the scenes of a `split`, of a `version` where the folder holds
+    several; the cameras' boxes come from the file `camera_detections`, else from projected
+    annotations.
     """
 
     kind = "nuscenes"
@@ -90,15 +95,19 @@ class NuScenes(Recordings):
         return [_database(self.folder, self.version).path(table) for table in FIELDS]
 
     def _rows(self) -> dict[str, Row]:
-        return {row["name"]: row for row in splits.scenes(_database(self.folder, self.version), self.split)}
+        return {
+            row["name"]: row
+            for row in splits.scenes(_database(self.folder, self.version), self.split)
+        }
 
 
 KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
 
 
 def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
-    """The recordings that a text `KIND:FOLDER` names, with the `options` of its kind; those that are None are not
-    given. Raises InvalidInput for another text, a folder that is none, an option that the kind does not have.
+    """The recordings that a text `KIND:FOLDER` names, with the `options` of its kind; those that
+    are None are not given. Raises InvalidInput for another text, a folder that is none, an option
+    that the kind does not have.
     """
     kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
     if not (colon and folder) or kind not in KINDS:

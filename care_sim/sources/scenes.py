@@ -10,7 +10,12 @@ from care_sim.base.text import shortened
 from care_sim.loops.film import Film
 from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
 from care_sim.sources.streets.recording import record
-from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street, street_name
+from care_sim.sources.streets.street import (
+    CALIBRATION_SEEDS,
+    EVALUATION_SEEDS,
+    make_street,
+    street_name,
+)
 
 
 class Scene(NamedTuple):
@@ -37,8 +42,8 @@ class Source(Protocol):
         ...
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """Columns that tell where a scene comes from: the kind of the source, and of recordings a hash of the files
-        that it is read from, wherever they lie.
+        """Columns that tell where a scene comes from: the kind of the source, and of recordings a
+        hash of the files that it is read from, wherever they lie.
         """
         ...
 
@@ -75,7 +80,9 @@ class Recorded:
         return self.recordings.kind
 
     def scenes(self) -> list[Scene]:
-        """By name; one seed for all, since the name of a scene is part of what draws its faults and floor."""
+        """By name; one seed for all, since the name of a scene is part of what draws its faults and
+        floor.
+        """
         return [Scene(name, 0) for name in self.recordings.scenes()]
 
     def film(self, scene: Scene) -> Film:
@@ -83,8 +90,13 @@ class Recorded:
         return self.recordings.film(scene.name)
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """The kind, the hash of the scene's files, and that of the camera detections where there are some."""
-        own: dict[str, Any] = {"source": self.kind, "recording": data_digest(self.recordings.files(scene.name))}
+        """The kind, the hash of the scene's files, and that of the camera detections where there
+        are some.
+        """
+        own: dict[str, Any] = {
+            "source": self.kind,
+            "recording": data_digest(self.recordings.files(scene.name)),
+        }
         if isinstance(self.recordings, NuScenes) and self.recordings.camera_detections:
             own["camera_detections"] = file_digest(self.recordings.camera_detections)
         return own
@@ -96,10 +108,12 @@ SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
 
 def source_of(text: str, **options: object) -> Source:
-    """The source that a text names: `streets`, `argoverse2:FOLDER` or `nuscenes:FOLDER`, with `options` of its kind
-    (`split`, and those of `care_sim.sources.recordings.NuScenes`); those that are None are not given.
+    """The source that a text names: `streets`, `argoverse2:FOLDER` or `nuscenes:FOLDER`, with
+    `options` of its kind (`split`, and those of `care_sim.sources.recordings.NuScenes`); those that
+    are None are not given.
 
-    Raises InvalidInput for another text, a folder that is none, an option that the kind does not have.
+    Raises InvalidInput for another text, a folder that is none, an option that the kind does not
+    have.
     """
     if text != "streets":
         if text.partition(":")[0] not in KINDS:
@@ -115,8 +129,8 @@ def source_of(text: str, **options: object) -> Source:
 
 
 def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
-    """The scenes that are asked for: one whole number means that many, from the first; else scenes by name; all of
-    them without. Raises InvalidInput for a name or a number that there is not.
+    """The scenes that are asked for: one whole number means that many, from the first; else scenes
+    by name; all of them without. Raises InvalidInput for a name or a number that there is not.
     """
     if not names:
         return scenes
@@ -124,7 +138,8 @@ def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
         count = int(names[0][:LONGEST_NUMBER])
         if not 1 <= count <= len(scenes):
             raise InvalidInput(
-                f"scenes must be a number from 1 to {len(scenes)} or names, got {shortened(names[0], LONGEST_NUMBER)}"
+                f"scenes must be a number from 1 to {len(scenes)} or names, got "
+                f"{shortened(names[0], LONGEST_NUMBER)}"
             )
         return scenes[:count]
     known = {scene.name: scene for scene in scenes}

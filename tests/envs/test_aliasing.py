@@ -16,7 +16,13 @@ def make(request):
     envs = []
 
     def made(wrap=lambda env: env, **arguments):
-        envs.append(wrap(gymnasium.make(request.param, disable_env_checker=True, budget=0.03, **place, **arguments)))
+        envs.append(
+            wrap(
+                gymnasium.make(
+                    request.param, disable_env_checker=True, budget=0.03, **place, **arguments
+                )
+            )
+        )
         return envs[-1]
 
     yield made
@@ -37,7 +43,9 @@ def scrawl(*given):
 
 
 def played(env, touch, inner=lambda _: None):
-    """What is seen and fired; `touch` gets all that changed hands, before each keyframe and after it."""
+    """What is seen and fired; `touch` gets all that changed hands, before each keyframe and after
+    it.
+    """
     rng = np.random.default_rng(0)
     told = []
     observation, info = env.reset(seed=3)
@@ -55,7 +63,11 @@ def played(env, touch, inner=lambda _: None):
 
 def kept(inner):
     records = inner.keyframes
-    return [record.fired.tolist() for record in records], inner.acted.tobytes(), inner.loop.belief.ranges.tobytes()
+    return (
+        [record.fired.tolist() for record in records],
+        inner.acted.tobytes(),
+        inner.loop.belief.ranges.tobytes(),
+    )
 
 
 @pytest.mark.parametrize("floor", [True, False])

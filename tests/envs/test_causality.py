@@ -17,7 +17,9 @@ def observe(pose, mask):
     world = env.loop.world
     hidden = world.add("hidden car", "car", pose)
     observations = [env.step(mask)[0] for _ in range(4)]
-    _, hits = world.bullet.cast(env.loop.sensor.origin, env.rig.grid.directions[np.flatnonzero(mask)], 50.0)
+    _, hits = world.bullet.cast(
+        env.loop.sensor.origin, env.rig.grid.directions[np.flatnonzero(mask)], 50.0
+    )
     env.close()
     return observations, bool(np.any(hits == hidden.body))
 
@@ -29,7 +31,10 @@ def forward_mask():
 
 
 def test_moving_what_nobody_looks_at_changes_nothing():
-    (near, touched), (far, _) = observe(BEHIND, forward_mask()), observe((-30.0, -1.0, 0.5), forward_mask())
+    (near, touched), (far, _) = (
+        observe(BEHIND, forward_mask()),
+        observe((-30.0, -1.0, 0.5), forward_mask()),
+    )
     assert not touched
     for before, after in zip(near, far, strict=True):
         for key in before:
@@ -46,9 +51,12 @@ def test_moving_what_a_fired_ray_touches_changes_the_scan():
 
 @pytest.mark.parametrize(("name", "engine"), [("bullet", Bullet), ("fast", Fast)])
 def test_only_fired_cells_are_cast(monkeypatch, name, engine):
-    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.05, engine=name).unwrapped
+    env = gymnasium.make(
+        "CARE-Dense-v0", disable_env_checker=True, budget=0.05, engine=name
+    ).unwrapped
     env.reset(seed=0)
-    counts, cast = [], engine.cast
+    counts = []
+    cast = engine.cast
     monkeypatch.setattr(engine, "cast", lambda *given: counts.append(len(given[2])) or cast(*given))
     for _ in range(3):
         env.step(env.action_space.sample())

@@ -1,4 +1,4 @@
-"""The same seed gives the same episode to the last bit: in one process, in many, in every vector."""
+"""The same seed gives the same episode to the last bit: in one process, in many, in vectors."""
 
 import hashlib
 import subprocess
@@ -11,7 +11,9 @@ import pytest
 import care_sim
 from tests.helpers.places import ROOT
 
-NAME, SEED, STEPS = "care_sim:CARE-Dense-v0", 11, 8
+NAME = "care_sim:CARE-Dense-v0"
+SEED = 11
+STEPS = 8
 
 
 def digest(observations):
@@ -38,7 +40,9 @@ def alone():
 def in_a_vector(vector):
     observations = [vector.reset(seed=[SEED, SEED + 1])[0]]
     observations += [vector.step(np.stack([action, action]))[0] for action in actions()]
-    observations = [{key: value[0].copy() for key, value in observation.items()} for observation in observations]
+    observations = [
+        {key: value[0].copy() for key, value in observation.items()} for observation in observations
+    ]
     vector.close()
     return digest(observations)
 
@@ -52,7 +56,9 @@ def test_vectors_of_gymnasium_give_the_same_episode(mode):
 
 def test_another_process_gives_the_same_episode():
     program = "from tests.envs import test_determinism; print(test_determinism.alone())"
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert done.stdout.split()[-1] == alone()
 
 
@@ -64,7 +70,9 @@ def test_the_subprocess_vector_of_stable_baselines3_gives_the_same_episode():
     observations = [vector.reset()]
     observations += [vector.step(np.stack([action, action]))[0] for action in actions()]
     vector.close()
-    assert digest([{key: value[0] for key, value in seen.items()} for seen in observations]) == alone()
+    assert (
+        digest([{key: value[0] for key, value in seen.items()} for seen in observations]) == alone()
+    )
 
 
 def make_one():

@@ -21,7 +21,7 @@ from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
 EXPLAINED = (
-    "symmetric and normalized Box action space",  # a score is a share of attention: 0 to 1, not -1 to 1
+    "symmetric and normalized Box action space",  # scores are shares of attention: 0 to 1
     "unconventional shape",  # tables and the grid are 2D on purpose
 )
 
@@ -123,7 +123,13 @@ def test_it_documents_itself():
     for name in CLOSED_LOOP:
         text = type(make(name).unwrapped).__doc__
         assert name in text
-        for heading in ("### Action", "### Observation", "### Reward", "### Episode end", "### Arguments"):
+        for heading in (
+            "### Action",
+            "### Observation",
+            "### Reward",
+            "### Episode end",
+            "### Arguments",
+        ):
             assert heading in text
 
 
@@ -143,7 +149,8 @@ def test_fewer_scores_than_cells_are_topped_up_from_the_floor_or_left_unspent():
 
 
 def test_policies_meet_the_same_floor_world_and_misses():
-    fired, seen = [], []
+    fired = []
+    seen = []
     for name in ("random", "history"):
         env = make("CARE-Dartout-v0", false_negative_rate=0.5)
         policy = care_sim.make_policy(name, env)
@@ -194,7 +201,9 @@ def test_the_next_episode_of_an_environment_has_another_floor():
 
 
 def seen_and_scanned(seed):
-    env = make("CARE-Dense-v0", budget=1.0, false_negative_rate=0.5, lidar_dropout=0.5, **ONE_STREET)
+    env = make(
+        "CARE-Dense-v0", budget=1.0, false_negative_rate=0.5, lidar_dropout=0.5, **ONE_STREET
+    )
     observation, _ = env.reset(seed=seed)
     seen = [observation["detections"].tolist()]
     for _ in range(2):
@@ -212,7 +221,12 @@ def test_misses_and_losses_are_the_seeds_own_even_where_the_street_is_not():
 
 
 def test_arguments_of_the_sensing_arrive():
-    arguments = {"min_returns": 9, "false_negative_rate": 0.2, "camera_latency": 2, "lidar_dropout": 0.1}
+    arguments = {
+        "min_returns": 9,
+        "false_negative_rate": 0.2,
+        "camera_latency": 2,
+        "lidar_dropout": 0.1,
+    }
     assert make("CARE-Dartout-v0", **arguments).unwrapped.conditions == Conditions(**arguments)
 
 
@@ -221,7 +235,7 @@ def test_every_condition_stands_on_the_page_of_the_environments():
 
 
 def test_a_contact_ends_the_episode_with_the_speed_it_happened_at():
-    """Braking from 0.3 s on covers 3.65 m by 0.70 s and 4.05 m by 0.75 s, when 7.75 m/s are left."""
+    """Braking from 0.3 s on covers 3.65 m by 0.70 s, 4.05 m by 0.75 s; 7.75 m/s are left."""
     env = make("CARE-Dartout-v0", budget=1.0).unwrapped
     env.scenario = BusAhead()
     env.reset(seed=0)
@@ -237,7 +251,9 @@ def test_a_contact_ends_the_episode_with_the_speed_it_happened_at():
 
 
 def test_a_person_who_is_run_into_ends_the_episode():
-    """A detector that never speaks, and a person who would need the car to come a quarter second later."""
+    """A detector that never speaks, and a person who would need the car to come a quarter second
+    later.
+    """
     env = make("CARE-Dartout-v0", min_returns=10**6).unwrapped
     env.scenario = Dartout(encroachment_s=(-0.3, -0.2), crossing_m=(20.0, 20.0))
     env.reset(seed=0)
@@ -248,22 +264,27 @@ def test_a_person_who_is_run_into_ends_the_episode():
     assert (terminated, truncated) == (True, False)
     assert info["speed_mps"] * info["time_s"] == pytest.approx(20.0, abs=3.3)
     outcome = info["outcome"]
-    assert (outcome["collision"], outcome["braked"], outcome["detection_distance_m"]) == (True, False, None)
+    assert (outcome["collision"], outcome["braked"], outcome["detection_distance_m"]) == (
+        True,
+        False,
+        None,
+    )
     assert outcome["impact_speed_mps"] == pytest.approx(info["speed_mps"])
     assert outcome["clearance_m"] <= 0.0
 
 
 @pytest.mark.parametrize(
-    ("duration", "keyframe", "steps"), [(0.1, 0.1, 1), (0.3, 0.1, 3), (0.7, 0.1, 7), (0.6, 0.2, 3), (0.25, 0.1, 3)]
+    ("duration", "keyframe", "steps"),
+    [(0.1, 0.1, 1), (0.3, 0.1, 3), (0.7, 0.1, 7), (0.6, 0.2, 3), (0.25, 0.1, 3)],
 )
 def test_an_episode_is_cut_off_at_its_duration_and_not_a_step_later(duration, keyframe, steps):
     env = make("CARE-Dartout-v0", budget=0.01, duration_s=duration, keyframe_s=keyframe)
     env.reset(seed=0)
     ends = [env.step(NOTHING)[2:] for _ in range(steps)]
     env.close()
-    assert [(terminated, truncated) for terminated, truncated, _ in ends] == [(False, False)] * (steps - 1) + [
-        (False, True)
-    ]
+    assert [(terminated, truncated) for terminated, truncated, _ in ends] == [(False, False)] * (
+        steps - 1
+    ) + [(False, True)]
     assert ["outcome" in info for *_, info in ends] == [False] * (steps - 1) + [True]
     assert ends[-1][2]["outcome"]["collision"] is False
 
@@ -272,7 +293,11 @@ def test_a_vector_of_environments_without_a_floor_fires_what_each_was_told():
     masks = np.zeros((2, 32, 512), np.float32)
     masks[0, 10, :10] = masks[1, 10, :20] = 1.0
     envs = gymnasium.make_vec(
-        "CARE-Dartout-v0", num_envs=2, vectorization_mode="sync", vector_kwargs={"copy": True}, floor=False
+        "CARE-Dartout-v0",
+        num_envs=2,
+        vectorization_mode="sync",
+        vector_kwargs={"copy": True},
+        floor=False,
     )
     envs.reset(seed=0)
     for _ in range(2):
@@ -336,7 +361,10 @@ def test_step_before_reset_says_so():
         ({"render_mode": "ascii"}, "render_mode must be"),
         ({"occluder": "cloud"}, "unknown occluder"),
         ({"vehicles": 99}, "vehicles of dense must be a whole number >= 0 and <= 12"),
-        ({"weather": "rain"}, "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, vehicles"),
+        (
+            {"weather": "rain"},
+            "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, vehicles",
+        ),
         ({"secrt": "x"}, "unknown argument of DenseEnv 'secrt', the nearest is secret; known: "),
         ({"bugdet": 0.1}, "the nearest is budget; known: "),
         ({"vehicle": 3}, "the nearest is vehicles; known: "),

@@ -1,4 +1,6 @@
-"""What an agent must not know: keys of `info` that tell the truth, and episodes looked up by their seed."""
+"""What an agent must not know: keys of `info` that tell the truth, and episodes looked up by their
+seed.
+"""
 
 import re
 
@@ -32,7 +34,8 @@ def make(request):
 
 
 def infos(env):
-    told, ended = [env.reset(seed=0)[1]], False
+    told = [env.reset(seed=0)[1]]
+    ended = False
     while not ended:
         *_, terminated, truncated, info = env.step(NOTHING)
         told.append(info)
@@ -41,24 +44,38 @@ def infos(env):
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_without_scoring_info_only_what_the_car_knows_is_told_and_at_the_end_the_outcome(make, name):
+def test_without_scoring_info_only_what_the_car_knows_is_told_and_at_the_end_the_outcome(
+    make, name
+):
     begun, *steps, last = infos(make(name, scoring_info=False))
     assert begun == {}
     assert all(set(info) == OWN[name] for info in steps)
     assert set(last) == OWN[name] | {"outcome"}
 
 
-@pytest.mark.parametrize(("name", "kind"), [("CARE-Dense-v0", ClosedLoopEnv), ("CARE-Replay-v0", OpenLoopEnv)])
-def test_every_key_of_info_stands_on_the_page_as_the_cars_own_or_for_scoring_alone(make, name, kind):
-    lines = re.findall(r"^ *\| (`.*) \| .* \| (the car's own|scoring alone) \|$", kind.__doc__, re.MULTILINE)
-    page = {key: whose for keys, whose in lines for key in re.findall(r"`(\w+)`", keys.partition(" | ")[0])}
+@pytest.mark.parametrize(
+    ("name", "kind"), [("CARE-Dense-v0", ClosedLoopEnv), ("CARE-Replay-v0", OpenLoopEnv)]
+)
+def test_every_key_of_info_stands_on_the_page_as_the_cars_own_or_for_scoring_alone(
+    make, name, kind
+):
+    lines = re.findall(
+        r"^ *\| (`.*) \| .* \| (the car's own|scoring alone) \|$", kind.__doc__, re.MULTILINE
+    )
+    page = {
+        key: whose
+        for keys, whose in lines
+        for key in re.findall(r"`(\w+)`", keys.partition(" | ")[0])
+    }
     told = {key for info in infos(make(name)) for key in info}
     assert set(page) == told
     assert {key for key, whose in page.items() if whose == "the car's own"} == OWN[name]
 
 
 def test_the_truth_left_out_changes_nothing_else(make):
-    with_it, without = (make("CARE-Dense-v0", scoring_info=told, false_negative_rate=1.0) for told in (True, False))
+    with_it, without = (
+        make("CARE-Dense-v0", scoring_info=told, false_negative_rate=1.0) for told in (True, False)
+    )
     np.testing.assert_equal(with_it.reset(seed=1)[0], without.reset(seed=1)[0])
     for _ in range(3):
         (*answer, info), (*other, less) = with_it.step(NOTHING), without.step(NOTHING)
@@ -67,7 +84,9 @@ def test_the_truth_left_out_changes_nothing_else(make):
 
 
 def begins(env, seed):
-    """The first observation, and after two scans of every cell; then the person's place at three moments."""
+    """The first observation, and after two scans of every cell; then the person's place at three
+    moments.
+    """
     observation, _ = env.reset(seed=seed)
     seen = [observation, *(env.step(np.ones((32, 512), np.float32))[0] for _ in range(2))]
     world = env.unwrapped.loop.world
@@ -81,7 +100,8 @@ def same(one, other):
 @pytest.mark.parametrize("name", ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0"])
 def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, name):
     public, secret, again, other = (
-        begins(make(name, budget=1.0, secret=text), 0) for text in (False, SECRET, SECRET, SECRET[::-1])
+        begins(make(name, budget=1.0, secret=text), 0)
+        for text in (False, SECRET, SECRET, SECRET[::-1])
     )
     assert all(map(same, secret[0], again[0]))
     assert secret[1] == again[1]
@@ -92,7 +112,9 @@ def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, n
 
 def test_a_secret_enters_misses_floor_and_losses_of_a_recorded_scene(make):
     faults = {"budget": 0.2, "false_negative_rate": 0.5, "lidar_dropout": 0.5}
-    public, secret, again = (make("CARE-Replay-v0", **faults, secret=text) for text in (False, SECRET, SECRET))
+    public, secret, again = (
+        make("CARE-Replay-v0", **faults, secret=text) for text in (False, SECRET, SECRET)
+    )
     fired = []
     for env in (public, secret, again):
         env.reset(seed=0)

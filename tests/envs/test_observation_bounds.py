@@ -26,7 +26,10 @@ FAULTS = {
     "ego_speed_sigma": st.floats(0, 10),
     "min_returns": st.integers(1, 3),
 }
-MOUNTS = {"camera_rotation_sigma_deg": st.floats(0, 180), "camera_position_sigma_m": st.floats(0, 10)}
+MOUNTS = {
+    "camera_rotation_sigma_deg": st.floats(0, 180),
+    "camera_position_sigma_m": st.floats(0, 10),
+}
 
 
 def play(env, policy="care", seed=0):
@@ -53,45 +56,75 @@ def play(env, policy="care", seed=0):
 @settings(max_examples=6)
 def test_the_closed_loop_under_all_faults(name, faults, keyframe_s, seed):
     duration_s = max(0.4, 2 * keyframe_s)
-    env = gymnasium.make(name, disable_env_checker=True, keyframe_s=keyframe_s, duration_s=duration_s, **faults)
+    env = gymnasium.make(
+        name, disable_env_checker=True, keyframe_s=keyframe_s, duration_s=duration_s, **faults
+    )
     play(env, seed=seed)
     env.close()
 
 
 def test_an_odometer_that_reads_anything():
-    env = gymnasium.make("CARE-Dartout-v0", disable_env_checker=True, duration_s=0.5, ego_speed_sigma=10.0)
+    env = gymnasium.make(
+        "CARE-Dartout-v0", disable_env_checker=True, duration_s=0.5, ego_speed_sigma=10.0
+    )
     play(env)
     env.close()
 
 
 @pytest.fixture(scope="session")
 def roll_back(tmp_path_factory):
-    """A log whose car rolls back by a hair, at first standing, while someone else jumps to and fro."""
-    jumps = [box("REGULAR_VEHICLE", (12.0 + 9 * (n // 5 % 2), 5.0, 0.42), track="j") for n in range(21)]
+    """A log whose car stands, then rolls back by a hair, while someone jumps to and fro."""
+    jumps = [
+        box("REGULAR_VEHICLE", (12.0 + 9 * (n // 5 % 2), 5.0, 0.42), track="j") for n in range(21)
+    ]
     poses = [at(-2e-5 * n) for n in range(21)]
-    return write(tmp_path_factory.mktemp("logs") / "back", [[CAR_AHEAD, jump] for jump in jumps], poses)
+    return write(
+        tmp_path_factory.mktemp("logs") / "back", [[CAR_AHEAD, jump] for jump in jumps], poses
+    )
 
 
 @given(faults=st.fixed_dictionaries({}, optional=FAULTS), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=6)
 def test_a_recorded_log_under_all_faults(drive, faults, seed):
-    play(gymnasium.make("CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{drive}", **faults), seed=seed)
+    play(
+        gymnasium.make(
+            "CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{drive}", **faults
+        ),
+        seed=seed,
+    )
 
 
 def test_a_recorded_car_that_rolls_back(roll_back):
-    env = gymnasium.make("CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{roll_back}", budget=0.5)
+    env = gymnasium.make(
+        "CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{roll_back}", budget=0.5
+    )
     play(env)
     env.reset()
     assert env.unwrapped.loop.belief.ego.speed == pytest.approx(-2e-4, rel=1e-3)
 
 
 def detections_file(path, root):
-    """A car in every picture, across the left edge, the right edge, the lower edge and wholly outside it."""
+    """A car in every picture, across the left edge, the right edge, the lower edge and wholly
+    outside it.
+    """
     tables = json.loads((root / "v1.0-trainval" / "sample_data.json").read_text())
-    pictures = [row["token"] for row in tables if any(channel in row["token"] for channel in CHANNELS)]
-    boxes = [-30, 300, 100, 500], [1500, 300, 1630, 500], [800, 700, 900, 950], [-90, 300, -40, 500], [1, 2, 3, 4]
+    pictures = [
+        row["token"] for row in tables if any(channel in row["token"] for channel in CHANNELS)
+    ]
+    boxes = (
+        [-30, 300, 100, 500],
+        [1500, 300, 1630, 500],
+        [800, 700, 900, 950],
+        [-90, 300, -40, 500],
+        [1, 2, 3, 4],
+    )
     rows = [
-        {"sample_data_token": token, "bbox_corners": box, "category_name": "vehicle.car", "score": 0.9}
+        {
+            "sample_data_token": token,
+            "bbox_corners": box,
+            "category_name": "vehicle.car",
+            "score": 0.9,
+        }
         for token in pictures
         for box in boxes
     ]
@@ -103,4 +136,6 @@ def detections_file(path, root):
 def test_a_nuscenes_scene(tmp_path, detector):
     root = write_drive(tmp_path / "nuscenes")
     own = {"camera_detections": detections_file(tmp_path / "found.json", root)} if detector else {}
-    play(gymnasium.make("CARE-Replay-v0", disable_env_checker=True, source=f"nuscenes:{root}", **own))
+    play(
+        gymnasium.make("CARE-Replay-v0", disable_env_checker=True, source=f"nuscenes:{root}", **own)
+    )

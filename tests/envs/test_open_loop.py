@@ -1,4 +1,6 @@
-"""The environments of the open loop: what Gymnasium asks, what the film decides, and what nothing may leak."""
+"""The environments of the open loop: what Gymnasium asks, what the film decides, and what nothing
+may leak.
+"""
 
 import pickle
 import warnings
@@ -26,7 +28,9 @@ NOTHING = np.zeros((32, 512), np.float32)
 def make(request, drive):
     """Makes an environment of the open loop."""
     place = {"source": f"argoverse2:{drive}"} if request.param == "CARE-Replay-v0" else {}
-    return lambda **arguments: gymnasium.make(request.param, disable_env_checker=True, **place, **arguments)
+    return lambda **arguments: gymnasium.make(
+        request.param, disable_env_checker=True, **place, **arguments
+    )
 
 
 @pytest.fixture
@@ -34,7 +38,9 @@ def replay(drive):
     """Makes the environment of the hand-built drive."""
 
     def make(**arguments):
-        return gymnasium.make("CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{drive}", **arguments)
+        return gymnasium.make(
+            "CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{drive}", **arguments
+        )
 
     return make
 
@@ -44,7 +50,9 @@ def played(env, policy, seed=0, **parameters):
     chooses = care_sim.make_policy(policy, env, **parameters)
     observation, _ = env.reset(seed=seed)
     chooses.reset()
-    infos, rewards, over = [], [], False
+    infos = []
+    rewards = []
+    over = False
     while not over:
         assert env.observation_space.contains(observation)
         observation, reward, terminated, over, info = env.step(chooses(observation))
@@ -75,7 +83,14 @@ def test_stable_baselines3_finds_nothing_to_complain_about(replay):
 
 def test_it_documents_itself_and_travels(make):
     env = make(budget=0.2)
-    for heading in (env.spec.id, "### Action", "### Observation", "### Reward", "### Episode end", "### Arguments"):
+    for heading in (
+        env.spec.id,
+        "### Action",
+        "### Observation",
+        "### Reward",
+        "### Episode end",
+        "### Arguments",
+    ):
         assert heading in type(env.unwrapped).__doc__
     again = gymnasium.make(pickle.loads(pickle.dumps(env.spec)), disable_env_checker=True)
     assert again.unwrapped.rig.budget == env.unwrapped.rig.budget == 3277
@@ -90,7 +105,9 @@ def test_an_episode_shows_every_keyframe_once_and_ends_with_the_tally(make):
     outcome = infos[-1]["outcome"]
     assert outcome["frames"] == sum(info["objects"] for info in infos)
     assert outcome["found"] == sum(info["found"] for info in infos)
-    assert rewards == [info["found"] / info["objects"] - 1 if info["objects"] else 0.0 for info in infos]
+    assert rewards == [
+        info["found"] / info["objects"] - 1 if info["objects"] else 0.0 for info in infos
+    ]
     assert 0 < outcome["sighted"] <= outcome["events"]
     with pytest.raises(gymnasium.error.ResetNeeded, match="over"):
         env.step(NOTHING)
@@ -99,8 +116,11 @@ def test_an_episode_shows_every_keyframe_once_and_ends_with_the_tally(make):
 def test_the_score_is_that_of_what_the_detector_reported(make):
     env = make(budget=0.2)
     played(env, "history")
-    film, keyframes = env.unwrapped.loop.film, env.unwrapped.keyframes
-    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden)
+    film = env.unwrapped.loop.film
+    keyframes = env.unwrapped.keyframes
+    sightings = Sightings.of(
+        film.name, [shot.annotations for shot in film.shots], hidden=film.hidden
+    )
     again = score_scene(sightings, [record.detections for record in keyframes])
     assert again.tally() == env.unwrapped.score.tally()
     assert again.event_rows() == env.unwrapped.score.event_rows()
@@ -112,19 +132,27 @@ def test_the_person_at_the_house_is_the_one_event_and_the_camera_finds_it(replay
         infos, _ = played(replay(budget=budget), policy)
         outcomes[policy] = infos[-1]["outcome"]
     assert {outcome["events"] for outcome in outcomes.values()} == {1.0}
-    assert [outcomes[policy]["sighted"] for policy in ("history", "care", "full")] == [0.0, 1.0, 1.0]
+    assert [outcomes[policy]["sighted"] for policy in ("history", "care", "full")] == [
+        0.0,
+        1.0,
+        1.0,
+    ]
     assert outcomes["history"]["delay"] > outcomes["care"]["delay"] == 0
 
 
 def test_who_waits_hidden_from_the_start_is_an_event_by_presence_visible_alone(tmp_path):
-    """A person is annotated behind a van from the first sweep on, without a point until it walks out at the fifth."""
+    """A person is annotated behind a van from the first sweep on, without a point until it walks
+    out at the fifth.
+    """
     van = box("BOX_TRUCK", (20.0, -4.0, 0.9), (6.0, 2.2, 2.6), track="van")
     waits = [box("PEDESTRIAN", (20.0, -7.0, 0.6), (0.6, 0.7, 1.8), track="p", points=0)] * 5
     walks = [box("PEDESTRIAN", (14.0, -3.0, 0.6), (0.6, 0.7, 1.8), track="p")] * 6
     log = write(tmp_path / "log", [[van, person] for person in (*waits, *walks)], [at()] * 11)
     outcomes = {}
     for presence in ("annotated", "visible"):
-        env = gymnasium.make("CARE-Replay-v0", source=f"argoverse2:{log}", presence=presence, budget=1.0)
+        env = gymnasium.make(
+            "CARE-Replay-v0", source=f"argoverse2:{log}", presence=presence, budget=1.0
+        )
         infos, rewards = played(env, "full")
         outcomes[presence] = infos[-1]["outcome"]
         assert rewards == [0.0] * 3, "what is scored is the same"
@@ -159,7 +187,8 @@ def test_the_seed_draws_floor_and_faults_and_the_same_seed_the_same_episode(make
 
 
 def test_policies_meet_the_same_floor_and_misses(replay):
-    seen, floors = [], []
+    seen = []
+    floors = []
     for action in (NOTHING, np.eye(32, 512, dtype=np.float32)):
         env = replay(false_negative_rate=0.5)
         observation, _ = env.reset(seed=2)
@@ -195,7 +224,8 @@ def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):
     observation, _ = env.reset(seed=0)
     for _ in range(2):
         observation, *_ = env.step(np.ones_like(NOTHING))
-    belief, shot = care_sim.Belief.from_observation(observation), env.unwrapped.loop.shot
+    belief = care_sim.Belief.from_observation(observation)
+    shot = env.unwrapped.loop.shot
     truth = env.unwrapped.truth.boxes(belief.tracks)
     present = shot.annotations.boxes[:, :2]
     nearest = np.linalg.norm(truth[:, None, :2] - present, axis=-1).min(axis=1)
@@ -207,9 +237,18 @@ def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):
     ("arguments", "complaint"),
     [
         ({"engine": "bullet"}, "engine is no argument of the open loop"),
-        ({"camera_rotation_sigma_deg": 1.0}, "camera_rotation_sigma_deg is no argument of the open loop"),
-        ({"duration_s": 3.0}, "unknown argument of .*Env 'duration_s'; known: .*budget, .*scoring_info, secret"),
-        ({"scoring_inf": False}, "unknown argument of .*Env 'scoring_inf', the nearest is scoring_info; known: "),
+        (
+            {"camera_rotation_sigma_deg": 1.0},
+            "camera_rotation_sigma_deg is no argument of the open loop",
+        ),
+        (
+            {"duration_s": 3.0},
+            "unknown argument of .*Env 'duration_s'; known: .*budget, .*scoring_info, secret",
+        ),
+        (
+            {"scoring_inf": False},
+            "unknown argument of .*Env 'scoring_inf', the nearest is scoring_info; known: ",
+        ),
         ({"secret": ""}, "secret must not be empty"),
         ({"detector": "yolo"}, "unknown detector 'yolo'"),
         ({"detector_parameters": {"size": 3}}, "unknown parameter of detector returns 'size'"),
@@ -227,10 +266,19 @@ def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
     ("arguments", "complaint"),
     [
         ({"source": ""}, "source must be argoverse2:FOLDER or nuscenes:FOLDER, got ''"),
-        ({"source": "waymo:."}, "source must be argoverse2:FOLDER or nuscenes:FOLDER, got 'waymo:.'"),
+        (
+            {"source": "waymo:."},
+            "source must be argoverse2:FOLDER or nuscenes:FOLDER, got 'waymo:.'",
+        ),
         ({"source": "argoverse2:nowhere"}, "source argoverse2:nowhere: nowhere is no folder"),
-        ({"source": "argoverse2:{drive}", "scene": "other"}, "unknown log in .* 'other'; known: drive"),
-        ({"source": "argoverse2:{drive}", "split": "val"}, "split says nothing to argoverse2 recordings"),
+        (
+            {"source": "argoverse2:{drive}", "scene": "other"},
+            "unknown log in .* 'other'; known: drive",
+        ),
+        (
+            {"source": "argoverse2:{drive}", "split": "val"},
+            "split says nothing to argoverse2 recordings",
+        ),
     ],
 )
 def test_recordings_that_are_not_there_are_named(drive, arguments, complaint):
@@ -240,7 +288,9 @@ def test_recordings_that_are_not_there_are_named(drive, arguments, complaint):
 
 
 def test_a_misspelt_argument_of_a_recording_is_told_the_nearest():
-    with pytest.raises(InvalidInput, match=r"of ReplayEnv 'sorce', the nearest is source; known: .* scene, "):
+    with pytest.raises(
+        InvalidInput, match=r"of ReplayEnv 'sorce', the nearest is source; known: .* scene, "
+    ):
         gymnasium.make("CARE-Replay-v0", disable_env_checker=True, sorce="argoverse2:.")
 
 

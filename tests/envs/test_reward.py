@@ -10,14 +10,30 @@ from care_sim.loops.records import Keyframe
 
 def keyframe(**changes):
     quiet = {
-        "index": 0, "time_s": 0.0, "fired": np.arange(3), "in_view": False, "detected": False, "braking": False,
-        "speed_mps": 8.0, "distance_m": 30.0, "nearest_m": 30.0, "clearance_m": 20.0, "impact_speed_mps": None,
-    }  # fmt: skip
+        "index": 0,
+        "time_s": 0.0,
+        "fired": np.arange(3),
+        "in_view": False,
+        "detected": False,
+        "braking": False,
+        "speed_mps": 8.0,
+        "distance_m": 30.0,
+        "nearest_m": 30.0,
+        "clearance_m": 20.0,
+        "impact_speed_mps": None,
+    }
     return Keyframe(**{**quiet, **changes})
 
 
 def nothing(**changes):
-    return {"delay": 0.0, "clearance": 0.0, "collision": 0.0, "braking": 0.0, "gain": 0.0, **changes}
+    return {
+        "delay": 0.0,
+        "clearance": 0.0,
+        "collision": 0.0,
+        "braking": 0.0,
+        "gain": 0.0,
+        **changes,
+    }
 
 
 @pytest.mark.parametrize(
@@ -34,7 +50,11 @@ def nothing(**changes):
         ({"clearance_m": 0.5}, (False, False), {}),
         ({"clearance_m": KEEP_CLEAR_M}, (True, True), {}),
         ({"clearance_m": KEEP_CLEAR_M / 4}, (True, True), {"clearance": -0.75}),
-        ({"clearance_m": -0.3, "impact_speed_mps": 4.0}, (True, True), {"clearance": -1.0, "collision": -1.0}),
+        (
+            {"clearance_m": -0.3, "impact_speed_mps": 4.0},
+            (True, True),
+            {"clearance": -1.0, "collision": -1.0},
+        ),
         ({"clearance_m": np.inf, "impact_speed_mps": 0.0}, (False, False), {"collision": -1.0}),
     ],
 )
@@ -59,8 +79,11 @@ def test_every_term_has_a_weight():
 
 
 def losses(*frames):
-    """What a potential loses at keyframes of (distance, whether a full scan detects, whether it was detected)."""
-    potential, last = Potential(), len(frames) - 1
+    """What a potential loses at keyframes of (distance, whether a full scan detects, whether it was
+    detected).
+    """
+    potential = Potential()
+    last = len(frames) - 1
     return [
         potential.lost(keyframe(distance_m=distance, detected=detected), detectable, number == last)
         for number, (distance, detectable, detected) in enumerate(frames)
@@ -68,11 +91,15 @@ def losses(*frames):
 
 
 def test_nothing_is_lost_before_a_full_scan_would_detect_nor_when_it_is_found_at_once():
-    assert losses((20.0, False, False), (16.0, True, True), (12.0, True, False), (8.0, True, True)) == [0, 0, 0, 0]
+    assert losses(
+        (20.0, False, False), (16.0, True, True), (12.0, True, False), (8.0, True, True)
+    ) == [0, 0, 0, 0]
 
 
 def test_what_is_lost_until_the_detection_is_the_share_of_the_bound():
-    assert losses((16.0, True, False), (12.0, True, False), (8.0, False, True), (4.0, True, False)) == [
+    assert losses(
+        (16.0, True, False), (12.0, True, False), (8.0, False, True), (4.0, True, False)
+    ) == [
         0,
         0.25,
         0.25,

@@ -1,4 +1,6 @@
-"""What sets the policies of the closed loop apart: history, camera reserves, forgetting, the two bounds."""
+"""What sets the policies of the closed loop apart: history, camera reserves, forgetting, the two
+bounds.
+"""
 
 import inspect
 from dataclasses import asdict
@@ -56,12 +58,19 @@ def test_with_a_camera_that_misses_everything_whole_episodes_are_those_of_histor
 def test_history_ignores_what_the_camera_sees():
     seeing = driven("CARE-Dense-v0", "history", 40)
     blind = driven("CARE-Dense-v0", "history", 40, false_negative_rate=1.0)
-    assert all(np.array_equal(a["fired"], b["fired"]) for (_, _, a), (_, _, b) in zip(seeing, blind, strict=True))
+    assert all(
+        np.array_equal(a["fired"], b["fired"])
+        for (_, _, a), (_, _, b) in zip(seeing, blind, strict=True)
+    )
 
 
 def test_care_differs_from_all_camera_only_by_what_tracks_explain(encounter, environment):
-    """Where everything is explained, CARE is history; where nothing is, it is the all-camera reserve."""
-    care, everything, history = (care_sim.make_policy(n, environment) for n in ("care", "all-camera", "history"))
+    """Where everything is explained, CARE is history; where nothing is, it is the all-camera
+    reserve.
+    """
+    care, everything, history = (
+        care_sim.make_policy(n, environment) for n in ("care", "all-camera", "history")
+    )
     no_tracks = np.zeros_like(encounter[0]["tracks"])
     no_tracks[:, 0] = -1
     for observation in encounter:
@@ -86,15 +95,21 @@ def test_full_asks_for_everything_and_refuses_another_budget(environment):
 
 
 def test_history_demands_the_hulls_nearest_first(environment, belief_of, car):
-    history, rig = care_sim.make_policy("history", environment), environment.unwrapped.rig
+    history = care_sim.make_policy("history", environment)
+    rig = environment.unwrapped.rig
     belief = belief_of([car(0, 10), car(1, 20, 5), car(2, 40, -5)])
     hulls = rig.grid.hulls(belief.tracks.boxes)
-    assert [s.tolist() for s in history.demand(belief).exploitation] == [hull.tolist() for hull in hulls]
+    assert [s.tolist() for s in history.demand(belief).exploitation] == [
+        hull.tolist() for hull in hulls
+    ]
     assert not any(len(layer) for layer in history.demand(belief).layers)
 
 
-def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation_pad(environment, belief_of, car):
-    sbf, rig = care_sim.make_policy("care-sbf", environment), environment.unwrapped.rig
+def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation_pad(
+    environment, belief_of, car
+):
+    sbf = care_sim.make_policy("care-sbf", environment)
+    rig = environment.unwrapped.rig
     belief = belief_of([car(0, 10), car(1, 20, 5, vy=3.0), car(2, 30, -5)])
     sbf.reset()
     for _ in range(5):
@@ -117,7 +132,9 @@ def test_the_parameters_of_forgetting_are_its_rules_with_their_defaults():
 
 def test_parameters_of_forgetting_reach_the_rules(environment, belief_of, car):
     belief = belief_of([car(0, 10)], Ego(8.0))
-    guarded, unguarded = (care_sim.make_policy("care-sbf", environment, **p) for p in ({}, {"k_safe": 0.0}))
+    guarded, unguarded = (
+        care_sim.make_policy("care-sbf", environment, **p) for p in ({}, {"k_safe": 0.0})
+    )
     for _ in range(5):
         kept, dropped = guarded.demand(belief), unguarded.demand(belief)
     assert len(kept.exploitation[0]) > len(dropped.exploitation[0])
@@ -126,7 +143,11 @@ def test_parameters_of_forgetting_reach_the_rules(environment, belief_of, car):
 @pytest.mark.parametrize(
     ("name", "parameters", "named"),
     [
-        ("clairvoyant", {}, r"policy 'clairvoyant'; known: all-camera, beam-reduce, care, care-priority"),
+        (
+            "clairvoyant",
+            {},
+            r"policy 'clairvoyant'; known: all-camera, beam-reduce, care, care-priority",
+        ),
         ("care", {"boldness": 2}, "boldness"),
         ("care-sbf", {"k_save": 2}, r"'k_save'.*k_safe"),
     ],

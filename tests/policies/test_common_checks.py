@@ -1,4 +1,4 @@
-"""What every policy keeps to in every environment, over keyframes in which the hidden one appears."""
+"""What every policy keeps to in every environment, until after the hidden actor appears."""
 
 from itertools import product
 
@@ -12,13 +12,23 @@ from care_sim.core.belief import MAX_DETECTIONS, Belief
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.policies import BUILT_IN
 
-BEFORE = {"CARE-Dartout-v0": 24, "CARE-Dense-v0": 24, "CARE-CutIn-v0": 24, "CARE-Street-v0": 2, "CARE-Replay-v0": 2}
-"""Keyframes until the hidden one is about to come into view; on the street many are, on the log one is."""
+BEFORE = {
+    "CARE-Dartout-v0": 24,
+    "CARE-Dense-v0": 24,
+    "CARE-CutIn-v0": 24,
+    "CARE-Street-v0": 2,
+    "CARE-Replay-v0": 2,
+}
+"""Keyframes until the hidden one is about to come into view; on the street many are, on the log one
+is.
+"""
 KEYFRAMES = 6
 
 
 def driven_to_the_encounter(env):
-    """The observation there, the floor having fired until then; with a full scan, which is slow, an earlier one."""
+    """The observation there, the floor having fired until then; with a full scan, which is slow, an
+    earlier one.
+    """
     observation, _ = env.reset(seed=0)
     for _ in range(BEFORE[env.spec.id] if observation["budget"] < 1 else 2):
         observation, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
@@ -48,7 +58,11 @@ def case(request):
     environment, name = request.param
     if name == "farthest-points":
         request.getfixturevalue("open3d")
-    place = {"source": f"argoverse2:{request.getfixturevalue('drive')}"} if environment == "CARE-Replay-v0" else {}
+    place = (
+        {"source": f"argoverse2:{request.getfixturevalue('drive')}"}
+        if environment == "CARE-Replay-v0"
+        else {}
+    )
     env = gymnasium.make(environment, budget=1.0 if name == "full" else 0.05, **place)
     yield env, name
     env.close()
@@ -61,7 +75,8 @@ def test_within_the_budget_without_a_duplicate_finite_and_the_same_after_reset(c
     for (_, action, info), (_, same, _) in zip(first, again, strict=True):
         assert env.action_space.contains(action)
         assert np.isfinite(action).all()
-        asked, fired = np.flatnonzero(action).tolist(), info["fired"].tolist()
+        asked = np.flatnonzero(action).tolist()
+        fired = info["fired"].tolist()
         assert len(asked) <= env.unwrapped.rig.budget
         assert len(fired) == len(set(fired)) == env.unwrapped.rig.budget
         assert set(asked) <= set(fired)
@@ -82,7 +97,9 @@ def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
 
 
 @pytest.mark.parametrize("name", ["care", "care-priority", "all-camera"])
-def test_with_a_black_camera_camera_policies_allocate_as_history_cell_for_cell(name, encounter, environment):
+def test_with_a_black_camera_camera_policies_allocate_as_history_cell_for_cell(
+    name, encounter, environment
+):
     padding = np.zeros((MAX_DETECTIONS, len(ImageDetections.COLUMNS)), np.float32)
     padding[:, 0] = -1
     chooses, history = (care_sim.make_policy(policy, environment) for policy in (name, "history"))
@@ -98,7 +115,9 @@ def haunted(observation):
     rows = observation["detections"].copy()
     free = np.flatnonzero(rows[:, 0] < 0)[:3]
     rows[free] = 0
-    rows[free, 0], rows[free, 1], rows[free, 2:6] = CLASSES.index("pedestrian"), 0.9, ghosts
+    rows[free, 0] = CLASSES.index("pedestrian")
+    rows[free, 1] = 0.9
+    rows[free, 2:6] = ghosts
     return {**observation, "detections": rows}
 
 
@@ -111,7 +130,11 @@ def test_false_positives_leave_the_exploitation_cells_as_they_are(case, encounte
         policy = care_sim.make_policy(name, env)
         for observation in encounter[::4]:
             demand = policy.demand(Belief.from_observation(change(observation)))
-            cells.append(allocate(care_sim.Demand(demand.exploitation), rig.budget, rig.reserve_fraction).tolist())
+            cells.append(
+                allocate(
+                    care_sim.Demand(demand.exploitation), rig.budget, rig.reserve_fraction
+                ).tolist()
+            )
     assert chosen[0] == chosen[1]
 
 

@@ -67,4 +67,7 @@ def test_a_hidden_policy_is_said_to_be(install):
 
 def test_a_broken_policy_is_listed_with_the_reason(install):
     install("broken", "raise RuntimeError('no\\nweights')", torn="Torn")
-    assert list(listing())[-1].splitlines() == ["torn (broken)", "    RuntimeError: no weights [broken 1.5]"]
+    assert list(listing())[-1].splitlines() == [
+        "torn (broken)",
+        "    RuntimeError: no weights [broken 1.5]",
+    ]

@@ -1,4 +1,6 @@
-"""Truth has a door of its own: who is handed it, what its holders do with it, and that nobody else reaches it."""
+"""Truth has a door of its own: who is handed it, what its holders do with it, and that nobody else
+reaches it.
+"""
 
 import itertools
 import sys
@@ -70,7 +72,10 @@ def test_a_privileged_policy_is_handed_truth(privileged, environment, encounter)
 
 
 def test_tags():
-    assert [name for name in BUILT_IN if "causal" not in tags_of(name)] == [*PRIVILEGED, "seed-finder"]
+    assert [name for name in BUILT_IN if "causal" not in tags_of(name)] == [
+        *PRIVILEGED,
+        "seed-finder",
+    ]
     assert tags_of("history-oracle") == ("privileged",)
     assert tags_of("random-points") == tags_of("farthest-points") == ("non-causal",)
 
@@ -98,18 +103,23 @@ def test_mixed_with_an_ordinary_policy_it_stays_privileged():
 
 
 def test_truth_is_no_parameter(environment):
-    with pytest.raises(InvalidInput, match="truth of policy history-oracle comes from the environment"):
+    with pytest.raises(
+        InvalidInput, match="truth of policy history-oracle comes from the environment"
+    ):
         care_sim.make_policy("history-oracle", environment, truth=None)
     with pytest.raises(InvalidInput, match="truth"):
         care_sim.make_policy("history", environment, truth=None)
 
 
 def test_the_oracle_covers_where_the_tracked_objects_will_be():
-    """True boxes read off the world; each track's hull is that of the actor nearest to its forecast."""
+    """True boxes read off the world; each track's hull is that of the actor nearest to its
+    forecast.
+    """
     env = gymnasium.make("CARE-CutIn-v0", budget=0.1)
     oracle, history = (care_sim.make_policy(name, env) for name in ("history-oracle", "history"))
     observation, _ = env.reset(seed=0)
-    loop, differs = env.unwrapped.loop, 0
+    loop = env.unwrapped.loop
+    differs = 0
     reported = [actor for actor in loop.world.actors if actor.label is not None]
     for _ in range(45):
         belief = Belief.from_observation(observation)
@@ -118,7 +128,9 @@ def test_the_oracle_covers_where_the_tracked_objects_will_be():
         true = boxes[distance.argmin(axis=1)] if len(belief.tracks) else boxes[:0]
         expected = oracle.rig.hulls(true[np.argsort(np.hypot(*true[:, :2].T), kind="stable")])
         demand = oracle.demand(belief)
-        assert [cells.tolist() for cells in demand.exploitation] == [hull.tolist() for hull in expected]
+        assert [cells.tolist() for cells in demand.exploitation] == [
+            hull.tolist() for hull in expected
+        ]
         assert not any(len(layer) for layer in demand.layers)
         differs += not np.array_equal(oracle(observation), history(observation))
         observation, *_ = env.step(history(observation))
@@ -129,14 +141,17 @@ def test_the_oracle_covers_where_the_tracked_objects_will_be():
 @pytest.mark.parametrize("privileged", PRIVILEGED[1:], indirect=True)
 @pytest.mark.parametrize("budget", [0.03, 0.35])
 def test_references_keep_exactly_the_matched_fraction_of_the_points(privileged, budget):
-    """P is counted in the picture of a full scan of the same moment, the kept points in the next observation."""
+    """P is counted in the picture of a full scan of the same moment, the kept points in the next
+    observation.
+    """
     sampled, whole = (gymnasium.make("CARE-Dense-v0", budget=b) for b in (budget, 1.0))
     policy = care_sim.make_policy(privileged, sampled)
     observation, _ = sampled.reset(seed=0)
     whole.reset(seed=0)
     full, *_ = whole.step(np.ones(whole.action_space.shape, np.float32))
     observation, *_ = sampled.step(policy(observation))
-    cells, reach = sampled.unwrapped.rig.budget, sampled.unwrapped.rig.grid.range_m
+    cells = sampled.unwrapped.rig.budget
+    reach = sampled.unwrapped.rig.grid.range_m
     points = np.count_nonzero(full["ranges"] < reach)
     returned = (observation["ranges"] > 0) & (observation["ranges"] < reach)
     assert np.count_nonzero(returned) == round(cells * points / full["ranges"].size)
@@ -147,7 +162,9 @@ def test_references_keep_exactly_the_matched_fraction_of_the_points(privileged, 
 
 def test_random_points_are_drawn_anew_for_every_cloud_and_seed(environment):
     """Two independent draws of a share b of the points have the share b of each in common."""
-    policy, other = (care_sim.make_policy("random-points", environment, seed=seed) for seed in (0, 1))
+    policy, other = (
+        care_sim.make_policy("random-points", environment, seed=seed) for seed in (0, 1)
+    )
     share = environment.unwrapped.rig.budget / environment.unwrapped.rig.grid.size
 
     def common(ours, theirs):
@@ -159,7 +176,9 @@ def test_random_points_are_drawn_anew_for_every_cloud_and_seed(environment):
 
     draws = [draw(policy, seed) for seed in range(4)]
     assert np.array_equal(draw(policy, 0), draws[0])
-    pairs = [common(ours, theirs) for ours, theirs in itertools.combinations([*draws, draw(other, 0)], 2)]
+    pairs = [
+        common(ours, theirs) for ours, theirs in itertools.combinations([*draws, draw(other, 0)], 2)
+    ]
     assert max(pairs) < share + 0.05
 
 
@@ -167,7 +186,9 @@ def test_random_points_do_not_hang_on_the_last_bits_of_the_cloud(environment):
     policy = care_sim.make_policy("random-points", environment)
     cells = np.arange(0, 900, 3)
     points = np.random.default_rng(0).uniform(1, 50, (300, 3))
-    assert (policy.kept(cells, points, 20) == policy.kept(cells, np.nextafter(points, 99), 20)).all()
+    assert (
+        policy.kept(cells, points, 20) == policy.kept(cells, np.nextafter(points, 99), 20)
+    ).all()
     assert (policy.kept(cells, points, 20) != policy.kept(cells, points + 0.001, 20)).any()
 
 
@@ -183,7 +204,8 @@ def test_farthest_points_are_those_of_the_plain_algorithm(environment):
     cells = np.sort(rng.choice(grid.size, 300, replace=False))
     points = grid.directions[cells] * rng.uniform(2, 50, (300, 1))
     policy = FarthestPoints(environment.unwrapped.rig, truth=None)
-    chosen, distance = [0], np.linalg.norm(points - points[0], axis=1)
+    chosen = [0]
+    distance = np.linalg.norm(points - points[0], axis=1)
     for _ in range(39):
         chosen.append(int(distance.argmax()))
         distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
@@ -204,5 +226,7 @@ def test_an_environment_without_truth_is_refused(environment):
                 raise AttributeError(name)
             return super().get_wrapper_attr(name)
 
-    with pytest.raises(InvalidInput, match="history-oracle needs an environment of CARE-Sim with a truth"):
+    with pytest.raises(
+        InvalidInput, match="history-oracle needs an environment of CARE-Sim with a truth"
+    ):
         care_sim.make_policy("history-oracle", Blindfold(environment))

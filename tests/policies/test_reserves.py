@@ -41,14 +41,18 @@ def test_every_block_of_the_grid_gets_its_part_of_the_uniform_pattern():
     assert counts.max() <= 10
 
 
-def test_history_uniform_spends_exactly_the_reserve_the_same_at_every_keyframe(environment, encounter):
+def test_history_uniform_spends_exactly_the_reserve_the_same_at_every_keyframe(
+    environment, encounter
+):
     policy = care_sim.make_policy("history-uniform", environment)
     beliefs = [Belief.from_observation(observation) for observation in encounter]
     patterns = [layers_of(policy.demand(belief)) for belief in beliefs]
     assert len(patterns[0][0][0]) == 819 - round(0.7 * 819)
     assert all(pattern == patterns[0] for pattern in patterns)
     hulls = policy.rig.hulls(beliefs[0].tracks.boxes)
-    assert [s.tolist() for s in policy.demand(beliefs[0]).exploitation] == [hull.tolist() for hull in hulls]
+    assert [s.tolist() for s in policy.demand(beliefs[0]).exploitation] == [
+        hull.tolist() for hull in hulls
+    ]
 
 
 def test_beam_reduction_keeps_the_rows_nearest_the_horizon():
@@ -67,7 +71,9 @@ def test_beam_reduction_asks_for_exactly_the_budget(count):
 
 
 def test_beam_reduction_exploits_nothing(environment, encounter):
-    demand = care_sim.make_policy("beam-reduce", environment).demand(Belief.from_observation(encounter[0]))
+    demand = care_sim.make_policy("beam-reduce", environment).demand(
+        Belief.from_observation(encounter[0])
+    )
     assert list(demand.exploitation) == []
     assert sum(len(cells) for (cells,) in demand.layers) == 819
 
@@ -83,7 +89,9 @@ def test_care_priority_adds_the_explained_wedges_as_a_second_layer(environment, 
 
 
 def scan_of(*points):
-    """A last scan with returns (x, y, z) in the sensor frame, moved to the middle of their cells; and the cells."""
+    """A last scan with returns (x, y, z) in the sensor frame, moved to the middle of their cells;
+    and the cells.
+    """
     picture = np.zeros(GRID.size, np.float32)
     cells = GRID.cells_of(points)
     picture[cells] = np.linalg.norm(points, axis=1)
@@ -97,7 +105,10 @@ def uncertainty(environment):
 
 def test_unexplained_returns_are_served_in_shells_the_nearest_first(uncertainty, belief_of):
     ranges, (far, near, beside) = scan_of((20.5, 3, 0), (7.5, -2, 0), (7.4, 2.1, 0))
-    assert layers_of(uncertainty.demand(belief_of(ranges=ranges))) == [[sorted([near, beside])], [[far]]]
+    assert layers_of(uncertainty.demand(belief_of(ranges=ranges))) == [
+        [sorted([near, beside])],
+        [[far]],
+    ]
 
 
 def test_cells_that_did_not_fire_or_return_are_no_uncertainty(uncertainty, belief_of):
@@ -107,12 +118,16 @@ def test_cells_that_did_not_fire_or_return_are_no_uncertainty(uncertainty, belie
 
 
 def test_ground_is_no_uncertainty(uncertainty, belief_of):
-    """The sensor stands 1.84 m above the road; a return 0.2 m above it is ground, one at 0.5 m is not."""
+    """The sensor stands 1.84 m above the road; a return 0.2 m above it is ground, one at 0.5 m is
+    not.
+    """
     ranges, (_, kerb) = scan_of((4, 0, -1.64), (4, 2, -1.34))
     assert layers_of(uncertainty.demand(belief_of(ranges=ranges))) == [[[kerb]]]
 
 
-def test_returns_of_a_detected_car_are_explained_and_those_beside_it_are_not(uncertainty, belief_of, car):
+def test_returns_of_a_detected_car_are_explained_and_those_beside_it_are_not(
+    uncertainty, belief_of, car
+):
     """Its near side stands at 17.7 m, its flank at 0.975 m."""
     ranges, (_, beside) = scan_of((17.7, 0, -1), (17.7, 1.6, -1))
     belief = belief_of([car(0, 20)], ranges=ranges)
@@ -121,11 +136,13 @@ def test_returns_of_a_detected_car_are_explained_and_those_beside_it_are_not(unc
 
 def test_a_track_that_was_not_detected_explains_nothing(uncertainty, belief_of, car):
     ranges, (missed,) = scan_of((17.7, 0, -1))
-    assert layers_of(uncertainty.demand(belief_of([car(0, 20, misses=1)], ranges=ranges))) == [[[missed]]]
+    assert layers_of(uncertainty.demand(belief_of([car(0, 20, misses=1)], ranges=ranges))) == [
+        [[missed]]
+    ]
 
 
 def test_boxes_are_moved_back_to_the_last_scan(uncertainty, belief_of, car):
-    """A car crosses at 20 m/s and the ego has come 1.1 m nearer: its far side stood at (23.4, -2)."""
+    """A car crosses at 20 m/s, the ego came 1.1 m nearer: its far side stood at (23.4, -2)."""
     ranges, _ = scan_of((23.3, -2, -1))
     crossing = car(0, 20, vy=20.0)
     assert layers_of(uncertainty.demand(belief_of([crossing], Ego(10.5, 0, -10), ranges))) == []
@@ -146,9 +163,11 @@ def test_in_a_drive_no_unexplained_return_lies_on_a_detected_vehicle(scenario):
     env = gymnasium.make(scenario, budget=0.1)
     policy = care_sim.make_policy("uncertainty", env)
     observation, _ = env.reset(seed=0)
-    loop, rig = env.unwrapped.loop, env.unwrapped.rig
+    loop = env.unwrapped.loop
+    rig = env.unwrapped.rig
     reported = [actor for actor in loop.world.actors if actor.label is not None]
-    found, accelerations = 0, set()
+    found = 0
+    accelerations = set()
     for _ in range(50):
         boxes = loop.sensor.boxes_to_local(loop.world.boxes(reported))
         detections = [box for box in boxes if np.hypot(*box[:2]) < 20]
@@ -169,5 +188,7 @@ def test_in_a_drive_no_unexplained_return_lies_on_a_detected_vehicle(scenario):
 
 
 def on_box(points, box):
-    local = Frame(*box[:3], box[6]).boxes_to_local(np.column_stack([points, np.zeros((len(points), 4))]))[:, :3]
+    local = Frame(*box[:3], box[6]).boxes_to_local(
+        np.column_stack([points, np.zeros((len(points), 4))])
+    )[:, :3]
     return (np.abs(local) <= box[3:6] / 2 + 0.01).all(axis=1)

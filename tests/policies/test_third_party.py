@@ -147,7 +147,10 @@ def honest(rig, bins=3):
 
 REASONS = {
     "abstract": r"broken:Abstract is abstract: it lacks demand",
-    "mistagged": r"broken:Mistagged has tags \('wise',\); allowed is a tuple of causal, privileged, .*",
+    "mistagged": (
+        r"broken:Mistagged has tags \('wise',\); allowed is a tuple of causal, privileged, "
+        r".*"
+    ),
     "nested": r"broken:Nested has tags \(\['causal'\],\); allowed is a tuple of causal",
     "other": r"broken:Other is no Policy",
     "silent": r"broken:silent tells no parameters",
@@ -207,7 +210,11 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
         lambda name: grid(["dartout", "dense"], [name], [0.1], [0]),
     )
     assert sound == ["care", "horizon"]
-    assert reasons["torn"] == "policy torn cannot be loaded: AttributeError: module 'broken' has no attribute 'Nowhere'"
+    assert (
+        reasons["torn"]
+        == "policy torn cannot be loaded: "
+        "AttributeError: module 'broken' has no attribute 'Nowhere'"
+    )
     assert reasons["leaving"] == "policy leaving cannot be loaded: SystemExit: 3"
     assert reasons["exploding"] == "policy exploding refuses to start: KeyError: 'weights'"
     assert list(reasons) == ["torn", "exploding", "leaving", "deaf"]

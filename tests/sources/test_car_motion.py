@@ -37,7 +37,9 @@ def test_nothing_of_the_future_is_in_it():
 
 def test_one_pose_has_no_motion_and_two_have_a_speed():
     assert motions(TIMES[:1], on_a_line([3.0])) == [Ego()]
-    assert [ego.speed for ego in motions(TIMES[:2], on_a_line([0.0, 2.0]))] == pytest.approx([4.0, 4.0])
+    assert [ego.speed for ego in motions(TIMES[:2], on_a_line([0.0, 2.0]))] == pytest.approx(
+        [4.0, 4.0]
+    )
 
 
 def test_after_a_keyframe_of_braking_all_of_it_is_told():

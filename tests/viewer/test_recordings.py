@@ -41,7 +41,11 @@ def test_recording_changes_nothing(episode):
 
 def test_every_entity_is_documented_and_every_documented_one_is_there(episode):
     found = episode[3]
-    names = {name.removeprefix("care/") for name in {*found.rows, *found.fixed} if name.startswith("care/")}
+    names = {
+        name.removeprefix("care/")
+        for name in {*found.rows, *found.fixed}
+        if name.startswith("care/")
+    }
     assert names == set(entities.ENTITIES)
     (about,) = found.fixed["about"]["TextDocument:text"]
     assert all(f"`{name}` | {content}" in about for name, content in entities.ENTITIES.items())
@@ -51,14 +55,27 @@ def test_the_timelines_are_those_of_the_keyframes(episode):
     _, keyframes, _, found, _ = episode
     assert found.seconds == pytest.approx({frame.index: frame.time_s for frame in keyframes})
     assert len(keyframes) == 60
-    always = ("world/bodies", "world/ego", "world/lidar/returns", "world/lidar/camera", "grid/cells", "grid/hulls")
+    always = (
+        "world/bodies",
+        "world/ego",
+        "world/lidar/returns",
+        "world/lidar/camera",
+        "grid/cells",
+        "grid/hulls",
+    )
     assert all(set(found.rows[f"care/{name}"]) == set(range(60)) for name in always)
 
 
 def test_measures_are_those_of_the_keyframes(episode):
     row, keyframes, _, found, _ = episode
-    for name, field in (("speed", "speed_mps"), ("distance", "distance_m"), ("clearance", "clearance_m")):
-        assert found.numbers(f"care/measures/{name}") == [getattr(frame, field) for frame in keyframes]
+    for name, field in (
+        ("speed", "speed_mps"),
+        ("distance", "distance_m"),
+        ("clearance", "clearance_m"),
+    ):
+        assert found.numbers(f"care/measures/{name}") == [
+            getattr(frame, field) for frame in keyframes
+        ]
     assert found.numbers("care/measures/braking") == [float(frame.braking) for frame in keyframes]
     detected = first(found, "actor", "detected")
     assert found.numbers("care/measures/distance")[detected] == row["detection_distance_m"]
@@ -69,13 +86,20 @@ def test_measures_are_those_of_the_keyframes(episode):
 
 def first(found, name, state):
     """The keyframe at which a state begins."""
-    return min(n for n, row in found.rows[f"care/states/{name}"].items() if row["StateChange:state"] == [state])
+    return min(
+        n
+        for n, row in found.rows[f"care/states/{name}"].items()
+        if row["StateChange:state"] == [state]
+    )
 
 
 def test_cells_and_budget_are_those_that_fired(episode):
     row, keyframes, _, found, _ = episode
     pictures = found.column("care/grid/cells", "SegmentationImage:buffer")
-    fired = {share: found.numbers(f"care/budget/{SHARES[share]}") for share in (EXPLOITATION, RESERVE, FLOOR)}
+    fired = {
+        share: found.numbers(f"care/budget/{SHARES[share]}")
+        for share in (EXPLOITATION, RESERVE, FLOOR)
+    }
     total = 0
     for number, (picture, frame) in enumerate(zip(pictures, keyframes, strict=True)):
         cells = np.array(picture, np.uint8).reshape(-1, entities.ROW_PIXELS, 512)
@@ -84,7 +108,9 @@ def test_cells_and_budget_are_those_that_fired(episode):
         np.testing.assert_array_equal(np.flatnonzero(shares), frame.fired)
         total += len(frame.fired)
         for share, percents in fired.items():
-            assert percents[number] == pytest.approx(100 * np.count_nonzero(shares == share) / round(0.05 * 16384))
+            assert percents[number] == pytest.approx(
+                100 * np.count_nonzero(shares == share) / round(0.05 * 16384)
+            )
     assert total == row["rays_fired"]
     assert max(fired[RESERVE]) > 0
     assert max(fired[EXPLOITATION]) == pytest.approx(70, abs=0.1)
@@ -97,11 +123,16 @@ def test_returns_lie_where_the_scan_says_and_on_the_bodies_that_are_drawn(episod
     for cloud, (_, belief) in zip(points, after, strict=True):
         ranges = belief.ranges.ravel()
         cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
-        np.testing.assert_allclose(cloud, grid.directions[cells] * ranges[cells, None], rtol=1e-5, atol=1e-4)
+        np.testing.assert_allclose(
+            cloud, grid.directions[cells] * ranges[cells, None], rtol=1e-5, atol=1e-4
+        )
     number = next(frame.index for frame in keyframes if frame.detected)
     origin = found.column("care/world/lidar", "Transform3D:translation")[number][0]
     sensor = Frame(*origin, 0.0)
-    bodies = {name: found.column("care/world/bodies", f"Boxes3D:{name}")[number] for name in ("centers", "half_sizes")}
+    bodies = {
+        name: found.column("care/world/bodies", f"Boxes3D:{name}")[number]
+        for name in ("centers", "half_sizes")
+    }
     person = found.column("care/world/bodies", "Boxes3D:labels")[number].index("person")
     world = sensor.origin + sensor.vectors_to_world(np.array(points[number]))
     away = np.abs(world[:, :2] - bodies["centers"][person][:2]).max(axis=1)
@@ -115,7 +146,9 @@ def test_camera_boxes_are_those_of_the_belief(episode):
     labels = found.column("care/world/lidar/camera/residual", "Points2D:labels")
     for number, (_, belief) in enumerate(after[:-1], 1):
         boxes = belief.detections.boxes
-        drawn = np.array([centre for column in columns for centre in column[number] or []]).reshape(-1, 2)
+        drawn = np.array([centre for column in columns for centre in column[number] or []]).reshape(
+            -1, 2
+        )
         expected = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, [1, 3]].mean(axis=1)])
         np.testing.assert_allclose(sorted(drawn.tolist()), sorted(expected.tolist()), atol=1e-3)
     assert any("false" in label for names in labels for label in names or [])
@@ -129,21 +162,31 @@ def test_a_six_second_recording_is_small_and_quickly_written(episode, tmp_path):
     assert path.stat().st_size < 5e6
     plain, recorded = (
         min(spent(wrap) for _ in range(2))
-        for wrap in (lambda env, _policy: env, lambda env, policy: RecordRerun(env, tmp_path / "again.rrd", policy))
+        for wrap in (
+            lambda env, _policy: env,
+            lambda env, policy: RecordRerun(env, tmp_path / "again.rrd", policy),
+        )
     )
     assert recorded - plain < 2.0
 
 
 def test_a_recorded_full_scan_is_small_too(tmp_path, read):
-    """More returns than are drawn: what is drawn lies among them, and the picture of the cells is whole."""
-    path, after = tmp_path / "full.rrd", []
+    """More returns than are drawn: what is drawn lies among them, and the picture of the cells is
+    whole.
+    """
+    path = tmp_path / "full.rrd"
+    after = []
     config = EpisodeConfig("dartout", "full", 1.0)
     trace(
-        config, lambda loop, _frame: after.append(loop.belief), wrap=lambda env, policy: RecordRerun(env, path, policy)
+        config,
+        lambda loop, _frame: after.append(loop.belief),
+        wrap=lambda env, policy: RecordRerun(env, path, policy),
     )
     assert path.stat().st_size < 5e6
-    found, grid = read(path), AngularGrid()
-    drawn, ranges = np.array(found.column("full/world/lidar/returns", "Points3D:positions")[7]), after[7].ranges.ravel()
+    found = read(path)
+    grid = AngularGrid()
+    drawn = np.array(found.column("full/world/lidar/returns", "Points3D:positions")[7])
+    ranges = after[7].ranges.ravel()
     returned = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
     assert len(returned) > entities.MOST_POINTS >= len(drawn) > entities.MOST_POINTS / 2
     cells = grid.cells_of(drawn)
@@ -231,6 +274,8 @@ def test_raw_actions_are_chosen_or_floor(tmp_path, read):
     assert found.numbers("agent/budget/chosen") == pytest.approx([100 * 100 / 1638] * 3)
     assert found.numbers("agent/budget/floor") == pytest.approx([100 * 1538 / 1638] * 3)
     assert not found.rows["agent/budget/exploitation"]
-    cells = np.array(found.column("agent/grid/cells", "SegmentationImage:buffer")[0]).reshape(-1, 512)
+    cells = np.array(found.column("agent/grid/cells", "SegmentationImage:buffer")[0]).reshape(
+        -1, 512
+    )
     assert set(cells[10 * entities.ROW_PIXELS, 512 - 100 :]) == {CHOSEN}
     assert found.fixed["agent/outcome"]["TextDocument:text"] == ["The episode was not finished."]

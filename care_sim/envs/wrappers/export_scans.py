@@ -25,10 +25,14 @@ from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
 UNITS = (
-    "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x along the road, y "
-    "left, z up. Sensor frame, that of points and tracks: x forward, y left, z up; sensor_in_world is its origin, "
-    "then yaw, pitch and roll, turned about z, then y, then x. Cells: row * columns + column; row 0 is the highest, "
-    "column 0 straight behind, then to the right, ahead, left. Ego and bodies are truth, in the world frame."
+    "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x "
+    "along the road, y "
+    "left, z up. Sensor frame, that of points and tracks: x forward, y left, z up; "
+    "sensor_in_world is its origin, "
+    "then yaw, pitch and roll, turned about z, then y, then x. Cells: row * columns + column; "
+    "row 0 is the highest, "
+    "column 0 straight behind, then to the right, ahead, left. Ego and bodies are truth, in the "
+    "world frame."
 )
 POINT_BYTES = 4 * 3 + 4 + 1
 """Of a point in a cloud: three coordinates, cell and share."""
@@ -38,24 +42,32 @@ class ExportScans(Watching):
     """Writes every scan of an episode as a point cloud, with what stood around it.
 
     ### Files
-    The first episode goes to the folder `path`, later ones to `NAME-1`, `NAME-2` beside it. Metres, seconds, radians;
-    boxes are centre x, y, z, length, width, height, yaw.
+    The first episode goes to the folder `path`, later ones to `NAME-1`, `NAME-2` beside it. Metres,
+    seconds, radians; boxes are centre x, y, z, length, width, height, yaw.
 
-    - `000.pcd`, binary: the returns of keyframe 0 as `x y z` (float32, sensor frame: x forward, y left, z up), `cell`
-      (int32, row * columns + column) and `share` (uint8, an index into the `shares` of `episode.json`).
-    - `000.json`: `keyframe`, `time_s`, `sensor_in_world` (x, y, z, yaw, pitch, roll), `ego` (box), `bodies` (`name`,
-      `class` or null, `box`), all in the world frame (x along the road, y left, z up) and truth; `tracks` (`id`,
-      `class`, `box` of the forecast, `velocity` over ground) in the sensor frame; `fired` cells; `detected` (the
-      first-sighting actor), `braking`, `speed_mps`.
-    - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the episode is over.
+    - `000.pcd`, binary: the returns of keyframe 0 as `x y z` (float32, sensor frame: x forward,
+      y left, z up), `cell` (int32, row * columns + column) and `share` (uint8, an index into the
+      `shares` of `episode.json`).
+    - `000.json`: `keyframe`, `time_s`, `sensor_in_world` (x, y, z, yaw, pitch, roll), `ego` (box),
+      `bodies` (`name`, `class` or null, `box`), all in the world frame (x along the road, y left,
+      z up) and truth;
+      `tracks` (`id`, `class`, `box` of the forecast, `velocity` over ground) in the sensor frame;
+      `fired` cells; `detected` (the first-sighting actor), `braking`, `speed_mps`.
+    - `episode.json`: `units`, `grid`, `classes`, `shares`, and `outcome`, null until the end.
 
     ### Arguments
-    `path` of the folder, one for every environment of a vector; `policy`, the `care_sim.Policy` that acts, as for
-    `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`, `care_sim.InvalidInput` for an environment
-    that is no closed loop of CARE-Sim and for a folder that holds scans already, OSError where nothing can be written.
+    `path` of the folder, one for every environment of a vector; `policy`, the `care_sim.Policy`
+    that acts, as for `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`,
+    `care_sim.InvalidInput` for an environment that is no closed loop of CARE-Sim and for a folder
+    that holds scans already, OSError where nothing can be written.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Action], path: "str | PathLike[str]", policy: Policy | None = None):
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Action],
+        path: "str | PathLike[str]",
+        policy: Policy | None = None,
+    ):
         super().__init__(env, policy)
         check_path("path", path)
         self._open3d: ModuleType = import_open3d()
@@ -73,7 +85,9 @@ class ExportScans(Watching):
         """Write the two files of a keyframe."""
         stem = f"{watched.frame.index:03d}"
         cells, points = watched.returned(self._closed_loop.rig.grid)
-        self._write_cloud(self._folder / f"{stem}.pcd", points, cells, watched.shares.ravel()[cells])
+        self._write_cloud(
+            self._folder / f"{stem}.pcd", points, cells, watched.shares.ravel()[cells]
+        )
         write_text(self._folder / f"{stem}.json", json.dumps(described(watched)) + "\n")
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
@@ -105,8 +119,10 @@ class ExportScans(Watching):
 
 def described(watched: WatchedKeyframe) -> dict[str, Any]:
     """What stood around a scan, as plain data; see `ExportScans`."""
-    situation, frame = watched.situation, watched.frame
-    sensor, tracks = situation.sensor, situation.belief.tracks
+    situation = watched.situation
+    frame = watched.frame
+    sensor = situation.sensor
+    tracks = situation.belief.tracks
     classes = [None if label is None else CLASSES[label] for label in situation.labels]
     columns = zip(tracks.ids, tracks.classes, tracks.boxes, tracks.velocities, strict=True)
     return {
@@ -119,7 +135,12 @@ def described(watched: WatchedKeyframe) -> dict[str, Any]:
             for name, label, box in zip(situation.names, classes, situation.bodies, strict=True)
         ],
         "tracks": [
-            {"id": int(number), "class": CLASSES[label], "box": box.tolist(), "velocity": velocity.tolist()}
+            {
+                "id": int(number),
+                "class": CLASSES[label],
+                "box": box.tolist(),
+                "velocity": velocity.tolist(),
+            }
             for number, label, box, velocity in columns
         ],
         "fired": frame.fired.tolist(),

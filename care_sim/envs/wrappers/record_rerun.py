@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 
 def recording(path: Path, lanes: Sequence[str]) -> "Recording":
-    """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed. `lanes` are their
-    names. Raises as `RecordRerun` does.
+    """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed.
+    `lanes` are their names. Raises as `RecordRerun` does.
     """
     import_rerun()
     from care_sim.viewer.recording.recording import Recording
@@ -35,23 +35,25 @@ def recording(path: Path, lanes: Sequence[str]) -> "Recording":
 class RecordRerun(Watching):
     """Records every episode for the Rerun viewer: `care-sim view FILE`.
 
-    The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it; one that is left before its end
-    is kept as far as it was played. A file is there whole or not at all, once its episode is over or the environment
-    is closed. Action, observation, reward and episode stay what they are.
+    The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it; one that is
+    left before its end is kept as far as it was played. A file is there whole or not at all, once
+    its episode is over or the environment is closed. Action, observation, reward and episode stay
+    what they are.
 
     ### Arguments
-    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does: its demands tell which cells were
-    exploitation and which reserve. Without it only "chosen" and "floor" are known. `name` of the episode in the
-    recording, the policy's by default. Environments of a vector need a file each, such as `f"out-{number}.rrd"`.
+    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does: its demands tell
+    which cells were exploitation and which reserve. Without it only "chosen" and "floor" are known.
+    `name` of the episode in the recording, the policy's by default. Environments of a vector need a
+    file each, such as `f"out-{number}.rrd"`.
 
     ### What is recorded
-    At every keyframe the street, the returns, the camera's picture and detections, the cells, the measures:
-    `care_sim.viewer.recording.entities.ENTITIES` has each with unit and frame, as has the page "About" of the recording.
-    Timelines are `keyframe` and `seconds`.
+    At every keyframe the street, the returns, the camera's picture and detections, the cells, the
+    measures: `care_sim.viewer.recording.entities.ENTITIES` has each with unit and frame, as has the
+    page "About" of the recording. Timelines are `keyframe` and `seconds`.
 
-    Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an environment that is no
-    closed loop of CARE-Sim and for a file that is a folder or is being written already, OSError where it cannot be
-    written.
+    Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an
+    environment that is no closed loop of CARE-Sim and for a file that is a folder or is being
+    written already, OSError where it cannot be written.
     """
 
     def __init__(
@@ -93,7 +95,8 @@ class RecordRerun(Watching):
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """Finish the episode, and the file if it is its own."""
-        episode, self._episode = self._episode, None
+        episode = self._episode
+        self._episode = None
         if episode is not None and self._recording is not None:
             with nullcontext() if self._path is None else self._recording:
                 episode.end(outcome)

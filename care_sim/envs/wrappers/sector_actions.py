@@ -34,48 +34,53 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
 
 
 class SectorReserve(_Sectors):
-    """The action ranks sectors for the reserve; exploitation and floor stay those of the shared allocator.
+    """The action ranks sectors for the reserve; exploitation and floor stay those of the shared
+    allocator.
 
     A learner so competes with the rules on the reserve alone.
 
     ### Action
-    `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest, azimuth 0 begins
-    straight behind.
+    `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest,
+    azimuth 0 begins straight behind.
 
     | score | what becomes of the sector |
     |---|---|
-    | above 0 | a layer of the reserve; the sector scored highest comes first, ties by ascending index |
+    | above 0 | a layer of the reserve; highest score first, ties by ascending index |
     | 0 or less | left to the floor |
 
-    The hulls of the forecasts, nearest first, take at most round((1 - rho) B) cells (Algorithm 1), then sector after
-    sector is fired whole, cells ascending, up to B, then the floor. Zeros everywhere are the `history` policy, cell
-    for cell.
+    The hulls of the forecasts, nearest first, take at most round((1 - rho) B) cells (Algorithm 1),
+    then sector after sector is fired whole, cells ascending, up to B, then the floor. Zeros
+    everywhere are the `history` policy, cell for cell.
 
     ### Observation
     That of the wrapped environment.
 
     ### Arguments
-    `azimuths` (32) and `elevations` (4), which must divide the grid, 512 x 32: a sector is 16 x 8 cells, 11.25 by 10.7
-    degrees; of the reserve of 3%, 148 cells, it takes 128. Raises `care_sim.InvalidInput` for other numbers, for an
-    action of another shape or with values that are not finite, or an environment that is none of CARE-Sim.
+    `azimuths` (32) and `elevations` (4), which must divide the grid, 512 x 32: a sector is 16 x 8
+    cells, 11.25 by 10.7 degrees; of the reserve of 3%, 148 cells, it takes 128. Raises
+    `care_sim.InvalidInput` for other numbers, for an action of another shape or with values that
+    are not finite, or an environment that is none of CARE-Sim.
     """
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        return self._cells(reserve_demand(self._sensing.belief, self._sensing.rig, self.sectors, scores))
+        return self._cells(
+            reserve_demand(self._sensing.belief, self._sensing.rig, self.sectors, scores)
+        )
 
 
 class SectorScores(_Sectors):
-    """The action scores everything: sector after sector is fired whole, best first, up to the budget.
+    """The action scores everything: sector after sector is fired whole, best first, up to the
+    budget.
 
     ### Action
-    `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest, azimuth 0 begins
-    straight behind.
+    `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest,
+    azimuth 0 begins straight behind.
 
     | score | what becomes of the sector |
     |---|---|
-    | above 0 | its cells fire, ascending, before those of sectors scored lower; ties by ascending index |
+    | above 0 | its cells fire, ascending; highest score first, ties by ascending index |
     | 0 or less | left to the floor |
 
     ### Observation
@@ -87,4 +92,8 @@ class SectorScores(_Sectors):
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
-        return self._cells(sector_demand(self._sensing.rig, self.sectors, checked_scores(action, self.sectors.shape)))
+        return self._cells(
+            sector_demand(
+                self._sensing.rig, self.sectors, checked_scores(action, self.sectors.shape)
+            )
+        )

@@ -17,28 +17,39 @@ from care_sim.policies.base import Policy
 
 
 class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
-    """Gathers the moments of the closed loop under it, around or inside wrappers that change the action.
+    """Gathers the moments of the closed loop under it, around or inside wrappers that change the
+    action.
 
-    With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions only what was chosen
-    and what the floor filled up. Raises InvalidInput for an environment that is no closed loop of CARE-Sim.
+    With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions
+    only what was chosen and what the floor filled up. Raises InvalidInput for an environment that
+    is no closed loop of CARE-Sim.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
-        inner, name = getattr(env, "unwrapped", None), type(self).__name__
+        inner = getattr(env, "unwrapped", None)
+        name = type(self).__name__
         if not (isinstance(env, gymnasium.Env) and isinstance(inner, ClosedLoopEnv)):
             raise InvalidInput(f"{name} watches the closed loop of CARE-Sim, got {shown(env)}")
         if not isinstance(policy, Policy | None):
-            raise InvalidInput(f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}")
+            raise InvalidInput(
+                f"policy of {name} must be a care_sim.Policy or None, got {shown(policy)}"
+            )
         super().__init__(env)
-        self._closed_loop, self._policy = inner, policy
+        self._closed_loop = inner
+        self._policy = policy
         self._watcher: EpisodeWatcher | None = None
-        self._begun, self._episodes = False, 0
+        self._begun = False
+        self._episodes = 0
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the one before, if it was not played to its end, is closed as it is."""
         self._leave(None)
         answer = super().reset(seed=seed, options=options)
-        self._watcher = EpisodeWatcher(self._closed_loop.loop, self._closed_loop.conditions.camera_confidence)
+        self._watcher = EpisodeWatcher(
+            self._closed_loop.loop, self._closed_loop.conditions.camera_confidence
+        )
         return answer
 
     def step(self, action: Action) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -48,12 +59,17 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         loop = self._closed_loop.loop
         if not self._begun:
             self.begin(loop, self._episodes)
-            self._begun, self._episodes = True, self._episodes + 1
+            self._begun = True
+            self._episodes = self._episodes + 1
         situation = self._watcher.situation()
         self.look(loop)
         answer = super().step(action)
         demand = self._policy.demanded if self._policy is not None else None
-        self.keep(self._watcher.watched(situation, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]))
+        self.keep(
+            self._watcher.watched(
+                situation, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]
+            )
+        )
         if answer[2] or answer[3]:
             self._leave(answer[4].get("outcome"))
         return answer
@@ -66,7 +82,9 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
             super().close()
 
     def _leave(self, outcome: Mapping[str, Any] | None) -> None:
-        begun, self._begun, self._watcher = self._begun, False, None
+        begun = self._begun
+        self._begun = False
+        self._watcher = None
         if begun:
             self.end(outcome)
 
@@ -83,11 +101,15 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
 
     @abstractmethod
     def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """The episode is over; `outcome` has the fields of `care_sim.loops.records.Outcome`, None for one that was left."""
+        """The episode is over; `outcome` has the fields of `care_sim.loops.records.Outcome`, None
+        for one that was left.
+        """
 
 
 def numbered(path: Path, episode: int) -> Path:
-    """Where an episode is kept: the first in `path` itself, later ones beside it, with their number."""
+    """Where an episode is kept: the first in `path` itself, later ones beside it, with their
+    number.
+    """
     if not episode:
         return path
     path = path if path.stem.strip(".") else path.resolve()

@@ -23,14 +23,16 @@ USUAL = "dense"
 
 
 class SeedFinder(Policy):
-    """What an agent can do that holds this package: of the first `seeds` seeds of a public `scenario` it takes the one
-    whose ego begins at the speed that it reads, lets that episode's world go on by itself, and reserves the hull of
-    where the hidden actor is by then. It needs no camera and no return. It plays as history does where no seed that it
-    knows begins at that speed: with a seed beyond `seeds`, a `secret` of the environment, noise of the speed.
+    """What an agent can do that holds this package: of the first `seeds` seeds of a public
+    `scenario` it takes the one whose ego begins at the speed that it reads, lets that episode's
+    world go on by itself, and reserves the hull of where the hidden actor is by then. It needs no
+    camera and no return. It plays as history does where no seed that it knows begins at that speed:
+    with a seed beyond `seeds`, a `secret` of the environment, noise of the speed.
 
-    `make_policy` tells it the `scenario` of the environment; made of a rig alone it takes `dense`. It knows scenarios
-    with their default arguments. With others, or in another scenario, the first speed can be the same: it then finds
-    the seed, and fires where the actor would be in the scenario that it knows.
+    `make_policy` tells it the `scenario` of the environment; made of a rig alone it takes `dense`.
+    It knows scenarios with their default arguments. With others, or in another scenario, the first
+    speed can be the same: it then finds the seed, and fires where the actor would be in the
+    scenario that it knows.
 
     A control, no contender: what it reaches without a camera is what the seeds give away.
     """
@@ -46,7 +48,8 @@ class SeedFinder(Policy):
         check_known("scenario", scenario, SCENARIOS)
         check_whole("seeds", seeds, 1, 10**6)
         super().__init__(rig)
-        self._scenario, self._seeds = scenario, seeds
+        self._scenario = scenario
+        self._seeds = seeds
         self.reset()
 
     def reset(self) -> None:
@@ -55,7 +58,8 @@ class SeedFinder(Policy):
         """The seed that fits the first observation; None if there is none."""
         self._hidden: Floats = np.empty((0, 7))
         self._speed: float | None = None
-        self._keyframe, self._x = 0, 0.0
+        self._keyframe = 0
+        self._x = 0.0
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then that of the actor whom nobody has seen."""
@@ -73,7 +77,9 @@ class SeedFinder(Policy):
         self._speed = speed
 
     def _expected(self) -> Floats:
-        """(n, 7) the box of the hidden actor in the sensor frame, if it is known; the road is straight."""
+        """(n, 7) the box of the hidden actor in the sensor frame, if it is known; the road is
+        straight.
+        """
         from care_sim.sensors.lidar import LIDAR_POSITION
 
         sensor = Frame.mounted((self._x, 0.0, 0.0), LIDAR_POSITION)
@@ -92,7 +98,9 @@ def _first_speeds(scenario: str, seeds: int) -> dict[float, int]:
 
 @lru_cache(maxsize=4)
 def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
-    """(k, 7) where the hidden actor is at every keyframe, in the world frame: what the ego does is nothing to it."""
+    """(k, 7) where the hidden actor is at every keyframe, in the world frame: what the ego does is
+    nothing to it.
+    """
     from care_sim.scenarios import SCENARIOS
 
     boxes: list[Floats] = []

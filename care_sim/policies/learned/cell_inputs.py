@@ -27,10 +27,18 @@ MARKS = (
 )
 """What is true or not of a cell at a keyframe: the bits of its code, the lowest first."""
 CUES = len(MARKS) + 2
-"""The marks; log2 of the cells of the unexplained wedge over 10; nearness of the last return, 1 at the sensor, 0 at the
-range of a ray and without a return."""
-OUTLOOKS = ("elevation over half a radian", "nearness of the road", "cos azimuth", "abs sin azimuth", "in a picture")
-"""What is known of a cell once the rig is. Left and right are alike, so that 20 scenes teach no side."""
+"""The marks; log2 of the cells of the unexplained wedge over 10; nearness of the last return, 1 at
+the sensor, 0 at the range of a ray and without a return."""
+OUTLOOKS = (
+    "elevation over half a radian",
+    "nearness of the road",
+    "cos azimuth",
+    "abs sin azimuth",
+    "in a picture",
+)
+"""What is known of a cell once the rig is. Left and right are alike, so that 20 scenes teach no
+side.
+"""
 
 _SMALL_CLASSES = np.isin(CLASSES, ("pedestrian", "bicycle"))
 
@@ -38,7 +46,9 @@ Table = NDArray[np.float32]
 
 
 class Seen(NamedTuple):
-    """What is seen of all cells: `codes` (N,) of `MARKS`, `sizes` (N,) and `nearnesses` (N,) as in `CUES`."""
+    """What is seen of all cells: `codes` (N,) of `MARKS`, `sizes` (N,) and `nearnesses` (N,) as in
+    `CUES`.
+    """
 
     codes: NDArray[np.uint8]
     sizes: Table
@@ -47,7 +57,9 @@ class Seen(NamedTuple):
     def rows(self, cells: Cells) -> Table:
         """(n, `CUES`) of some cells (n,)."""
         marks = np.unpackbits(self.codes[cells, None], axis=1, bitorder="little")
-        return np.column_stack([marks, self.sizes[cells], self.nearnesses[cells]]).astype(np.float32)
+        return np.column_stack([marks, self.sizes[cells], self.nearnesses[cells]]).astype(
+            np.float32
+        )
 
 
 class Cues:
@@ -62,8 +74,11 @@ class Cues:
         """At a keyframe, given the hulls of its forecasts."""
         from care_sim.policies.learned.cell_scores import mark, mark_scan
 
-        rig, cells = self.rig, self.rig.grid.size
-        seen = Seen(np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32))
+        rig = self.rig
+        cells = self.rig.grid.size
+        seen = Seen(
+            np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32)
+        )
         mark(seen.codes, seen.sizes, *self._sets(belief, hulls))
         limits = np.float32(rig.grid.range_m), np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m)
         margins = rig.azimuth_margin, rig.elevation_margin
@@ -77,9 +92,13 @@ class Cues:
         flat = np.hypot(x, y)
         road = np.divide(self.rig.sensor_height_m, -z, out=np.full(len(z), np.inf), where=z < 0)
         ground = 1 - np.minimum(road / self.rig.grid.range_m, 1)
-        return np.stack([np.arcsin(z) / 0.5, ground, x / flat, np.abs(y) / flat, self._covered()], 1).astype(np.float32)
+        return np.stack(
+            [np.arcsin(z) / 0.5, ground, x / flat, np.abs(y) / flat, self._covered()], 1
+        ).astype(np.float32)
 
-    def _sets(self, belief: Belief, hulls: Sequence[Cells]) -> tuple[Cells, Cells, NDArray[np.uint8]]:
+    def _sets(
+        self, belief: Belief, hulls: Sequence[Cells]
+    ) -> tuple[Cells, Cells, NDArray[np.uint8]]:
         """Cells of hulls, wedges and undilated wedges, where each set ends, and its marks."""
         from care_sim.policies.learned.cell_scores import BOX, EXPLAINED, HULL, SMALL, UNEXPLAINED
 
@@ -87,7 +106,9 @@ class Cues:
         known = explained(detections, belief.tracks, self.rig)
         sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._bare)]
         new = UNEXPLAINED + SMALL * _SMALL_CLASSES[detections.classes]
-        marks = np.concatenate([np.full(len(hulls), HULL), np.where(known, EXPLAINED, new), np.where(known, 0, BOX)])
+        marks = np.concatenate(
+            [np.full(len(hulls), HULL), np.where(known, EXPLAINED, new), np.where(known, 0, BOX)]
+        )
         cells = np.concatenate([np.empty(0, np.int64), *sets])
         return cells, np.cumsum([*map(len, sets)], dtype=np.int64), marks.astype(np.uint8)
 

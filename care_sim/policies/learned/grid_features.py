@@ -1,4 +1,6 @@
-"""What an agent sees: a belief as a few coarse pictures of the angular grid, all values from 0 to 1."""
+"""What an agent sees: a belief as a few coarse pictures of the angular grid, all values from 0 to
+1.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,10 +30,11 @@ crowns of trees. The tallest of the five classes are lower.
 
 @dataclass(frozen=True)
 class GridFeatures:
-    """Beliefs of a rig as `CHANNELS` over `columns` x `rows` blocks of the grid, and the vector `EGO`.
+    """Beliefs of a rig as `CHANNELS` over `columns` x `rows` blocks of the grid, and the vector
+    `EGO`.
 
-    Blocks pool their cells: `nearness` takes the largest, the others the share. Raises InvalidInput unless the blocks
-    divide the grid. Not for several threads at once: it reuses its memory.
+    Blocks pool their cells: `nearness` takes the largest, the others the share. Raises InvalidInput
+    unless the blocks divide the grid. Not for several threads at once: it reuses its memory.
     """
 
     rig: Rig

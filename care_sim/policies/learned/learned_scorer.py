@@ -1,4 +1,4 @@
-"""History with a learned reserve: the cells in which objects without a track are likely to return."""
+"""History with a learned reserve: cells in which objects without a track are likely to return."""
 
 from os import PathLike
 
@@ -15,12 +15,13 @@ from care_sim.policies.learned.weights import Weights, load, shipped
 
 
 class LearnedScorer(Policy):
-    """The learned scorer of the paper (Sec. 5.1): a small network scores every cell by what a policy can see of it
-    (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho B highest; of these, what exploitation has already goes
-    to the floor, as with `history-uniform`.
+    """The learned scorer of the paper (Sec. 5.1): a small network scores every cell by what a
+    policy can see of it (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho
+    B highest; of these, what exploitation has already goes to the floor, as with `history-uniform`.
 
-    `path` is a file of weights that `care-sim train learned-scorer` wrote; the shipped ones, unless given. They serve
-    any budget and any cameras. Raises InvalidInput for a file of something else or made for another grid.
+    `path` is a file of weights that `care-sim train learned-scorer` wrote; the shipped ones, unless
+    given. They serve any budget and any cameras. Raises InvalidInput for a file of something else
+    or made for another grid.
     """
 
     name = "learned-scorer"
@@ -38,7 +39,9 @@ class LearnedScorer(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the cells of the highest scores."""
         hulls = self.rig.hulls(belief.tracks.boxes)
-        return Demand(hulls, [[highest(self._network.scores(self._cues.of(belief, hulls)), self._reserve)]])
+        return Demand(
+            hulls, [[highest(self._network.scores(self._cues.of(belief, hulls)), self._reserve)]]
+        )
 
 
 class CellNetwork:
@@ -50,7 +53,10 @@ class CellNetwork:
         self._out = weights.array("out", units)
         hidden = outlooks @ layer[CUES:] + weights.array("bias", units)
         self._outlook = hidden, np.maximum(hidden, 0) @ self._out
-        self._layers = _by_code(layer[: len(MARKS)]), *np.ascontiguousarray(layer[len(MARKS) : CUES])
+        self._layers = (
+            _by_code(layer[: len(MARKS)]),
+            *np.ascontiguousarray(layer[len(MARKS) : CUES]),
+        )
 
     def scores(self, seen: Seen) -> NDArray[np.float32]:
         """(N,) of cells; higher where an object without a track is likelier."""

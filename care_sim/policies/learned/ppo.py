@@ -1,4 +1,4 @@
-"""A learned allocator: sectors scored by a small network, trained by proximal policy optimisation."""
+"""A learned allocator: a small network, trained by proximal policy optimisation, scores sectors."""
 
 from os import PathLike
 from typing import ClassVar
@@ -16,16 +16,20 @@ from care_sim.policies.learned.wrapper_text import Wrapping
 
 
 class Ppo(Policy):
-    """Does what the learner would behind its wrappers, without noise: the same scores, the same allocator.
+    """Does what the learner would behind its wrappers, without noise: the same scores, the same
+    allocator.
 
-    `path` is a file of weights that `care-sim train ppo` wrote; without, those that come with the package, learned on
-    the dense street at all budgets of its tables. Raises InvalidInput for weights that are missing, damaged, of another
-    kind, or made for another grid or budget.
+    `path` is a file of weights that `care-sim train ppo` wrote; without, those that come with the
+    package, learned on the dense street at all budgets of its tables. Raises InvalidInput for
+    weights that are missing, damaged, of another kind, or made for another grid or budget.
     """
 
     name = "ppo"
     tags = ("causal", "learned")
-    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on the dense street"
+    source = (
+        "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on "
+        "the dense street"
+    )
     weights: ClassVar[str] = "ppo-dense"
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
@@ -39,7 +43,9 @@ class Ppo(Policy):
         self._score_map = ScoreMap(file, wrapping)
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the sectors alone."""
+        """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the
+        sectors alone.
+        """
         scores = self._score_map(self._features(belief))
         if self._reserve_alone:
             return reserve_demand(belief, self.rig, self._sectors, scores)
@@ -50,5 +56,8 @@ class PpoDartout(Ppo):
     """The same, learned on the dart-out."""
 
     name = "ppo-dartout"
-    source = "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on the dart-out"
+    source = (
+        "Schulman et al. 2017 (proximal policy optimisation), with Stable-Baselines3; learned on "
+        "the dart-out"
+    )
     weights = "ppo-dartout"

@@ -1,9 +1,11 @@
-"""The network of learned allocators in NumPy: one small network slides over the sectors and scores each.
+"""The network of learned allocators in NumPy: one small network slides over the sectors and scores
+each.
 
-It sees the coarse blocks of a sector and one block more on each side, over the seam behind the car too, and the car's
-own motion. Hidden layers are rectified, scores are hyperbolic tangents of
+It sees the coarse blocks of a sector and one block more on each side, over the seam behind the car
+too, and the car's own motion. Hidden layers are rectified, scores are hyperbolic tangents of
 
-    score.weight . relu(hidden.weight relu(window.weight * blocks + ego.weight ego + window.bias) + hidden.bias) + place
+    score.weight . relu(hidden.weight relu(window.weight * blocks + ego.weight ego + window.bias) +
+    hidden.bias) + place
 
 with `place` one number a sector.
 """
@@ -21,7 +23,9 @@ MARGIN = 1
 
 
 class ScoreMap:
-    """Scores of sectors from the observation of `GridObservation`. Raises InvalidInput for arrays that do not fit."""
+    """Scores of sectors from the observation of `GridObservation`. Raises InvalidInput for arrays
+    that do not fit.
+    """
 
     def __init__(self, weights: Weights, wrapping: Wrapping):
         self._shape = len(CHANNELS), wrapping.rows, wrapping.columns
@@ -32,13 +36,18 @@ class ScoreMap:
         self._kernel = np.ascontiguousarray(kernel.reshape(hidden, -1).T)
         self._bias = weights.array("window.bias", hidden)
         self._ego = weights.array("ego.weight", hidden, len(EGO))
-        self._hidden = weights.array("hidden.weight", hidden, hidden), weights.array("hidden.bias", hidden)
+        self._hidden = (
+            weights.array("hidden.weight", hidden, hidden),
+            weights.array("hidden.bias", hidden),
+        )
         self._score = weights.array("score.weight", hidden)
         self._place = weights.array("place", wrapping.elevations, wrapping.azimuths)
 
     def __call__(self, observation: Observation) -> NDArray[np.float32]:
         """(elevations, azimuths) from -1 to 1."""
-        seen = self._windows(observation["grid"]) @ self._kernel + (self._ego @ observation["ego"] + self._bias)
+        seen = self._windows(observation["grid"]) @ self._kernel + (
+            self._ego @ observation["ego"] + self._bias
+        )
         weight, bias = self._hidden
         thought = np.maximum(np.maximum(seen, 0) @ weight.T + bias, 0)
         return np.asarray(np.tanh((thought @ self._score).reshape(self._place.shape) + self._place))
@@ -48,10 +57,10 @@ class ScoreMap:
         channels, rows, columns = self._shape
         padded = np.zeros((channels, rows + 2 * MARGIN, columns + 2 * MARGIN), np.float32)
         padded[:, MARGIN:-MARGIN, MARGIN:-MARGIN] = grid.reshape(self._shape)
-        padded[:, :, :MARGIN], padded[:, :, -MARGIN:] = (
-            padded[:, :, -2 * MARGIN : -MARGIN],
-            padded[:, :, MARGIN : 2 * MARGIN],
-        )
+        padded[:, :, :MARGIN] = padded[:, :, -2 * MARGIN : -MARGIN]
+        padded[:, :, -MARGIN:] = padded[:, :, MARGIN : 2 * MARGIN]
         tall, wide = self._stride
-        windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[:, ::tall, ::wide]
+        windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[
+            :, ::tall, ::wide
+        ]
         return windows.transpose(1, 2, 0, 3, 4).reshape(-1, self._kernel.shape[0])

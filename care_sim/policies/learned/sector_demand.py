@@ -9,8 +9,11 @@ from care_sim.core.types import Demand
 from care_sim.policies.learned.tiling import Tiling
 
 
-def reserve_demand(belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]) -> Demand:
-    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best first.
+def reserve_demand(
+    belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]
+) -> Demand:
+    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
+    first.
 
     Twice the budget is enough of them: at most one budget of cells lies in the hulls already.
     """

@@ -1,4 +1,6 @@
-"""Equal tiles of the angular grid: the sectors that an agent scores, and the coarse blocks in which it sees."""
+"""Equal tiles of the angular grid: the sectors that an agent scores, and the coarse blocks in which
+it sees.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,10 +15,11 @@ from care_sim.core.grid import AngularGrid, Cells
 
 @dataclass(frozen=True)
 class Tiling:
-    """`azimuths` x `elevations` tiles. Raises InvalidInput unless they divide the grid's columns and rows.
+    """`azimuths` x `elevations` tiles. Raises InvalidInput unless they divide the grid's columns
+    and rows.
 
-    A tile's index is `elevation * azimuths + azimuth`; as with cells, elevation 0 is the highest and azimuth 0 begins
-    straight behind, at -pi. `shape` is that of a picture of the tiles.
+    A tile's index is `elevation * azimuths + azimuth`; as with cells, elevation 0 is the highest
+    and azimuth 0 begins straight behind, at -pi. `shape` is that of a picture of the tiles.
     """
 
     grid: AngularGrid
@@ -24,7 +27,10 @@ class Tiling:
     elevations: int = 4
 
     def __post_init__(self) -> None:
-        sides = (("azimuths", self.azimuths, self.grid.columns), ("elevations", self.elevations, self.grid.rows))
+        sides = (
+            ("azimuths", self.azimuths, self.grid.columns),
+            ("elevations", self.elevations, self.grid.rows),
+        )
         for name, count, cells in sides:
             check_whole(name, count, 1, cells)
             if cells % count:
@@ -48,8 +54,8 @@ class Tiling:
         return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
 
     def ranked(self, scores: NDArray[np.floating], enough: int) -> list[Cells]:
-        """The cells of the tiles with a strictly positive score (`shape`), best first, ties by ascending index; no more
-        tiles than hold `enough` cells.
+        """The cells of the tiles with a strictly positive score (`shape`), best first, ties by
+        ascending index; no more tiles than hold `enough` cells.
         """
         flat = np.ravel(scores)
         many = min(np.count_nonzero(flat > 0), -(-enough // self.cells.shape[1]))

@@ -1,6 +1,8 @@
-"""Weights of learned policies in a file that executes no code: float32 arrays and a card that says whose they are.
+"""Weights of learned policies in a file that executes no code: float32 arrays and a card that says
+whose they are.
 
-The file is an .npz of NumPy, read with `allow_pickle=False`; the card is JSON text in one of its entries.
+The file is an .npz of NumPy, read with `allow_pickle=False`; the card is JSON text in one of its
+entries.
 """
 
 import json
@@ -25,8 +27,9 @@ FORMAT = "care-sim weights 1"
 LARGEST = 2**26
 """Bytes that a file may hold when it is unpacked; the shipped ones hold some thousands."""
 LARGEST_WEIGHT = 1e6
-"""What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that three layers of
-any shape stay below 1e29, while float32 ends at 3e38; the shipped ones stay below 5."""
+"""What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that
+three layers of any shape stay below 1e29, while float32 ends at 3e38; the shipped ones stay below
+5."""
 _CARD = "card"
 
 Arrays = dict[str, NDArray[np.float32]]
@@ -36,9 +39,10 @@ Arrays = dict[str, NDArray[np.float32]]
 class Card:
     """What a file of weights is, what it fits, and how it was made.
 
-    `kind` names the policy. `grid` is the one that was trained on, `budget` the cells a keyframe, None where any will
-    do; `wrapper` are the wrappers that it was trained behind in one text, None without. `scenario`, `data`, `seeds`,
-    `steps`, `machine`, `versions` and `result` tell people how the weights were trained and what they reached.
+    `kind` names the policy. `grid` is the one that was trained on, `budget` the cells a keyframe,
+    None where any will do; `wrapper` are the wrappers that it was trained behind in one text, None
+    without. `scenario`, `data`, `seeds`, `steps`, `machine`, `versions` and `result` tell people
+    how the weights were trained and what they reached.
     """
 
     kind: str
@@ -75,7 +79,13 @@ class Card:
 
 
 _TYPES: dict[str, Any] = {column.name: str for column in fields(Card)}
-_TYPES |= {"grid": dict, "budget": int | None, "wrapper": str | None, "scenario": str | None, "steps": int}
+_TYPES |= {
+    "grid": dict,
+    "budget": int | None,
+    "wrapper": str | None,
+    "scenario": str | None,
+    "steps": int,
+}
 _TYPES |= dict.fromkeys(("seeds", "versions", "result"), dict)
 
 
@@ -88,8 +98,8 @@ class Weights:
     card: Card
 
     def check(self, kind: str, rig: Rig) -> None:
-        """Raise InvalidInput, with what the file has and what is needed, unless the weights are of this kind and fit
-        this rig.
+        """Raise InvalidInput, with what the file has and what is needed, unless the weights are of
+        this kind and fit this rig.
         """
         card = self.card
         needed: dict[str, Any] = {"kind": kind, "grid": rig.grid}
@@ -98,16 +108,27 @@ class Weights:
             if getattr(card, name) != value:
                 has, wanted = (_told(name, it, rig) for it in (getattr(card, name), value))
                 hint = "; those trained with several budgets fit any" if name == "budget" else ""
-                raise InvalidInput(f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}")
+                raise InvalidInput(
+                    f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}"
+                )
 
     def array(self, name: str, *shape: int | None) -> NDArray[np.float32]:
-        """An array by name; None in `shape` is any length. Raises InvalidInput for a missing one, or another shape."""
+        """An array by name; None in `shape` is any length. Raises InvalidInput for a missing one,
+        or another shape.
+        """
         if name not in self.arrays:
-            raise InvalidInput(f"weights {self.path}: no array {name!r}; it has {', '.join(self.arrays) or 'none'}")
+            raise InvalidInput(
+                f"weights {self.path}: no array {name!r}; it has {', '.join(self.arrays) or 'none'}"
+            )
         array = self.arrays[name]
-        if array.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):
+        if array.ndim != len(shape) or any(
+            n not in (None, m) for n, m in zip(shape, array.shape, strict=True)
+        ):
             wanted = " x ".join("any" if n is None else str(n) for n in shape)
-            raise InvalidInput(f"weights {self.path}: array {name!r} has the shape {array.shape}, needed is {wanted}")
+            raise InvalidInput(
+                f"weights {self.path}: array {name!r} has the shape {array.shape}, needed is "
+                f"{wanted}"
+            )
         return array
 
 
@@ -134,8 +155,12 @@ def load(path: str | PathLike[str]) -> Weights:
     except FileNotFoundError as error:
         raise InvalidInput(f"weights {path}: no such file") from error
     except Exception as error:
-        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[0]
-        raise InvalidInput(f"weights {path}: no .npz of weights of care-sim train, or damaged ({reason})") from error
+        reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[
+            0
+        ]
+        raise InvalidInput(
+            f"weights {path}: no .npz of weights of care-sim train, or damaged ({reason})"
+        ) from error
 
 
 def shipped(name: str) -> Path:
@@ -151,7 +176,9 @@ def _check_contents(entries: list[ZipInfo]) -> None:
 
 
 def _grid(plain: dict[str, Any]) -> AngularGrid:
-    if set(plain) != {column.name for column in fields(AngularGrid)} or not all(map(is_number, plain.values())):
+    if set(plain) != {column.name for column in fields(AngularGrid)} or not all(
+        map(is_number, plain.values())
+    ):
         raise ValueError(f"its card says grid {plain!r}")
     return AngularGrid(**plain)
 

@@ -1,4 +1,6 @@
-"""The wrappers that weights were trained behind, in one line of text, so that a policy acts and sees as its learner."""
+"""The wrappers that weights were trained behind, in one line of text, so that a policy acts and
+sees as its learner.
+"""
 
 import re
 from dataclasses import dataclass, fields
@@ -12,10 +14,11 @@ _TEXT = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\
 
 @dataclass(frozen=True)
 class Wrapping:
-    """`action` over `azimuths` x `elevations` sectors, `GridObservation` of `columns` x `rows` blocks.
+    """`action` over `azimuths` x `elevations` sectors, `GridObservation` of `columns` x `rows`
+    blocks.
 
-    See `care_sim.envs.wrappers.sector_actions` and `care_sim.envs.wrappers.grid_observation`. Raises InvalidInput for another action, and
-    for sectors that are not made of whole blocks.
+    See `care_sim.envs.wrappers.sector_actions` and `care_sim.envs.wrappers.grid_observation`.
+    Raises InvalidInput for another action, and for sectors that are not made of whole blocks.
     """
 
     action: str = "SectorReserve"
@@ -31,11 +34,15 @@ class Wrapping:
         for blocks, sectors in (("columns", "azimuths"), ("rows", "elevations")):
             if getattr(self, blocks) % getattr(self, sectors):
                 raise InvalidInput(
-                    f"{sectors} must divide {blocks}, got {getattr(self, sectors)} and {getattr(self, blocks)}"
+                    f"{sectors} must divide {blocks}, got {getattr(self, sectors)} and "
+                    f"{getattr(self, blocks)}"
                 )
 
     def __str__(self) -> str:
-        return f"{self.action} {self.azimuths} x {self.elevations}, GridObservation {self.columns} x {self.rows}"
+        return (
+            f"{self.action} {self.azimuths} x {self.elevations}, GridObservation {self.columns} "
+            f"x {self.rows}"
+        )
 
     @classmethod
     def parse(cls, text: str | None) -> "Wrapping":

@@ -10,9 +10,10 @@ from care_sim.policies.base import Policy
 
 
 class BeamReduce(Policy):
-    """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), which drops scan lines from a cloud,
-    adapted by the paper (Sec. 5.1) into a causal scan policy: it fires whole rows, the nearest to the
-    horizon first, and the last one thinned evenly, so that exactly B cells are asked for.
+    """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), which drops scan lines from a
+    cloud, adapted by the paper (Sec. 5.1) into a causal scan policy: it fires whole rows, the
+    nearest to the horizon first, and the last one thinned evenly, so that exactly B cells are asked
+    for.
     """
 
     name = "beam-reduce"
@@ -28,7 +29,9 @@ class BeamReduce(Policy):
 
 
 def horizon_rows(grid: AngularGrid, count: int) -> list[Cells]:
-    """The cells of the rows nearest the horizon, nearest first, `count` in all; the last row evenly thinned."""
+    """The cells of the rows nearest the horizon, nearest first, `count` in all; the last row evenly
+    thinned.
+    """
     nearest = np.argsort(np.abs(grid.directions[:: grid.columns, 2]), kind="stable")
     whole, rest = divmod(count, grid.columns)
     widths = [grid.columns] * whole + [rest] * (rest > 0)

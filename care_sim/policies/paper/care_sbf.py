@@ -28,7 +28,10 @@ class CareSbf(Policy):
     # The listing and the check of parameters read the rules and their defaults here.
     __init__.__signature__ = Signature(  # type: ignore[attr-defined]
         [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("self", "rig")]
-        + [rule.replace(kind=Parameter.KEYWORD_ONLY) for rule in signature(ForgettingRules).parameters.values()]
+        + [
+            rule.replace(kind=Parameter.KEYWORD_ONLY)
+            for rule in signature(ForgettingRules).parameters.values()
+        ]
     )
 
     def reset(self) -> None:

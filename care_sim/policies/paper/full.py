@@ -19,7 +19,8 @@ class Full(Policy):
         super().__init__(rig)
         if rig.budget != rig.grid.size:
             raise InvalidInput(
-                f"policy full needs budget=1.0, this environment fires {rig.budget} of {rig.grid.size} cells"
+                f"policy full needs budget=1.0, this environment fires {rig.budget} of "
+                f"{rig.grid.size} cells"
             )
 
     def demand(self, belief: Belief) -> Demand:

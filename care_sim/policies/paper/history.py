@@ -6,8 +6,9 @@ from care_sim.policies.base import Policy
 
 
 class History(Policy):
-    """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning: the
-    exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is empty.
+    """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning:
+    the exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is
+    empty.
     """
 
     name = "history"

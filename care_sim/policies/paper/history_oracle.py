@@ -8,8 +8,9 @@ from care_sim.policies.privileged import PrivilegedPolicy
 
 
 class HistoryOracle(PrivilegedPolicy):
-    """The oracle of the paper (Sec. 5.2): history, with the forecast of every tracked object replaced by its
-    true next position. An upper bound on any learned predictor of regions; new objects stay unknown to it.
+    """The oracle of the paper (Sec. 5.2): history, with the forecast of every tracked object
+    replaced by its true next position. An upper bound on any learned predictor of regions; new
+    objects stay unknown to it.
     """
 
     name = "history-oracle"

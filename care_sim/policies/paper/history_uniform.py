@@ -13,8 +13,8 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 
 
 class HistoryUniform(Policy):
-    """The control history+uniform of the paper (Sec. 5.1): the whole reserve, rho B cells, goes to one pattern
-    that stays the same over the episode and looks nowhere in particular.
+    """The control history+uniform of the paper (Sec. 5.1): the whole reserve, rho B cells, goes to
+    one pattern that stays the same over the episode and looks nowhere in particular.
     """
 
     name = "history-uniform"
@@ -31,7 +31,9 @@ class HistoryUniform(Policy):
 
 
 def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
-    """`count` different cells, ascending: as many in every row, evenly spaced, each row turned by the golden ratio."""
+    """`count` different cells, ascending: as many in every row, evenly spaced, each row turned by
+    the golden ratio.
+    """
     numbers = np.arange(count)
     row = numbers * grid.rows // max(count, 1)
     in_row = np.bincount(row, minlength=grid.rows)

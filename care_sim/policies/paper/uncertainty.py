@@ -14,16 +14,16 @@ GROUND_CLEARANCE_M = 0.3
 fits the road's plane knows it better: see `care_sim.perception.cluster.road.KERB_CLEARANCE_M`.
 """
 BOX_MARGIN_M = 0.2
-"""Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a keyframe of
-0.1 s, and three deviations of a ranging noise of 2 to 3 cm another 0.1 m."""
+"""Boxes reach this much further: an error of 1 m/s in the car's own speed moves a box by 0.1 m in a
+keyframe of 0.1 s, and three deviations of a ranging noise of 2 to 3 cm another 0.1 m."""
 SHELL_M = 1.0
 """Depth of a layer. Within it cells come in ascending order; finer would only cost time."""
 
 
 class Uncertainty(Policy):
-    """The uncertainty reserve of the paper (Sec. 5.1), in the style of light curtains (Ancha et al., ECCV 2020;
-    safety envelopes, RSS 2021): cells that were occupied but undetected at the previous scan are fired again,
-    the closest obstacle first.
+    """The uncertainty reserve of the paper (Sec. 5.1), in the style of light curtains (Ancha et
+    al., ECCV 2020; safety envelopes, RSS 2021): cells that were occupied but undetected at the
+    previous scan are fired again, the closest obstacle first.
     """
 
     name = "uncertainty"
@@ -37,7 +37,9 @@ class Uncertainty(Policy):
         return Demand(self.rig.hulls(belief.tracks.boxes), layers)
 
     def _unexplained(self, belief: Belief) -> tuple[Cells, Floats]:
-        """Cells (n,) and ranges (n,) of the last scan's returns above the ground and outside detected boxes."""
+        """Cells (n,) and ranges (n,) of the last scan's returns above the ground and outside
+        detected boxes.
+        """
         cells = np.flatnonzero((belief.ranges > 0) & (belief.ranges < self.rig.grid.range_m))
         ranges = belief.ranges.ravel()[cells].astype(np.float64)
         points = self.rig.grid.directions[cells] * ranges[:, None]

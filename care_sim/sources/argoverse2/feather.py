@@ -16,10 +16,11 @@ Columns = dict[str, NDArray[Any]]
 
 
 def read_columns(path: Path, kinds: Mapping[str, type], ranges: Mapping[str, Range]) -> Columns:
-    """The named columns of a Feather file as arrays of the given kinds, int, float or str; numbers lie in their ranges.
+    """The named columns of a Feather file as arrays of the given kinds, int, float or str; numbers
+    lie in their ranges.
 
-    Raises InvalidInput for a file that is missing or truncated, lacks a column, holds another kind in it, or has an
-    empty or infinite value, or one beyond its range.
+    Raises InvalidInput for a file that is missing or truncated, lacks a column, holds another kind
+    in it, or has an empty or infinite value, or one beyond its range.
     """
     try:
         table = feather.read_table(path)
@@ -46,13 +47,16 @@ def read_columns(path: Path, kinds: Mapping[str, type], ranges: Mapping[str, Ran
 
 def _column(path: Path, column: pyarrow.ChunkedArray, name: str, kind: type) -> NDArray[Any]:
     if not _HOLDS[kind](column.type):
-        raise InvalidInput(f"{path}: column {name!r} must hold {kind.__name__} values, has {column.type}")
+        raise InvalidInput(
+            f"{path}: column {name!r} must hold {kind.__name__} values, has {column.type}"
+        )
     if column.null_count:
         raise InvalidInput(f"{path}: column {name!r} has {column.null_count} empty values")
     values: NDArray[Any] = np.asarray(column.to_pylist() if kind is str else column, dtype=kind)
     if kind is float and not np.isfinite(values).all():
         raise InvalidInput(
-            f"{path}: column {name!r} has a value that is not finite, in row {np.isfinite(values).argmin()}"
+            f"{path}: column {name!r} has a value that is not finite, in row "
+            f"{np.isfinite(values).argmin()}"
         )
     return values
 

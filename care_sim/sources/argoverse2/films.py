@@ -1,12 +1,13 @@
-"""Argoverse 2 sensor logs as films: annotated boxes and car poses become bodies, and rays are cast at them.
+"""Argoverse 2 sensor logs as films: annotated boxes and car poses become bodies, and rays are cast
+at them.
 
-Wilson et al. 2021, "Argoverse 2: Next Generation Datasets for Self-Driving Perception and Forecasting"; the layout
-and the taxonomy are those of its Sensor Dataset guide. A log folder needs `city_SE3_egovehicle.feather` and one
-`annotations*.feather`; its sensor recordings are not used.
+Wilson et al. 2021, "Argoverse 2: Next Generation Datasets for Self-Driving Perception and
+Forecasting"; the layout and the taxonomy are those of its Sensor Dataset guide. A log folder needs
+`city_SE3_egovehicle.feather` and one `annotations*.feather`; its sensor recordings are not used.
 
-Boxes without a recorded LiDAR point inside are left out, as the official evaluation leaves them out: nobody saw
-those objects there. Those of the first keyframe are in `Film.hidden`, since the objects were present. Static
-surroundings are not annotated, so only what is annotated occludes.
+Boxes without a recorded LiDAR point inside are left out, as the official evaluation leaves them
+out: nobody saw those objects there. Those of the first keyframe are in `Film.hidden`, since the
+objects were present. Static surroundings are not annotated, so only what is annotated occludes.
 """
 
 from pathlib import Path
@@ -38,13 +39,15 @@ from care_sim.sources.car_motion import motions
 UP_LIDAR = (1.35, 0.0, 1.64)
 """Metres in the car's frame: `up_lidar` in the calibration of the Sensor Dataset guide."""
 CAR_FRAME_HEIGHT_M = 0.33
-"""The origin of the car's frame, the middle of its rear axle, stands this far above the road: the wheels' radius, and
-where the returns of a recorded sweep lie within 10 m."""
+"""The origin of the car's frame, the middle of its rear axle, stands this far above the road: the
+wheels' radius, and where the returns of a recorded sweep lie within 10 m."""
 SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
 KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
 HALF_SWEEP_NS = NANOSECONDS // 20
-"""Annotations come at 10 Hz: the nearest is this far from a moment at most, unless a sweep holds none."""
+"""Annotations come at 10 Hz: the nearest is this far from a moment at most, unless a sweep holds
+none.
+"""
 
 
 def logs(folder: Path) -> list[Path]:
@@ -54,28 +57,34 @@ def logs(folder: Path) -> list[Path]:
     """
     found = [path for path in (folder, *sorted(folder.glob("*"))) if _is_log(path)]
     if not found:
-        raise InvalidInput(f"{folder}: no Argoverse 2 log (a folder with {POSE_FILE} and {ANNOTATION_FILES})")
+        raise InvalidInput(
+            f"{folder}: no Argoverse 2 log (a folder with {POSE_FILE} and {ANNOTATION_FILES})"
+        )
     return found[:1] if found[0] == folder else found
 
 
 def film(log: Path, grid: AngularGrid | None = None) -> Film:
     """The film of a log, every cell of `grid` (the paper's, unless given) fired in every keyframe.
 
-    Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a pose, an unknown
-    category, an object annotated twice at once.
+    Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a
+    pose, an unknown category, an object annotated twice at once.
     """
-    boxes_file, pose_file = annotation_file(log), log / POSE_FILE
+    boxes_file = annotation_file(log)
+    pose_file = log / POSE_FILE
     sweeps, boxes = read_boxes(boxes_file)
     poses = read_poses(pose_file)
     without_pose = np.setdiff1d(sweeps, poses["timestamp_ns"])
     if len(without_pose):
-        raise InvalidInput(f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}")
+        raise InvalidInput(
+            f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}"
+        )
     keyframes = _keyframes(sweeps, poses["timestamp_ns"])
     moments = np.union1d(sweeps, keyframes)
     cars = _car_frames(poses, moments)
     times = (moments - moments[0]) / NANOSECONDS
     egos = motions(times, cars)
-    grid, shots = grid or AngularGrid(), []
+    grid = grid or AngularGrid()
+    shots = []
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
         seen = shoot(_props(_rows(boxes, moments[row], seen=True)), sensor, SENSOR_HEIGHT_M, grid)
@@ -90,12 +99,15 @@ def _is_log(path: Path) -> bool:
 
 
 def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
-    """Timestamps every half second from the first annotated sweep to the last: of the annotated sweep that is
-    nearest, or, where the sweep holds no annotation, of the nearest pose. Both ascend.
+    """Timestamps every half second from the first annotated sweep to the last: of the annotated
+    sweep that is nearest, or, where the sweep holds no annotation, of the nearest pose. Both
+    ascend.
     """
     moments = np.arange(sweeps[0], sweeps[-1] + HALF_SWEEP_NS, round(KEYFRAME_S * NANOSECONDS))
     annotated = _nearest(sweeps, moments)
-    chosen = np.where(np.abs(annotated - moments) <= HALF_SWEEP_NS, annotated, _nearest(posed, moments))
+    chosen = np.where(
+        np.abs(annotated - moments) <= HALF_SWEEP_NS, annotated, _nearest(posed, moments)
+    )
     return np.unique(chosen)
 
 
@@ -107,10 +119,15 @@ def _nearest(stamps: Cells, moments: Cells) -> Cells:
 
 
 def _car_frames(poses: Columns, moments: Cells) -> list[Frame]:
-    """The car's frame at every moment, each of which has a pose. The world is the city's, moved to the first."""
+    """The car's frame at every moment, each of which has a pose. The world is the city's, moved to
+    the first.
+    """
     rows = np.searchsorted(poses["timestamp_ns"], moments)
-    places, turns = table(poses, PLACE)[rows], Rotation.from_quat(table(poses, TURN)[rows])
-    return [Frame.turned_by(turn, place) for turn, place in zip(turns, places - places[0], strict=True)]
+    places = table(poses, PLACE)[rows]
+    turns = Rotation.from_quat(table(poses, TURN)[rows])
+    return [
+        Frame.turned_by(turn, place) for turn, place in zip(turns, places - places[0], strict=True)
+    ]
 
 
 def _rows(boxes: Columns, sweep: int, seen: bool) -> Columns:
@@ -121,8 +138,13 @@ def _rows(boxes: Columns, sweep: int, seen: bool) -> Columns:
 
 def _props(boxes: Columns) -> list[Prop]:
     """The boxes as bodies; the sensor's axes are the car's."""
-    numbers, labels = boxes["number"].tolist(), [CATEGORIES[name] for name in boxes["category"].tolist()]
+    numbers = boxes["number"].tolist()
+    labels = [CATEGORIES[name] for name in boxes["category"].tolist()]
     sizes = [tuple(size) for size in table(boxes, SIZE).tolist()]
-    places, turns = table(boxes, PLACE) - UP_LIDAR, table(boxes, TURN)
-    frames = [Frame.turned_by(Rotation.from_quat(turn), place) for turn, place in zip(turns, places, strict=True)]
+    places = table(boxes, PLACE) - UP_LIDAR
+    turns = table(boxes, TURN)
+    frames = [
+        Frame.turned_by(Rotation.from_quat(turn), place)
+        for turn, place in zip(turns, places, strict=True)
+    ]
     return [Prop(*values) for values in zip(numbers, labels, sizes, frames, strict=True)]

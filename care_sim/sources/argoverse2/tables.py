@@ -1,4 +1,6 @@
-"""The tables of an Argoverse 2 log: annotations and poses of the car, checked; what is wrong is named in one line."""
+"""The tables of an Argoverse 2 log: annotations and poses of the car, checked; what is wrong is
+named in one line.
+"""
 
 from pathlib import Path
 
@@ -23,8 +25,8 @@ CATEGORIES: dict[str, str | None] = {
     "BICYCLE": "bicycle",
     "OFFICIAL_SIGNALER": "pedestrian",
     "PEDESTRIAN": "pedestrian",
-    # Outside the five classes: bodies that occlude, and that nobody reports. Riders have boxes of their own; as in
-    # nuScenes the bicycle counts, once, and its rider does not.
+    # Outside the five classes: bodies that occlude, and that nobody reports. Riders have boxes of
+    # their own; as in nuScenes the bicycle counts, once, and its rider does not.
     "ANIMAL": None,
     "BICYCLIST": None,
     "BOLLARD": None,
@@ -50,8 +52,11 @@ CATEGORIES: dict[str, str | None] = {
 RECORDING_CAR = "EGO_VEHICLE"
 """The category of the recording car itself, which is no object of its own film."""
 
-POSE_FILE, ANNOTATION_FILES = "city_SE3_egovehicle.feather", "annotations*.feather"
-PLACE, TURN, SIZE = ("tx_m", "ty_m", "tz_m"), ("qx", "qy", "qz", "qw"), ("length_m", "width_m", "height_m")
+POSE_FILE = "city_SE3_egovehicle.feather"
+ANNOTATION_FILES = "annotations*.feather"
+PLACE = ("tx_m", "ty_m", "tz_m")
+TURN = ("qx", "qy", "qz", "qw")
+SIZE = ("length_m", "width_m", "height_m")
 _POSE_TYPES = {"timestamp_ns": int, **dict.fromkeys((*PLACE, *TURN), float)}
 _BOX_TYPES = {
     **_POSE_TYPES,
@@ -61,7 +66,11 @@ _BOX_TYPES = {
     "num_interior_pts": int,
 }
 _POSE_RANGES = {"timestamp_ns": STAMPS_NS, **dict.fromkeys(PLACE, MAP_M)}
-_BOX_RANGES = {"timestamp_ns": STAMPS_NS, **dict.fromkeys(PLACE, AWAY_M), **dict.fromkeys(SIZE, SIZES_M)}
+_BOX_RANGES = {
+    "timestamp_ns": STAMPS_NS,
+    **dict.fromkeys(PLACE, AWAY_M),
+    **dict.fromkeys(SIZE, SIZES_M),
+}
 
 
 def annotation_file(log: Path) -> Path:
@@ -73,14 +82,15 @@ def annotation_file(log: Path) -> Path:
 
 
 def read_boxes(path: Path) -> tuple[Cells, Columns]:
-    """The annotated timestamps (n,), ascending, and the checked annotations, without the recording car, each with the
-    `number` of its track in the film.
+    """The annotated timestamps (n,), ascending, and the checked annotations, without the recording
+    car, each with the `number` of its track in the film.
 
-    Raises InvalidInput for a file that is missing, truncated or incomplete, an unknown category, a box that no drive
-    holds (`care_sim.sources.plausible`), an object annotated twice at once.
+    Raises InvalidInput for a file that is missing, truncated or incomplete, an unknown category, a
+    box that no drive holds (`care_sim.sources.plausible`), an object annotated twice at once.
     """
     boxes = read_columns(path, _BOX_TYPES, _BOX_RANGES)
-    sweeps, kept = np.unique(boxes["timestamp_ns"]), boxes["category"] != RECORDING_CAR
+    sweeps = np.unique(boxes["timestamp_ns"])
+    kept = boxes["category"] != RECORDING_CAR
     boxes = {name: column[kept] for name, column in boxes.items()}
     if not kept.any():
         raise InvalidInput(f"{path}: no annotations")
@@ -101,8 +111,8 @@ def read_boxes(path: Path) -> tuple[Cells, Columns]:
 def read_poses(path: Path) -> Columns:
     """The checked poses of the car, in order of time.
 
-    Raises InvalidInput for a file that is missing, truncated or incomplete, a pose that no drive holds
-    (`care_sim.sources.plausible`), two poses at once.
+    Raises InvalidInput for a file that is missing, truncated or incomplete, a pose that no drive
+    holds (`care_sim.sources.plausible`), two poses at once.
     """
     poses = read_columns(path, _POSE_TYPES, _POSE_RANGES)
     stamps = poses["timestamp_ns"]

@@ -1,4 +1,6 @@
-"""The cameras of a recorded car, and what they saw when no detector was run: projected boxes with visibility."""
+"""The cameras of a recorded car, and what they saw when no detector was run: projected boxes with
+visibility.
+"""
 
 import math
 from dataclasses import dataclass
@@ -14,18 +16,28 @@ from care_sim.sensors.annotated import Annotations, IdentifiedDetections
 from care_sim.sensors.camera import CAMERA_WIDTH
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 
-CHANNELS = ("CAM_FRONT", "CAM_FRONT_LEFT", "CAM_FRONT_RIGHT", "CAM_BACK_LEFT", "CAM_BACK_RIGHT", "CAM_BACK")
+CHANNELS = (
+    "CAM_FRONT",
+    "CAM_FRONT_LEFT",
+    "CAM_FRONT_RIGHT",
+    "CAM_BACK_LEFT",
+    "CAM_BACK_RIGHT",
+    "CAM_BACK",
+)
 PICTURE = (1600, 900)
 """Width and height of a picture in pixels."""
 
 VISIBLE_SHARES = {"v0-40": 0.0, "v40-60": 0.5, "v60-80": 0.7, "v80-100": 0.9}
-"""The share of an object that its level of visibility stands for: the middle of the bin, and none of the lowest,
-which holds the objects that no picture shows. An object without a level counts as wholly visible."""
+"""The share of an object that its level of visibility stands for: the middle of the bin, and none
+of the lowest, which holds the objects that no picture shows. An object without a level counts as
+wholly visible."""
 
 
 @dataclass(frozen=True)
 class RecordedCamera:
-    """One camera in the sensor frame of the LiDAR: optical centre and axes `frame`, and its intrinsics in pixels."""
+    """One camera in the sensor frame of the LiDAR: optical centre and axes `frame`, and its
+    intrinsics in pixels.
+    """
 
     frame: Frame
     focal: float
@@ -33,12 +45,16 @@ class RecordedCamera:
 
     @cached_property
     def pinhole(self) -> PinholeCamera:
-        """The same camera with its principal point in the middle of a picture that holds the recorded one."""
+        """The same camera with its principal point in the middle of a picture that holds the
+        recorded one.
+        """
         frame = self.frame
         width, height = (
-            2 * math.ceil(max(middle, size - middle)) for middle, size in zip(self.centre, PICTURE, strict=True)
+            2 * math.ceil(max(middle, size - middle))
+            for middle, size in zip(self.centre, PICTURE, strict=True)
         )
-        position, angle = (frame.x, frame.y, frame.z), float(2 * np.arctan(width / 2 / self.focal))
+        position = (frame.x, frame.y, frame.z)
+        angle = float(2 * np.arctan(width / 2 / self.focal))
         return PinholeCamera(width, height, angle, position, frame.yaw, -frame.pitch, frame.roll)
 
     @property
@@ -48,11 +64,15 @@ class RecordedCamera:
 
 
 def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCamera:
-    """From frames in the car: the camera's (z forward, x right, y down) and the LiDAR's sensor frame."""
+    """From frames in the car: the camera's (z forward, x right, y down) and the LiDAR's sensor
+    frame.
+    """
     ahead = Rotation.from_matrix([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
     turn = lidar.rotation.inv() * mount.rotation * ahead
     frame = Frame.turned_by(turn, lidar.vectors_to_local(mount.origin - lidar.origin))
-    return RecordedCamera(frame, float(intrinsic[0, 0]), (float(intrinsic[0, 2]), float(intrinsic[1, 2])))
+    return RecordedCamera(
+        frame, float(intrinsic[0, 0]), (float(intrinsic[0, 2]), float(intrinsic[1, 2]))
+    )
 
 
 def projected_detections(
@@ -60,10 +80,12 @@ def projected_detections(
 ) -> IdentifiedDetections:
     """Boxes of the annotated objects that the pictures show: `shares` (n,) of each are visible.
 
-    An object has a box in every picture in which its projected box, cut at the edges and times the visible share,
-    would fill MIN_PIXELS of a picture CAMERA_WIDTH wide. Confidence grows with those pixels as for rendered pictures.
+    An object has a box in every picture in which its projected box, cut at the edges and times the
+    visible share, would fill MIN_PIXELS of a picture CAMERA_WIDTH wide. Confidence grows with those
+    pixels as for rendered pictures.
     """
-    rows, objects = [np.empty((0, len(ImageDetections.COLUMNS)))], [np.empty(0, np.int64)]
+    rows = [np.empty((0, len(ImageDetections.COLUMNS)))]
+    objects = [np.empty(0, np.int64)]
     for number, camera in enumerate(cameras):
         boxes = projected(camera, annotations.boxes)
         area = np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0, None), axis=1)
@@ -72,11 +94,15 @@ def projected_detections(
         columns = annotations.classes, confidence_of(pixels), boxes
         rows.append(_rows([column[seen] for column in columns], number))
         objects.append(annotations.objects[seen])
-    return IdentifiedDetections(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
+    return IdentifiedDetections(
+        ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects)
+    )
 
 
 def projected(camera: RecordedCamera, boxes: Floats) -> Floats:
-    """(n, 4) image boxes of 3D boxes (n, 7), cut at the edges of the recorded picture, empty where it shows none."""
+    """(n, 4) image boxes of 3D boxes (n, 7), cut at the edges of the recorded picture, empty where
+    it shows none.
+    """
     shift = camera.shift
     limits = np.tile(PICTURE, 2) + shift
     return np.clip(np.nan_to_num(camera.pinhole.project_boxes(boxes), nan=shift[0]), shift, limits)

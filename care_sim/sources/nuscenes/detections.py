@@ -1,9 +1,10 @@
 """Detections of a 2D detector that somebody ran on the pictures, from a file.
 
-Two forms. nuScenes: rows with `sample_data_token`, `bbox_corners` (left, top, right, bottom), `category_name` or
-`detection_name`, and `score` or `detection_score`, as a list or as a map `results` from tokens to lists. COCO results:
-rows with `image_id`, `bbox` (left, top, width, height), `category_id` and `score`; `image_id` is the token of the
-picture or its file name. Known categories outside the five classes are left out.
+Two forms. nuScenes: rows with `sample_data_token`, `bbox_corners` (left, top, right, bottom),
+`category_name` or `detection_name`, and `score` or `detection_score`, as a list or as a map
+`results` from tokens to lists. COCO results: rows with `image_id`, `bbox` (left, top, width,
+height), `category_id` and `score`; `image_id` is the token of the picture or its file name. Known
+categories outside the five classes are left out.
 """
 
 from collections import defaultdict
@@ -30,7 +31,9 @@ COCO_LAST = 90
 FARTHEST_PX = 1e5
 """How far a box may reach, within the picture or beside it: its area is to be a number."""
 SAME_OBJECT_IOU = 0.5
-"""A detection lies on the object of its class whose projected box overlaps it at least this much (PASCAL VOC)."""
+"""A detection lies on the object of its class whose projected box overlaps it at least this much
+(PASCAL VOC).
+"""
 
 Found = tuple[int, float, Floats]
 """Class, confidence and box (4,) in the recorded picture."""
@@ -46,32 +49,49 @@ class DetectionFile:
             try:
                 picture, detection = _read(row)
             except KeyError as error:
-                raise InvalidInput(f"{path}: detection {number} cannot be read (it lacks {error})") from error
+                raise InvalidInput(
+                    f"{path}: detection {number} cannot be read (it lacks {error})"
+                ) from error
             except (TypeError, ValueError) as error:
-                raise InvalidInput(f"{path}: detection {number} cannot be read ({error})") from error
+                raise InvalidInput(
+                    f"{path}: detection {number} cannot be read ({error})"
+                ) from error
             if detection is not None:
                 self._found[picture].append(detection)
 
     def check(self, database: Database) -> None:
-        """Raise InvalidInput for a detection on what is no picture of a keyframe of the database."""
+        """Raise InvalidInput for a detection whose picture is no keyframe of the database."""
         for picture in self._found:
             if picture not in database.pictures:
                 table = database.path("sample_data")
-                raise InvalidInput(f"{self.path}: a detection on {picture!r}, which is no keyframe of {table}")
+                raise InvalidInput(
+                    f"{self.path}: a detection on {picture!r}, which is no keyframe of {table}"
+                )
 
     def seen(
         self, cameras: Sequence[RecordedCamera], pictures: Sequence[Row], annotations: Annotations
     ) -> IdentifiedDetections:
-        """The detections on the pictures of a keyframe, one a camera, each with the object that it lies on."""
-        rows, objects = [np.empty((0, len(ImageDetections.COLUMNS)))], [np.empty(0, np.int64)]
+        """The detections on the pictures of a keyframe, one a camera, each with the object that it
+        lies on.
+        """
+        rows = [np.empty((0, len(ImageDetections.COLUMNS)))]
+        objects = [np.empty(0, np.int64)]
         for number, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
             found = self._found.get(picture["token"], []) + self._found.get(picture["filename"], [])
             boxes = np.array([box for _, _, box in found]).reshape(-1, 4) + camera.shift
             classes = np.array([label for label, _, _ in found], dtype=np.int64)
             zeros = np.zeros(len(found))
-            rows.append(np.column_stack([classes, [c for _, c, _ in found], boxes, zeros + number, zeros, zeros]))
-            objects.append(_behind(boxes, classes, projected(camera, annotations.boxes), annotations))
-        return IdentifiedDetections(ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects))
+            rows.append(
+                np.column_stack(
+                    [classes, [c for _, c, _ in found], boxes, zeros + number, zeros, zeros]
+                )
+            )
+            objects.append(
+                _behind(boxes, classes, projected(camera, annotations.boxes), annotations)
+            )
+        return IdentifiedDetections(
+            ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects)
+        )
 
 
 def _rows(path: Path) -> list[Row]:
@@ -80,9 +100,14 @@ def _rows(path: Path) -> list[Row]:
     results = content.get("results") if isinstance(content, dict) else None
     if isinstance(results, dict) and all(isinstance(rows, list) for rows in results.values()):
         pairs = [(token, row) for token, rows in results.items() for row in rows]
-        return [{"sample_data_token": token, **row} if isinstance(row, dict) else row for token, row in pairs]
+        return [
+            {"sample_data_token": token, **row} if isinstance(row, dict) else row
+            for token, row in pairs
+        ]
     if not isinstance(content, list):
-        raise InvalidInput(f"{path}: must hold a list of detections, or a map `results` from tokens to such lists")
+        raise InvalidInput(
+            f"{path}: must hold a list of detections, or a map `results` from tokens to such lists"
+        )
     return content
 
 
@@ -92,10 +117,13 @@ def _read(row: Row) -> tuple[str, Found | None]:
         raise TypeError(f"no map of fields: {row!r}")
     if "image_id" in row:
         left, top, width, height = _box(row["bbox"])
-        label, corners = _coco_class(row["category_id"]), np.array([left, top, left + width, top + height])
-        picture, score = str(row["image_id"]), row["score"]
+        label = _coco_class(row["category_id"])
+        corners = np.array([left, top, left + width, top + height])
+        picture = str(row["image_id"])
+        score = row["score"]
     else:
-        picture, corners = row["sample_data_token"], _box(row["bbox_corners"])
+        picture = row["sample_data_token"]
+        corners = _box(row["bbox_corners"])
         label = class_of(row["category_name"] if "category_name" in row else row["detection_name"])
         score = row["score"] if "score" in row else row["detection_score"]
     if not isinstance(picture, str):
@@ -121,12 +149,19 @@ def _coco_class(number: object) -> str | None:
 
 
 def _behind(boxes: Floats, classes: Cells, shown: Floats, annotations: Annotations) -> Cells:
-    """(n,) the object behind each detected box, NOBODY where no projected box (m, 4) overlaps it enough."""
+    """(n,) the object behind each detected box, NOBODY where no projected box (m, 4) overlaps it
+    enough.
+    """
     if not len(boxes) or not len(shown):
         return np.full(len(boxes), NOBODY, np.int64)
-    low, high = np.maximum(boxes[:, None, :2], shown[:, :2]), np.minimum(boxes[:, None, 2:], shown[:, 2:])
+    low, high = (
+        np.maximum(boxes[:, None, :2], shown[:, :2]),
+        np.minimum(boxes[:, None, 2:], shown[:, 2:]),
+    )
     common = np.prod(np.clip(high - low, 0, None), axis=-1)
     areas, others = (np.prod(b[:, 2:] - b[:, :2], axis=1) for b in (boxes, shown))
-    overlap = np.where(classes[:, None] == annotations.classes, common / (areas[:, None] + others - common), 0.0)
+    overlap = np.where(
+        classes[:, None] == annotations.classes, common / (areas[:, None] + others - common), 0.0
+    )
     best = overlap.argmax(axis=1)
     return np.where(overlap.max(axis=1) >= SAME_OBJECT_IOU, annotations.objects[best], NOBODY)

@@ -1,8 +1,10 @@
-"""nuScenes scenes as films: recorded sweeps, annotations of the 2 Hz keyframes, six recorded cameras.
+"""nuScenes scenes as films: recorded sweeps, annotations of the 2 Hz keyframes, six recorded
+cameras.
 
-Boxes without a LiDAR or radar point inside are left out, as the official evaluation leaves them out; those of the first
-keyframe are in `Film.hidden`, since the objects were present. The car's motion is that of the keyframes' poses. The
-cameras' pictures are taken within 50 ms of the sweep; the way that the car drives meanwhile is neglected.
+Boxes without a LiDAR or radar point inside are left out, as the official evaluation leaves them
+out; those of the first keyframe are in `Film.hidden`, since the objects were present. The car's
+motion is that of the keyframes' poses. The cameras' pictures are taken within 50 ms of the sweep;
+the way that the car drives meanwhile is neglected.
 """
 
 from dataclasses import dataclass
@@ -41,30 +43,41 @@ _FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
 
 
 def film(
-    database: Database, scene: Row, grid: AngularGrid | None = None, detections: DetectionFile | None = None
+    database: Database,
+    scene: Row,
+    grid: AngularGrid | None = None,
+    detections: DetectionFile | None = None,
 ) -> Film:
-    """The film of a scene, in the cells of `grid` (the paper's, unless given). The cameras' boxes come from
-    `detections`, else from projected annotations.
+    """The film of a scene, in the cells of `grid` (the paper's, unless given). The cameras' boxes
+    come from `detections`, else from projected annotations.
 
-    Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated sweep, a detection
-    on what is no picture of a keyframe.
+    Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated
+    sweep, a detection on what is no picture of a keyframe.
     """
     if detections is not None:
         detections.check(database)
     samples = database.samples(scene)
     data = [_recordings(database, sample) for sample in samples]
     stage = _stage(database, samples, data[0], grid or AngularGrid(), detections)
-    cars = [_frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data]
+    cars = [
+        _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
+    ]
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
     egos = motions(times, cars)
-    shots = tuple(stage.shot(*moment) for moment in zip(samples, data, times.tolist(), cars, egos, strict=True))
-    cameras, hidden = tuple(camera.pinhole for camera in stage.cameras), stage.hidden(samples[0], cars[0])
+    shots = tuple(
+        stage.shot(*moment)
+        for moment in zip(samples, data, times.tolist(), cars, egos, strict=True)
+    )
+    cameras = tuple(camera.pinhole for camera in stage.cameras)
+    hidden = stage.hidden(samples[0], cars[0])
     return Film(scene["name"], cameras, stage.lidar.z, KEYFRAME_S, shots, hidden)
 
 
 @dataclass(frozen=True)
 class _Stage:
-    """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number for every instance."""
+    """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number for every
+    instance.
+    """
 
     database: Database
     lidar: Frame
@@ -73,7 +86,9 @@ class _Stage:
     grid: AngularGrid
     detections: DetectionFile | None
 
-    def shot(self, sample: Row, recordings: dict[str, Row], time_s: float, car: Frame, ego: Ego) -> Shot:
+    def shot(
+        self, sample: Row, recordings: dict[str, Row], time_s: float, car: Frame, ego: Ego
+    ) -> Shot:
         sensor = car.holding(self.lidar.origin, self.lidar.rotation)
         boxes = self._boxes(sample, seen=True)
         annotations = _annotations(self.database, boxes, self.numbers, sensor)
@@ -85,17 +100,27 @@ class _Stage:
     def hidden(self, sample: Row, car: Frame) -> Annotations:
         """What is annotated without a point."""
         boxes = self._boxes(sample, seen=False)
-        return _annotations(self.database, boxes, self.numbers, car.holding(self.lidar.origin, self.lidar.rotation))
+        return _annotations(
+            self.database, boxes, self.numbers, car.holding(self.lidar.origin, self.lidar.rotation)
+        )
 
     def _boxes(self, sample: Row, seen: bool) -> list[Row]:
         """The annotations of the five classes that hold a point, or those that hold none."""
         boxes = self.database.annotations(sample["token"])
-        return [box for box in boxes if _has_points(box) == seen and _class_name(self.database, box) is not None]
+        return [
+            box
+            for box in boxes
+            if _has_points(box) == seen and _class_name(self.database, box) is not None
+        ]
 
-    def _seen(self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations) -> IdentifiedDetections:
+    def _seen(
+        self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations
+    ) -> IdentifiedDetections:
         if self.detections is None:
             return projected_detections(self.cameras, annotations, _shares(self.database, boxes))
-        return self.detections.seen(self.cameras, [recordings[channel] for channel in CHANNELS], annotations)
+        return self.detections.seen(
+            self.cameras, [recordings[channel] for channel in CHANNELS], annotations
+        )
 
 
 def _stage(
@@ -114,7 +139,9 @@ def _recordings(database: Database, sample: Row) -> dict[str, Row]:
     found = database.keyframe_data(sample["token"])
     for channel in (LIDAR, *CHANNELS):
         if channel not in found:
-            raise InvalidInput(f"{database.path('sample_data')}: no {channel} of the sample {sample['token']!r}")
+            raise InvalidInput(
+                f"{database.path('sample_data')}: no {channel} of the sample {sample['token']!r}"
+            )
     return found
 
 
@@ -143,12 +170,14 @@ def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
     intrinsic = database.numbers("calibrated_sensor", token, "camera_intrinsic", 3, 3)
     if not FOCALS[0] <= intrinsic[0, 0] <= FOCALS[1]:
         raise InvalidInput(
-            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose focal length is not within "
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose focal "
+            "length is not within "
             f"{FOCALS[0]:g} and {FOCALS[1]:g} pixels"
         )
     if not all(0 <= middle <= size for middle, size in zip(intrinsic[:2, 2], PICTURE, strict=True)):
         raise InvalidInput(
-            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose principal point lies "
+            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose "
+            "principal point lies "
             f"outside the picture of {PICTURE[0]} x {PICTURE[1]}"
         )
     return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
@@ -168,11 +197,15 @@ def _has_points(box: Row) -> bool:
 
 def _object_numbers(database: Database, samples: list[Row]) -> dict[str, int]:
     """A number for every instance of a scene."""
-    tokens = {box["instance_token"] for sample in samples for box in database.annotations(sample["token"])}
+    tokens = {
+        box["instance_token"] for sample in samples for box in database.annotations(sample["token"])
+    }
     return {token: number for number, token in enumerate(sorted(tokens))}
 
 
-def _annotations(database: Database, boxes: list[Row], numbers: dict[str, int], sensor: Frame) -> Annotations:
+def _annotations(
+    database: Database, boxes: list[Row], numbers: dict[str, int], sensor: Frame
+) -> Annotations:
     rows = np.array([_world_box(database, box) for box in boxes]).reshape(-1, 7)
     classes = [CLASSES.index(str(_class_name(database, box))) for box in boxes]
     objects = [numbers[box["instance_token"]] for box in boxes]
@@ -180,15 +213,21 @@ def _annotations(database: Database, boxes: list[Row], numbers: dict[str, int], 
     away = np.abs(local[:, :3]).max(axis=1, initial=0)
     if (away > AWAY_M[1]).any():
         far = away.argmax()
-        path, token = database.path("sample_annotation"), boxes[far]["token"]
-        raise InvalidInput(f"{path}: {token!r} lies {away[far]:g} m from the LiDAR, may lie {AWAY_M[1]:g} m from it")
+        path = database.path("sample_annotation")
+        token = boxes[far]["token"]
+        raise InvalidInput(
+            f"{path}: {token!r} lies {away[far]:g} m from the LiDAR, may lie {AWAY_M[1]:g} m "
+            "from it"
+        )
     return Annotations(np.array(objects, dtype=np.int64), np.array(classes, dtype=np.int64), local)
 
 
 def _world_box(database: Database, box: Row) -> tuple[float, ...]:
     """Sizes are width, length, height in the table."""
     frame = _frame(database, "sample_annotation", box["token"])
-    width, length, height = database.numbers("sample_annotation", box["token"], "size", 3, within=SIZES_M).tolist()
+    width, length, height = database.numbers(
+        "sample_annotation", box["token"], "size", 3, within=SIZES_M
+    ).tolist()
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 
 
@@ -202,5 +241,8 @@ def _share(database: Database, token: str) -> float:
     level = database.row("visibility", token)["level"]
     if level not in VISIBLE_SHARES:
         known = ", ".join(VISIBLE_SHARES)
-        raise InvalidInput(f"{database.path('visibility')}: {token!r} has the unknown level {level!r}; known: {known}")
+        raise InvalidInput(
+            f"{database.path('visibility')}: {token!r} has the unknown level {level!r}; known: "
+            f"{known}"
+        )
     return VISIBLE_SHARES[level]

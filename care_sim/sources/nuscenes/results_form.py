@@ -1,6 +1,7 @@
 """Detections in the results form of the nuScenes detection task, which the official devkit scores.
 
-The form: https://github.com/nutonomy/nuscenes-devkit/blob/master/python-sdk/nuscenes/eval/detection/README.md
+The form:
+https://github.com/nutonomy/nuscenes-devkit/blob/master/python-sdk/nuscenes/eval/detection/README.md
 """
 
 import numpy as np
@@ -12,8 +13,16 @@ from care_sim.core.types import CLASSES, Detections
 from care_sim.loops.film import Shot
 from care_sim.sources.nuscenes.tables import Row
 
-MODALITIES = {"use_camera": True, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False}
-"""What the form's `meta` must tell. The camera decides where a policy looks, the LiDAR measures the boxes."""
+MODALITIES = {
+    "use_camera": True,
+    "use_lidar": True,
+    "use_radar": False,
+    "use_map": False,
+    "use_external": False,
+}
+"""What the form's `meta` must tell. The camera decides where a policy looks, the LiDAR measures the
+boxes.
+"""
 MOST_BOXES = 500
 """A sample with more is refused."""
 STANDING_MPS = ForgettingRules.static_mps
@@ -26,27 +35,38 @@ ATTRIBUTES = {
     "bicycle": ("cycle.without_rider", "cycle.with_rider"),
     "pedestrian": ("pedestrian.standing", "pedestrian.moving"),
 }
-"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. The others of the eight official
-attributes, a vehicle that only stopped and a person who sits, are nothing that a box and its speed could tell.
+"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. The others of
+the eight official attributes, a vehicle that only stopped and a person who sits, are nothing that a
+box and its speed could tell.
 """
 
 
 def boxes(shot: Shot, detections: Detections, velocities: Floats) -> list[Row]:
-    """The detections (n) of a keyframe as boxes of its sample, surest first, the MOST_BOXES surest of more.
+    """The detections (n) of a keyframe as boxes of its sample, surest first, the MOST_BOXES surest
+    of more.
 
-    `velocities` (n, 2) m/s over ground, in sensor axes. In the form, places, headings and velocities are those of the
-    world, sizes are width, length and height, and a rotation is a quaternion w, x, y, z.
+    `velocities` (n, 2) m/s over ground, in sensor axes. In the form, places, headings and
+    velocities are those of the world, sizes are width, length and height, and a rotation is a
+    quaternion w, x, y, z.
     """
     scores = confidences(detections)
     order = np.argsort(-scores, kind="stable")[:MOST_BOXES]
-    world, moves = shot.sensor.boxes_to_world(detections.boxes), turned(velocities, shot.sensor.yaw)
-    columns = zip(detections.classes[order].tolist(), world[order], moves[order], scores[order].tolist(), strict=True)
+    world = shot.sensor.boxes_to_world(detections.boxes)
+    moves = turned(velocities, shot.sensor.yaw)
+    columns = zip(
+        detections.classes[order].tolist(),
+        world[order],
+        moves[order],
+        scores[order].tolist(),
+        strict=True,
+    )
     return [{"sample_token": shot.token, **_box(CLASSES[label], *rest)} for label, *rest in columns]
 
 
 def confidences(detections: Detections) -> Floats:
-    """(n,) the detector's own scores; for one that has none n / (n + MIN_RETURNS) of n returns: a half where an
-    object begins to count, towards 1 with more, and never 0, which the devkit reads as a recall not reached.
+    """(n,) the detector's own scores; for one that has none n / (n + MIN_RETURNS) of n returns: a
+    half where an object begins to count, towards 1 with more, and never 0, which the devkit reads
+    as a recall not reached.
     """
     if detections.scores is not None:
         return detections.scores

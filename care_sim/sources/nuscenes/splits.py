@@ -7,20 +7,47 @@ from care_sim.base.errors import InvalidInput
 from care_sim.sources.nuscenes.tables import Database, Row, read_json
 
 _VAL_NUMBERS = (
-    (3, 3), (12, 18), (35, 36), (38, 39), (92, 110), (221, 221), (268, 278), (329, 332), (344, 346), (519, 524),
-    (552, 565), (625, 627), (629, 630), (632, 638), (770, 771), (775, 775), (777, 778), (780, 784), (794, 800),
-    (802, 802), (904, 917), (919, 931), (962, 963), (966, 969), (971, 972), (1059, 1073),
-)  # fmt: skip
+    (3, 3),
+    (12, 18),
+    (35, 36),
+    (38, 39),
+    (92, 110),
+    (221, 221),
+    (268, 278),
+    (329, 332),
+    (344, 346),
+    (519, 524),
+    (552, 565),
+    (625, 627),
+    (629, 630),
+    (632, 638),
+    (770, 771),
+    (775, 775),
+    (777, 778),
+    (780, 784),
+    (794, 800),
+    (802, 802),
+    (904, 917),
+    (919, 931),
+    (962, 963),
+    (966, 969),
+    (971, 972),
+    (1059, 1073),
+)
 
-VAL = tuple(f"scene-{number:04}" for first, last in _VAL_NUMBERS for number in range(first, last + 1))
+VAL = tuple(
+    f"scene-{number:04}" for first, last in _VAL_NUMBERS for number in range(first, last + 1)
+)
 """The 150 scenes of the official validation split (nuScenes devkit, utils/splits.py)."""
 
 
 def scenes(database: Database, split: str = "val") -> list[Row]:
-    """The scenes of a split that the database holds, by name: of `val`, of a split in `<root>/<version>/splits.json`
-    (a map from names of splits to lists of names of scenes, which goes before), or `all`.
+    """The scenes of a split that the database holds, by name: of `val`, of a split in
+    `<root>/<version>/splits.json` (a map from names of splits to lists of names of scenes, which
+    goes before), or `all`.
 
-    Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and an empty split.
+    Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and
+    an empty split.
     """
     by_name = {row["name"]: row for row in database.rows("scene").values()}
     own = _own_splits(database)
@@ -28,11 +55,20 @@ def scenes(database: Database, split: str = "val") -> list[Row]:
     check_known("split", split, known)
     for name in known[split]:
         if name not in by_name:
-            where, table = _own_file(database), database.path("scene")
+            where = _own_file(database)
+            table = database.path("scene")
             raise InvalidInput(f"{where}: the split {split!r} names {name!r}, which {table} lacks")
     if not known[split]:
-        held = ", ".join(name for name, names in known.items() if names and by_name.keys() >= set(names)) or "none"
-        raise InvalidInput(f"{database.path('scene')}: holds no scene of the split {split!r}; splits it holds: {held}")
+        held = (
+            ", ".join(
+                name for name, names in known.items() if names and by_name.keys() >= set(names)
+            )
+            or "none"
+        )
+        raise InvalidInput(
+            f"{database.path('scene')}: holds no scene of the split {split!r}; splits it holds: "
+            f"{held}"
+        )
     return [by_name[name] for name in known[split]]
 
 

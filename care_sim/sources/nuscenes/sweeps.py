@@ -15,14 +15,17 @@ VALUES_A_POINT = 5
 LARGEST = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
 OWN_CAR_M = 1.0
-"""Points nearer than this lie on the recording car (the radius within which the devkit drops them from sweeps)."""
+"""Points nearer than this lie on the recording car (the radius within which the devkit drops them
+from sweeps).
+"""
 
 
 def read_points(path: Path) -> Floats:
-    """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is right, y forward.
+    """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is
+    right, y forward.
 
-    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST`, and for a place that is not
-    finite.
+    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST`, and for a
+    place that is not finite.
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such file")
@@ -33,17 +36,26 @@ def read_points(path: Path) -> Floats:
     except OSError as error:
         raise InvalidInput(f"{path}: cannot be read ({error})") from error
     if values.size % (4 * VALUES_A_POINT) or not values.size:
-        raise InvalidInput(f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} bytes")
+        raise InvalidInput(
+            f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} "
+            "bytes"
+        )
     places = values.view("<f4").reshape(-1, VALUES_A_POINT)[:, :3]
-    finite = np.isfinite(places).all(axis=1)  # before they are cast, which warns of a NaN that signals
+    finite = np.isfinite(places).all(
+        axis=1
+    )  # before they are cast, which warns of a NaN that signals
     if not finite.all():
         raise InvalidInput(f"{path}: point {finite.argmin()} has a place that is not finite")
     points = places.astype(float)
     return np.column_stack([points[:, 1], -points[:, 0], points[:, 2]])
 
 
-def recorded_cloud(points: Floats, grid: AngularGrid, annotations: Annotations, sensor: Frame) -> Cloud:
-    """The points (n, 3) that a ray of `grid` could have returned, each with the annotated box that it lies in."""
+def recorded_cloud(
+    points: Floats, grid: AngularGrid, annotations: Annotations, sensor: Frame
+) -> Cloud:
+    """The points (n, 3) that a ray of `grid` could have returned, each with the annotated box that
+    it lies in.
+    """
     ranges = np.linalg.norm(points, axis=1)
     cells = grid.cells_of(points)
     (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & (ranges <= grid.range_m))
@@ -52,7 +64,8 @@ def recorded_cloud(points: Floats, grid: AngularGrid, annotations: Annotations, 
 
 
 def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Cells:
-    """(n,) the annotated object whose box holds each point (n, 3), the smallest of several, NOBODY where there is none.
+    """(n,) the annotated object whose box holds each point (n, 3), the smallest of several, NOBODY
+    where there is none.
 
     Boxes stand upright in the world, however the frame `sensor` of points and annotations leans.
     """
@@ -61,7 +74,10 @@ def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Cells:
     places = KDTree(sensor.origin + sensor.vectors_to_world(points))
     near = places.query_ball_point(boxes[:, :3], np.linalg.norm(boxes[:, 3:6], axis=1) / 2)
     for row in np.argsort(-boxes[:, 3:6].prod(axis=1), kind="stable").tolist():
-        box, rows = boxes[row], np.array(near[row], dtype=np.int64)
-        inside = np.all(np.abs(turned(places.data[rows] - box[:3], -box[6])) <= box[3:6] / 2, axis=1)
+        box = boxes[row]
+        rows = np.array(near[row], dtype=np.int64)
+        inside = np.all(
+            np.abs(turned(places.data[rows] - box[:3], -box[6])) <= box[3:6] / 2, axis=1
+        )
         found[rows[inside]] = annotations.objects[row]
     return found

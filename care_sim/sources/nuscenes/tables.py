@@ -1,4 +1,4 @@
-"""The JSON tables of a nuScenes v1.0 database; a token that points nowhere is named with its file."""
+"""The JSON tables of a nuScenes v1.0 database. Errors name the file and the token."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,7 +18,9 @@ Row = dict[str, Any]
 
 ANY: Range = (float("-inf"), float("inf"))
 LARGEST_TABLE = 2**33
-"""Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of half a kilobyte)."""
+"""Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of
+half a kilobyte).
+"""
 
 FIELDS: dict[str, dict[str, type]] = {
     "scene": {"name": str, "first_sample_token": str, "last_sample_token": str},
@@ -30,7 +32,12 @@ FIELDS: dict[str, dict[str, type]] = {
         "filename": str,
         "is_key_frame": bool,
     },
-    "calibrated_sensor": {"sensor_token": str, "translation": list, "rotation": list, "camera_intrinsic": list},
+    "calibrated_sensor": {
+        "sensor_token": str,
+        "translation": list,
+        "rotation": list,
+        "camera_intrinsic": list,
+    },
     "sensor": {"channel": str},
     "ego_pose": {"translation": list, "rotation": list},
     "sample_annotation": {
@@ -51,10 +58,11 @@ FIELDS: dict[str, dict[str, type]] = {
 
 
 class Database:
-    """The tables of `<root>/<version>`. Without a version, the only folder `v1.0-*` in the root is taken.
+    """The tables of `<root>/<version>`. Without a version, the only folder `v1.0-*` in the root is
+    taken.
 
-    Raises InvalidInput for a missing or truncated table, a row without a field or with another kind of value in it, a
-    token that points nowhere.
+    Raises InvalidInput for a missing or truncated table, a row without a field or with another kind
+    of value in it, a token that points nowhere.
     """
 
     def __init__(self, root: Path, version: str | None = None):
@@ -67,7 +75,9 @@ class Database:
         return self.folder / f"{table}.json"
 
     def rows(self, table: str) -> dict[str, Row]:
-        """The rows of a table by token. Of recordings and car poses only those of keyframes: one in six."""
+        """The rows of a table by token. Of recordings and car poses only those of keyframes: one in
+        six.
+        """
         if table not in self._tables:
             self._tables[table] = self._read(table)
         return self._tables[table]
@@ -79,7 +89,9 @@ class Database:
             raise InvalidInput(f"{self.path(table)}: no row with the token {token!r}")
         return rows[token]
 
-    def numbers(self, table: str, token: str, field: str, *shape: int, within: Range = ANY) -> Floats:
+    def numbers(
+        self, table: str, token: str, field: str, *shape: int, within: Range = ANY
+    ) -> Floats:
         """A field of finite numbers as an array of `shape`, all in the range `within`."""
         found = self.row(table, token)[field]
         try:
@@ -88,7 +100,9 @@ class Database:
             values = np.empty(0)
         if values.shape != shape or values.dtype.kind not in "if" or not np.isfinite(values).all():
             wanted = " x ".join(map(str, shape))
-            raise InvalidInput(f"{self.path(table)}: {token!r} has no {field} of {wanted} finite numbers")
+            raise InvalidInput(
+                f"{self.path(table)}: {token!r} has no {field} of {wanted} finite numbers"
+            )
         least, most = within
         beyond = values[(values < least) | (values > most)]
         if beyond.size:
@@ -102,7 +116,9 @@ class Database:
 
     def sensor_of(self, data: Row) -> Row:
         """The sensor that made a recording."""
-        return self.row("sensor", self.row("calibrated_sensor", data["calibrated_sensor_token"])["sensor_token"])
+        return self.row(
+            "sensor", self.row("calibrated_sensor", data["calibrated_sensor_token"])["sensor_token"]
+        )
 
     def annotations(self, sample: str) -> Sequence[Row]:
         """The annotated boxes of a sample, one an instance."""
@@ -110,7 +126,9 @@ class Database:
         for token, count in Counter(box["instance_token"] for box in boxes).items():
             if count > 1:
                 table = self.path("sample_annotation")
-                raise InvalidInput(f"{table}: the sample {sample!r} holds the instance {token!r} {count} times")
+                raise InvalidInput(
+                    f"{table}: the sample {sample!r} holds the instance {token!r} {count} times"
+                )
         return boxes
 
     def samples(self, scene: Row) -> list[Row]:
@@ -121,21 +139,33 @@ class Database:
             row = self.row("sample", token)
             _check_stamp(self.path("sample"), row)
             if found and row["timestamp"] <= found[-1]["timestamp"]:
-                raise InvalidInput(f"{self.path('sample')}: {token!r} is no later than the sample before it")
+                raise InvalidInput(
+                    f"{self.path('sample')}: {token!r} is no later than the sample before it"
+                )
             found.append(row)
             token = row["next"]
         if found[-1]["token"] != scene["last_sample_token"]:
-            end, wanted = found[-1]["token"], scene["last_sample_token"]
-            raise InvalidInput(f"{self.path('sample')}: {scene['name']} ends with {end!r}, and should with {wanted!r}")
+            end = found[-1]["token"]
+            wanted = scene["last_sample_token"]
+            raise InvalidInput(
+                f"{self.path('sample')}: {scene['name']} ends with {end!r}, and should with "
+                f"{wanted!r}"
+            )
         check_span(self.path("sample"), (found[-1]["timestamp"] - found[0]["timestamp"]) * 1e-6)
         return found
 
     def _read(self, table: str) -> dict[str, Row]:
-        """The rows and fields that are needed; whatever else a table holds is dropped while it is parsed."""
+        """The rows and fields that are needed; whatever else a table holds is dropped while it is
+        parsed.
+        """
         kinds = {"token": str, **FIELDS[table]}
 
         def taken(row: Row) -> object:
-            return {name: row[name] for name in kinds if name in row} if self._is_needed(table, row) else _DROPPED
+            return (
+                {name: row[name] for name in kinds if name in row}
+                if self._is_needed(table, row)
+                else _DROPPED
+            )
 
         return _indexed(self.path(table), read_json(self.path(table), taken), kinds)
 
@@ -151,7 +181,11 @@ class Database:
     @cached_property
     def pictures(self) -> frozenset[str]:
         """The tokens and the file names of all recordings of keyframes."""
-        return frozenset(name for token, row in self.rows("sample_data").items() for name in (token, row["filename"]))
+        return frozenset(
+            name
+            for token, row in self.rows("sample_data").items()
+            for name in (token, row["filename"])
+        )
 
     @cached_property
     def _data_of_samples(self) -> dict[str, list[Row]]:
@@ -187,7 +221,9 @@ def _only_version(root: Path) -> Path:
     versions = sorted(path for path in root.glob("v1.0-*") if path.is_dir())
     if len(versions) != 1:
         found = ", ".join(path.name for path in versions) or "none"
-        raise InvalidInput(f"{root}: must hold one folder v1.0-*, or the version must be named; found: {found}")
+        raise InvalidInput(
+            f"{root}: must hold one folder v1.0-*, or the version must be named; found: {found}"
+        )
     return versions[0]
 
 
@@ -211,7 +247,11 @@ def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str
 
 def _what_is_wrong(row: Row, number: int, name: str, kind: type) -> str:
     which = f"row {row.get('token') or number}"
-    return f"{which}: {name} must be {KINDS[kind]}, got {row[name]!r}" if name in row else f"{which} lacks {name!r}"
+    return (
+        f"{which}: {name} must be {KINDS[kind]}, got {row[name]!r}"
+        if name in row
+        else f"{which} lacks {name!r}"
+    )
 
 
 KINDS = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}

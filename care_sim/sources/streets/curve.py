@@ -11,9 +11,9 @@ from care_sim.core.frames import Floats, Pose, turned
 class Curve:
     """A straight, one bend, and a straight again. Metres and radians.
 
-    Road coordinates: `s` along the line, `d` to its left, headings relative to its own. The line begins at the
-    world pose `start` with s = 0; it bends from `bend_at` on for `bend_length` with `curvature` (1/m, positive to
-    the left). Before 0 and after the bend it goes on straight.
+    Road coordinates: `s` along the line, `d` to its left, headings relative to its own. The line
+    begins at the world pose `start` with s = 0; it bends from `bend_at` on for `bend_length` with
+    `curvature` (1/m, positive to the left). Before 0 and after the bend it goes on straight.
     """
 
     start: Pose = (0.0, 0.0, 0.0)
@@ -36,7 +36,10 @@ class Curve:
         along = np.clip(s - self.bend_at, 0.0, self.bend_length)
         turn = self.curvature * along
         chord = along * np.sinc(turn / (2 * np.pi))
-        before, after = np.minimum(s, self.bend_at), np.maximum(s - self.bend_at - self.bend_length, 0.0)
+        before, after = (
+            np.minimum(s, self.bend_at),
+            np.maximum(s - self.bend_at - self.bend_length, 0.0),
+        )
         x = before + chord * np.cos(turn / 2) + after * np.cos(turn) - d * np.sin(turn)
         y = chord * np.sin(turn / 2) + after * np.sin(turn) + d * np.cos(turn)
         world = turned(np.stack([x, y], axis=-1), self.start[2]) + self.start[:2]
@@ -47,8 +50,9 @@ class Curve:
 class Walked:
     """A way covered at constant `speed` (m/s): a person's or a cyclist's.
 
-    `corners` (k, 2) are s and d of the way's corners on `curve`; the walker is at its beginning at `starts_s` and
-    stands at either end before and after. Distances are measured in the world, so that the speed holds in a bend.
+    `corners` (k, 2) are s and d of the way's corners on `curve`; the walker is at its beginning at
+    `starts_s` and stands at either end before and after. Distances are measured in the world, so
+    that the speed holds in a bend.
     """
 
     curve: Curve
@@ -69,10 +73,15 @@ class Walked:
         return np.column_stack([x, y, np.arctan2(legs[leg, 1], legs[leg, 0])])
 
     def _points(self) -> Floats:
-        """(n, 2) world points of the way, at most about a stride apart, so that it follows a bend."""
+        """(n, 2) world points of the way, about a stride apart at most, to follow bends."""
         places = [np.array([*self.corners[0], 0.0])]
         for start, end in zip(self.corners, self.corners[1:], strict=False):
-            pieces = max(int(np.ceil(np.hypot(end[0] - start[0], end[1] - start[1]) / self.STRIDE_M)), 1)
+            pieces = max(
+                int(np.ceil(np.hypot(end[0] - start[0], end[1] - start[1]) / self.STRIDE_M)), 1
+            )
             shares = np.arange(1, pieces + 1) / pieces
-            places += [np.array([*(np.array(start) + share * (np.array(end) - start)), 0.0]) for share in shares]
+            places += [
+                np.array([*(np.array(start) + share * (np.array(end) - start)), 0.0])
+                for share in shares
+            ]
         return self.curve.to_world(np.array(places))[:, :2]

@@ -1,4 +1,6 @@
-"""A street while it is being drawn: what stands and moves where, and whether there is room for more."""
+"""A street while it is being drawn: what stands and moves where, and whether there is room for
+more.
+"""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +11,9 @@ from care_sim.core.frames import Floats
 from care_sim.world.bodies import CATALOGUE
 
 STEP_S = 0.1
-"""Between two samples of a way: at 30 km/h a car moves 0.8 m in it, so that nobody steps through a car unseen."""
+"""Between two samples of a way: at 30 km/h a car moves 0.8 m in it, so that nobody steps through a
+car unseen.
+"""
 KEYFRAME_S = 0.5
 KEYFRAMES = 40
 """20 s at 2 Hz, as the scenes of nuScenes (paper, Sec. 5.1)."""
@@ -20,14 +24,21 @@ Footprint = tuple[float, float]
 """Length and width in metres."""
 
 
-def footprints_meet(poses: Floats, size: Floats, others: Floats, other_sizes: Floats, gap: Floats) -> NDArray[np.bool_]:
-    """(n,) whether rectangles come closer than `gap` (n,) along every axis (separating axis theorem).
+def footprints_meet(
+    poses: Floats, size: Floats, others: Floats, other_sizes: Floats, gap: Floats
+) -> NDArray[np.bool_]:
+    """(n,) whether rectangles come closer than `gap` (n,) along every axis (separating axis
+    theorem).
 
-    `poses` (n, 3) and `others` (n, 3) are x, y, heading; `size` and `other_sizes` (n, 2) length and width.
+    `poses` (n, 3) and `others` (n, 3) are x, y, heading; `size` and `other_sizes` (n, 2) length and
+    width.
     """
     meet = np.ones(len(poses), dtype=bool)
     for angle in (poses[:, 2], poses[:, 2] + np.pi / 2, others[:, 2], others[:, 2] + np.pi / 2):
-        apart = np.abs((others[:, 0] - poses[:, 0]) * np.cos(angle) + (others[:, 1] - poses[:, 1]) * np.sin(angle))
+        apart = np.abs(
+            (others[:, 0] - poses[:, 0]) * np.cos(angle)
+            + (others[:, 1] - poses[:, 1]) * np.sin(angle)
+        )
         meet &= apart < _reach(poses, size, angle) + _reach(others, other_sizes, angle) + gap
     return meet
 
@@ -40,7 +51,9 @@ def _reach(poses: Floats, sizes: Floats, angle: Floats) -> Floats:
 
 @dataclass
 class Crowd:
-    """Footprints with their ways: lists that grow together. A way is (1, 3) for what stands, else (t, 3)."""
+    """Footprints with their ways: lists that grow together. A way is (1, 3) for what stands, else
+    (t, 3).
+    """
 
     ways: list[Floats] = field(default_factory=list)
     sizes: list[Footprint] = field(default_factory=list)
@@ -56,30 +69,39 @@ class Crowd:
         """Whether a footprint on `way` ever comes too close to one of these."""
         if not self.ways:
             return False
-        sizes, berths = np.array(self.sizes), np.array(self.berths)
+        sizes = np.array(self.sizes)
+        berths = np.array(self.berths)
         places = np.stack(self.ways)
         apart = np.hypot(places[..., 0] - way[:, 0], places[..., 1] - way[:, 1])
         reach = (np.hypot(*sizes.T) + np.hypot(*size)) / 2 + np.sqrt(2) * berths
         who, when = np.nonzero(apart < reach[:, None])
         mine = way[when if len(way) > 1 else np.zeros_like(when)]
         theirs = places[who, when if places.shape[1] > 1 else np.zeros_like(when)]
-        return bool(footprints_meet(mine, np.broadcast_to(size, (len(who), 2)), theirs, sizes[who], berths[who]).any())
+        return bool(
+            footprints_meet(
+                mine, np.broadcast_to(size, (len(who), 2)), theirs, sizes[who], berths[who]
+            ).any()
+        )
 
 
 TOUCH_M = 0.01
 """Things that stand may come as close as this."""
 SQUEEZE_M = 0.15
-"""What a walker leaves at least on each side of a gap between things that stand: a hand's breadth."""
+"""Least room of a walker on each side of a gap between things that stand: a hand's breadth."""
 
 
 class Draft:
-    """Bodies by kind with their ways, the ground that must stay free, and the generator that draws them."""
+    """Bodies by kind with their ways, the ground that must stay free, and the generator that draws
+    them.
+    """
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
         self.kinds: list[str] = []
         self.ways: list[Floats] = []
-        self._fixed, self._moving, self._reserved = Crowd(), Crowd(), Crowd()
+        self._fixed = Crowd()
+        self._moving = Crowd()
+        self._reserved = Crowd()
 
     def reserve(self, pose: Floats, size: Footprint) -> None:
         """Keep a rectangle free of everything that stands: a carriageway, a junction."""
@@ -91,17 +113,26 @@ class Draft:
 
     def stand(self, kind: str, pose: Floats) -> bool:
         """Put a body at a pose (3,) if there is room; says whether there was."""
-        way, size = pose.reshape(1, 3), _footprint(kind)
-        if self._reserved.meets(way, size) or self._fixed.meets(way, size) or self._moving.meets(way, size):
+        way = pose.reshape(1, 3)
+        size = _footprint(kind)
+        if (
+            self._reserved.meets(way, size)
+            or self._fixed.meets(way, size)
+            or self._moving.meets(way, size)
+        ):
             return False
         self._fixed.add(way, size, TOUCH_M)
         self._keep(kind, np.repeat(way, len(TIMES), axis=0))
         return True
 
     def move(self, kind: str, way: Floats, berth: float) -> bool:
-        """Let a body follow a way (t, 3) if nothing ever stands or passes there; says whether it could."""
+        """Let a body follow a way (t, 3) if nothing ever stands or passes there; says whether it
+        could.
+        """
         size = _footprint(kind)
-        if self._fixed.meets(way, (size[0] + 2 * SQUEEZE_M, size[1] + 2 * SQUEEZE_M)) or self._moving.meets(way, size):
+        if self._fixed.meets(
+            way, (size[0] + 2 * SQUEEZE_M, size[1] + 2 * SQUEEZE_M)
+        ) or self._moving.meets(way, size):
             return False
         self.drive(kind, way, berth)
         return True

@@ -1,8 +1,9 @@
-"""Who drives: the ego on its script, highway-env traffic on every road, and the flow that fills the lanes.
+"""Who drives: the ego on its script, highway-env traffic on every road, and the flow that fills the
+lanes.
 
-Each road has a traffic of its own, unrolled onto a straight line and rolled back onto the road's curve; highway-env's
-cost grows with the square of the vehicles on a road. The lane of a bend that is not the reference line is a few per
-cent longer or shorter than its unrolled one.
+Each road has a traffic of its own, unrolled onto a straight line and rolled back onto the road's
+curve; highway-env's cost grows with the square of the vehicles on a road. The lane of a bend that
+is not the reference line is a few per cent longer or shorter than its unrolled one.
 """
 
 from dataclasses import dataclass
@@ -20,35 +21,44 @@ from care_sim.world.traffic import RoadVehicle, Traffic
 
 EGO_CRUISE_MPS: Range = (3.5, SPEED_LIMIT_MPS)
 EGO_HALT_CHANCE, EGO_HALT_AT_S, EGO_HALT_S = 0.5, (3.0, 14.0), (3.0, 8.0)
-"""The ego cruises; in every other scene it comes to rest once, as before a light. Together with the cruising
-speeds that makes about 16 km/h on average, that of the drives of nuScenes (Caesar et al. 2020, Sec. 2)."""
+"""The ego cruises; in every other scene it comes to rest once, as before a light. Together with the
+cruising speeds that makes about 16 km/h on average, that of the drives of nuScenes (Caesar et al.
+2020, Sec. 2)."""
 EGO_BRAKING_MPS2, EGO_STARTING_MPS2 = 2.0, 1.5
-"""Comfortable: less than half of what the closed loop's controller brakes with, and a usual start in town."""
+"""Comfortable: less than half of what the closed loop's controller brakes with, and a usual start
+in town.
+"""
 
 FLOW_PER_H: Range = (200.0, 400.0)
-"""Vehicles an hour in a direction of the main road: half the 400 to 800 of both that RASt 06 gives for a collector
-street. Their spacing is exponential beyond HEADWAY_S (Cowan 1975)."""
+"""Vehicles an hour in a direction of the main road: half the 400 to 800 of both that RASt 06 gives
+for a collector street. Their spacing is exponential beyond HEADWAY_S (Cowan 1975)."""
 SIDE_FLOW_PER_H: Range = (50.0, 200.0)
 """In a side street: up to the 400 an hour in both directions of a residential street (RASt 06)."""
 HEADWAY_S = 3.0
-"""Least time between vehicles: what the IDM drivers keep in equilibrium at 30 km/h, so that nobody brakes at once."""
+"""Least time between vehicles: what the IDM drivers keep in equilibrium at 30 km/h, so that nobody
+brakes at once.
+"""
 DRIVER_MPS: Range = (7.0, SPEED_LIMIT_MPS)
-"""What oncoming drivers want in a 30 km/h zone. Those in the ego's lane keep the limit: the ego does not react, and
-none of them may hold it up."""
+"""What oncoming drivers want in a 30 km/h zone. Those in the ego's lane keep the limit: the ego
+does not react, and none of them may hold it up."""
 TRAFFIC_KINDS = {"car": 0.78, "van": 0.08, "truck": 0.08, "bus": 0.06}
-"""Shares in moving traffic. Annotations of nuScenes with attribute moving or stopped: 161 thousand cars, 33 thousand
-trucks (which cover vans: half each), 13 thousand buses."""
+"""Shares in moving traffic. Annotations of nuScenes with attribute moving or stopped: 161 thousand
+cars, 33 thousand trucks (which cover vans: half each), 13 thousand buses."""
 VEHICLE_BERTH_M = 0.5
 """What people on foot or bicycle leave at least between themselves and a driving vehicle."""
 LEAD_M: Range = (28.0, 60.0)
 """From the ego to the next vehicle ahead: beyond the gap that the IDM wants at 30 km/h."""
 BEYOND_M = 70.0
-"""The street is inhabited this far before the ego's first and beyond its last place: sight ends at 50 m."""
+"""The street is inhabited this far before the ego's first and beyond its last place: sight ends at
+50 m.
+"""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """The ego's scripted drive at every sample: world `poses` (t, 3), `motion`, and metres along the main road."""
+    """The ego's scripted drive at every sample: world `poses` (t, 3), `motion`, and metres along
+    the main road.
+    """
 
     poses: Floats
     motion: tuple[Ego, ...]
@@ -57,13 +67,17 @@ class Drive:
 
 def ego_speeds(rng: np.random.Generator) -> Floats:
     """(t,) the ego's speed at every sample, m/s."""
-    cruise, halts = draw(rng, EGO_CRUISE_MPS), rng.random() < EGO_HALT_CHANCE
+    cruise = draw(rng, EGO_CRUISE_MPS)
+    halts = rng.random() < EGO_HALT_CHANCE
     begins = draw(rng, EGO_HALT_AT_S)
     ends = begins + cruise / EGO_BRAKING_MPS2 + draw(rng, EGO_HALT_S)
     speeds = [cruise]
     for time in TIMES[:-1]:
         wanted = 0.0 if halts and begins <= time < ends else cruise
-        least, most = speeds[-1] - EGO_BRAKING_MPS2 * STEP_S, speeds[-1] + EGO_STARTING_MPS2 * STEP_S
+        least, most = (
+            speeds[-1] - EGO_BRAKING_MPS2 * STEP_S,
+            speeds[-1] + EGO_STARTING_MPS2 * STEP_S,
+        )
         speeds.append(float(np.clip(wanted, least, most)))
     return np.array(speeds)
 
@@ -72,7 +86,9 @@ def drive_main(draft: Draft, plan: Plan) -> Drive:
     """Drive the ego and the main road's traffic; the ego's way is kept clear of walkers."""
     speeds = ego_speeds(draft.rng)
     reach = float(speeds.sum() * STEP_S)
-    traffic = Traffic(plan.main.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
+    traffic = Traffic(
+        plan.main.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS
+    )
     ego = traffic.add_ego(0.0, speeds[0], CATALOGUE["ego"])
     drivers = _queue(draft, traffic, reach)
     if len(plan.main.directions) > 1:
@@ -86,16 +102,21 @@ def drive_main(draft: Draft, plan: Plan) -> Drive:
 
 
 def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
-    """Drive a side street's traffic: some leave along it, some come up to the main road and give way.
+    """Drive a side street's traffic: some leave along it, some come up to the main road and give
+    way.
 
     They wait before its pavement.
     """
     road = joining.road
     nearest = main.side(joining.sign).boundary_m
-    traffic = Traffic(road.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
+    traffic = Traffic(
+        road.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS
+    )
     leaving = _places(draft, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
     coming = _places(draft, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
-    drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [_driver(draft, traffic, s, 1) for s in coming]
+    drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [
+        _driver(draft, traffic, s, 1) for s in coming
+    ]
     if coming:
         first = CATALOGUE[drivers[len(leaving)][0]]
         traffic.add_stop_line(nearest + first.size[0] / 2, 1)
@@ -124,21 +145,26 @@ def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
 def _places(draft: Draft, flow_per_h: Range, first: float, last: float) -> list[float]:
     """Places along a lane, from `first` to `last`, of vehicles that flow at the speed limit."""
     mean_s = 3600.0 / draw(draft.rng, flow_per_h)
-    places, place = [], first + draft.rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
+    places = []
+    place = first + draft.rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
     while place < last:
         places.append(float(place))
         place += (HEADWAY_S + draft.rng.exponential(mean_s - HEADWAY_S)) * SPEED_LIMIT_MPS
     return places
 
 
-def _driver(draft: Draft, traffic: Traffic, s: float, lane: int, speed: float | None = None) -> Driver:
+def _driver(
+    draft: Draft, traffic: Traffic, s: float, lane: int, speed: float | None = None
+) -> Driver:
     kind = str(draft.rng.choice(list(TRAFFIC_KINDS), p=list(TRAFFIC_KINDS.values())))
     wanted = draw(draft.rng, DRIVER_MPS) if speed is None else speed
     return kind, traffic.add_driver(s, lane, wanted, CATALOGUE[kind])
 
 
 def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | None = None) -> Floats:
-    """(t, n, 3) road places of vehicles at every sample; the first one is the ego when it has speeds."""
+    """(t, n, 3) road places of vehicles at every sample; the first one is the ego when it has
+    speeds.
+    """
     ways = np.empty((len(TIMES), len(vehicles), 3))
     for sample in range(len(TIMES)):
         ways[sample] = np.array([vehicle.pose for vehicle in vehicles]).reshape(-1, 3)
@@ -150,7 +176,12 @@ def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | Non
 
 def _drive(curve: Curve, way: Floats, speeds: Floats) -> Drive:
     along = way[:, 0]
-    rates = [speed * curve.curvature_at(s) for s, speed in zip(along.tolist(), speeds.tolist(), strict=True)]
+    rates = [
+        speed * curve.curvature_at(s)
+        for s, speed in zip(along.tolist(), speeds.tolist(), strict=True)
+    ]
     accelerations = np.diff(speeds, prepend=speeds[0]) / STEP_S
-    motion = tuple(Ego(*values) for values in zip(speeds.tolist(), rates, accelerations.tolist(), strict=True))
+    motion = tuple(
+        Ego(*values) for values in zip(speeds.tolist(), rates, accelerations.tolist(), strict=True)
+    )
     return Drive(curve.to_world(way), motion, along)

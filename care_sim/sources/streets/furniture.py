@@ -1,4 +1,4 @@
-"""What stands: houses, hedges, parked vehicles, a bus at its stop. Rows are filled from end to end."""
+"""What stands beside a road: houses, hedges, parked vehicles, a bus at its stop."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,20 +11,24 @@ from care_sim.sources.streets.layouts import Joining, Plan, Road, Side
 from care_sim.world.bodies import CATALOGUE
 
 OCCUPANCY: Range = (0.1, 0.85)
-"""Share of a parking lane that is taken, drawn a side: from a nearly empty street up to the 85 % at which Shoup
-(2005, The High Cost of Free Parking) calls one full."""
+"""Share of a parking lane that is taken, drawn a side: from a nearly empty street up to the 85 % at
+which Shoup (2005, The High Cost of Free Parking) calls one full."""
 PARKING_GAP_M: Range = (0.6, 1.6)
 """Between bumpers: with the mean car, the 5.7 m that RASt 06 gives a vehicle along the kerb."""
 PARKED_KINDS = {"car": 0.86, "van": 0.09, "truck": 0.05}
-"""Annotations of nuScenes with attribute parked: 330 thousand cars, 56 thousand trucks (which cover vans: two in
-three of those that park in a street)."""
+"""Annotations of nuScenes with attribute parked: 330 thousand cars, 56 thousand trucks (which cover
+vans: two in three of those that park in a street)."""
 OFF_KERB_M: Range = (-0.15, 0.15)
 OFF_LINE: Range = (-0.03, 0.03)
-"""How far a parked vehicle stands off the middle of its lane, metres, and off its direction, radians."""
+"""How far a parked vehicle stands off the middle of its lane, metres, and off its direction,
+radians.
+"""
 YARD_CHANCE, YARD_M = 0.2, (3.0, 7.0)
 """Between two blocks of a closed front, now and then: an entrance to a yard."""
 HOUSE_GAP_M: Range = (6.0, 12.0)
-"""Between detached houses: twice the 3 m that German building codes keep from a boundary, and a garage."""
+"""Between detached houses: twice the 3 m that German building codes keep from a boundary, and a
+garage.
+"""
 GATE_M: Range = (1.0, 3.5)
 """Openings in a hedge, between every other two of its pieces: a gate, or a drive."""
 GATE_CHANCE = 0.5
@@ -56,18 +60,22 @@ def furnish(draft: Draft, plan: Plan, span: Span) -> None:
     for joining in plan.joinings:
         beside = plan.main.side(joining.sign)
         for side in joining.road.sides:
-            _line_with_houses(draft, joining.road, side, (beside.front_m, beside.front_m + JOINING_M))
+            _line_with_houses(
+                draft, joining.road, side, (beside.front_m, beside.front_m + JOINING_M)
+            )
             _park(draft, joining.road, side, (beside.kerb_m + CORNER_M, beside.front_m + JOINING_M))
 
 
 def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road) -> None:
     """Keep a side street's carriageway free, and the main road's parking lane at its corners."""
     road, (right, left) = joining.road, joining.road.sides
-    kerb, corners = main.side(joining.sign).kerb_m, right.kerb_m + left.kerb_m + 2 * CORNER_M
+    kerb = main.side(joining.sign).kerb_m
+    corners = right.kerb_m + left.kerb_m + 2 * CORNER_M
     draft.reserve(road.curve.to_world(np.array([kerb / 2, road.middle_d, 0.0])), (kerb, corners))
     middle = (left.lane_edge_m - right.lane_edge_m) / 2
     draft.reserve(
-        road.curve.to_world(np.array([JOINING_M, middle, 0.0])), (2 * JOINING_M, left.lane_edge_m + right.lane_edge_m)
+        road.curve.to_world(np.array([JOINING_M, middle, 0.0])),
+        (2 * JOINING_M, left.lane_edge_m + right.lane_edge_m),
     )
 
 
@@ -79,8 +87,9 @@ def _stop_bus(draft: Draft, road: Road, span: Span) -> None:
 
 @dataclass(frozen=True)
 class _Row:
-    """Bodies one behind another at `d`, facing `heading`: draws of the next kind (None leaves a car's room) and of the
-    next gap; how far they stand `off` the row, metres, and `turned` off it, radians.
+    """Bodies one behind another at `d`, facing `heading`: draws of the next kind (None leaves a
+    car's room) and of the next gap; how far they stand `off` the row, metres, and `turned` off it,
+    radians.
     """
 
     d: float
@@ -92,11 +101,17 @@ class _Row:
 
     def fill(self, draft: Draft, road: Road, span: Span) -> None:
         """Fill the row from end to end; what finds no room tries further on."""
-        s, kind = span[0] + draw(draft.rng, START_M), self.next_kind()
+        s = span[0] + draw(draft.rng, START_M)
+        kind = self.next_kind()
         while s < span[1]:
-            length = CATALOGUE[kind or "car"].size[0] * (1 + abs(road.curve.curvature_at(s) * self.d))
-            d, heading = self.d + draw(draft.rng, self.off), self.heading + draw(draft.rng, self.turned)
-            if kind is None or draft.stand(kind, road.curve.to_world(np.array([s + length / 2, d, heading]))):
+            length = CATALOGUE[kind or "car"].size[0] * (
+                1 + abs(road.curve.curvature_at(s) * self.d)
+            )
+            d = self.d + draw(draft.rng, self.off)
+            heading = self.heading + draw(draft.rng, self.turned)
+            if kind is None or draft.stand(
+                kind, road.curve.to_world(np.array([s + length / 2, d, heading]))
+            ):
                 s += length + self.next_gap()
                 kind = self.next_kind()
             else:
@@ -107,12 +122,14 @@ def _line_with_houses(draft: Draft, road: Road, side: Side, span: Span) -> None:
     """A closed front at the pavement, or detached houses behind gardens with hedges."""
     rng = draft.rng
     if not side.garden_m:
-        _outside(side.front_m, side, "building", lambda: _now_and_then(rng, YARD_CHANCE, YARD_M)).fill(
-            draft, road, span
-        )
+        _outside(
+            side.front_m, side, "building", lambda: _now_and_then(rng, YARD_CHANCE, YARD_M)
+        ).fill(draft, road, span)
         return
     _outside(side.front_m, side, "house", lambda: draw(rng, HOUSE_GAP_M)).fill(draft, road, span)
-    _outside(side.boundary_m, side, "hedge", lambda: _now_and_then(rng, GATE_CHANCE, GATE_M)).fill(draft, road, span)
+    _outside(side.boundary_m, side, "hedge", lambda: _now_and_then(rng, GATE_CHANCE, GATE_M)).fill(
+        draft, road, span
+    )
 
 
 def _outside(edge_m: float, side: Side, kind: str, next_gap: Callable[[], float]) -> _Row:
@@ -121,16 +138,22 @@ def _outside(edge_m: float, side: Side, kind: str, next_gap: Callable[[], float]
 
 
 def _park(draft: Draft, road: Road, side: Side, span: Span) -> None:
-    """Fill a parking lane; the taken share of it is drawn a side. Vehicles face as the nearest lane leads."""
-    rng, occupancy = draft.rng, draw(draft.rng, OCCUPANCY)
+    """Fill a parking lane; the taken share of it is drawn a side. Vehicles face as the nearest lane
+    leads.
+    """
+    rng = draft.rng
+    occupancy = draw(draft.rng, OCCUPANCY)
     lane = road.directions[0] if side.sign < 0 else road.directions[-1]
-    kinds, shares = list(PARKED_KINDS), list(PARKED_KINDS.values())
+    kinds = list(PARKED_KINDS)
+    shares = list(PARKED_KINDS.values())
 
     def next_kind() -> str | None:
         return str(rng.choice(kinds, p=shares)) if rng.random() < occupancy else None
 
     heading = 0.0 if lane > 0 else np.pi
-    row = _Row(side.parking_d, next_kind, lambda: draw(rng, PARKING_GAP_M), heading, OFF_KERB_M, OFF_LINE)
+    row = _Row(
+        side.parking_d, next_kind, lambda: draw(rng, PARKING_GAP_M), heading, OFF_KERB_M, OFF_LINE
+    )
     row.fill(draft, road, span)
 
 

@@ -1,7 +1,8 @@
-"""Road layouts: which roads a scene has and how they are divided. Drawn first; everything else is placed on them.
+"""Road layouts: which roads a scene has and how they are divided. Drawn first; everything else is
+placed on them.
 
-A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right. Widths follow
-the German RASt 06 (directives for urban streets), as in `care_sim.scenarios.base`.
+A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right.
+Widths follow the German RASt 06 (directives for urban streets), as in `care_sim.scenarios.base`.
 """
 
 from collections.abc import Callable
@@ -36,7 +37,9 @@ EVEN_CHANCE = 0.5
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a road, from the edge of its outer lane outwards; `sign` is +1 on the left, -1 on the right."""
+    """One side of a road, from the edge of its outer lane outwards; `sign` is +1 on the left, -1 on
+    the right.
+    """
 
     sign: int
     lane_edge_m: float
@@ -73,7 +76,9 @@ class Side:
 
 @dataclass(frozen=True)
 class Road:
-    """A road: its line, the directions of its lanes from right to left (+1 along it), and its two sides."""
+    """A road: its line, the directions of its lanes from right to left (+1 along it), and its two
+    sides.
+    """
 
     curve: Curve
     directions: tuple[int, ...]
@@ -97,7 +102,9 @@ class Road:
 
 @dataclass(frozen=True)
 class Joining:
-    """A side street: it begins at the main road's `at_m`, on the side `sign`, and leads away from it."""
+    """A side street: it begins at the main road's `at_m`, on the side `sign`, and leads away from
+    it.
+    """
 
     road: Road
     at_m: float
@@ -119,14 +126,18 @@ def straight(rng: np.random.Generator) -> Plan:
 
 def bend(rng: np.random.Generator) -> Plan:
     """A two-way street that bends, left or right, round a corner of houses."""
-    radius, turn = draw(rng, BEND_RADIUS_M), draw(rng, BEND_TURN)
+    radius = draw(rng, BEND_RADIUS_M)
+    turn = draw(rng, BEND_TURN)
     side = rng.choice((-1, 1))
-    return Plan(_road(rng, Curve((0.0, 0.0, 0.0), draw(rng, BEND_AT_M), radius * turn, side / radius)))
+    return Plan(
+        _road(rng, Curve((0.0, 0.0, 0.0), draw(rng, BEND_AT_M), radius * turn, side / radius))
+    )
 
 
 def junction(rng: np.random.Generator) -> Plan:
     """A two-way street with a T-junction, or a crossing, whose side streets give way."""
-    main, at = _road(rng, Curve()), draw(rng, JUNCTION_AT_M)
+    main = _road(rng, Curve())
+    at = draw(rng, JUNCTION_AT_M)
     first = int(rng.choice((-1, 1)))
     signs = (first,) if rng.random() < EVEN_CHANCE else (first, -first)
     return Plan(main, tuple(Joining(_joining(rng, at, sign), at, sign) for sign in signs))
@@ -137,7 +148,8 @@ def one_way(rng: np.random.Generator) -> Plan:
     main = _road(rng, Curve(), directions=(1,), cycles=(0.0, CONTRAFLOW_M))
     if rng.random() < EVEN_CHANCE:
         return Plan(main)
-    at, sign = draw(rng, JUNCTION_AT_M), int(rng.choice((-1, 1)))
+    at = draw(rng, JUNCTION_AT_M)
+    sign = int(rng.choice((-1, 1)))
     return Plan(main, (Joining(_joining(rng, at, sign), at, sign),))
 
 

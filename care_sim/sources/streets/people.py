@@ -1,4 +1,6 @@
-"""Who walks and cycles: along the pavements, across the street in a gap of the traffic, out of a yard or a garden."""
+"""Who walks and cycles: along the pavements, across the street in a gap of the traffic, out of a
+yard or a garden.
+"""
 
 from collections.abc import Callable
 
@@ -12,34 +14,39 @@ from care_sim.sources.streets.furniture import Span
 from care_sim.sources.streets.layouts import EVEN_CHANCE, Road, Side
 
 WALKING_MPS, WALKING_SPREAD_MPS = 1.34, 0.26
-"""Speeds of people on foot: normal (Weidmann 1993, Transporttechnik der Fussgaenger), cut at two spreads."""
+"""Speeds of people on foot: normal (Weidmann 1993, Transporttechnik der Fussgaenger), cut at two
+spreads.
+"""
 CYCLING_MPS, CYCLING_SPREAD_MPS = 4.25, 0.9
-"""15.3 km/h, the mean of conventional bicycles in the German Naturalistic Cycling Study (Schleinitz et al. 2017);
-the spread is a fifth of it, as that of people on foot. Cut at two spreads."""
+"""15.3 km/h, the mean of conventional bicycles in the German Naturalistic Cycling Study (Schleinitz
+et al. 2017); the spread is a fifth of it, as that of people on foot. Cut at two spreads."""
 PEOPLE_PER_100M: Range = (1.0, 8.0)
-"""People on 100 m of one pavement, drawn a scene. nuScenes annotates 6.4 people a keyframe (218 thousand in 34
-thousand). Two pavements within 50 m are 200 m, and half of the people there are hidden, behind parked vehicles and
-each other: 6.4 on 100 m would make as many, and not all that nuScenes annotates are that near."""
+"""People on 100 m of one pavement, drawn a scene. nuScenes annotates 6.4 people a keyframe (218
+thousand in 34 thousand). Two pavements within 50 m are 200 m, and half of the people there are
+hidden, behind parked vehicles and each other: 6.4 on 100 m would make as many, and not all that
+nuScenes annotates are that near."""
 STANDING_SHARE = 0.28
 """Annotations of people in nuScenes with attribute standing or sitting: 60 of 218 thousand."""
 CROSSERS, EMERGING = 2.5, 2.5
-"""Mean number of people a scene who cross the main road, and who step out of a yard or a garden: chosen so that
-most scenes have a few of either. Poisson."""
+"""Mean number of people a scene who cross the main road, and who step out of a yard or a garden:
+chosen so that most scenes have a few of either. Poisson."""
 CYCLISTS_PER_H: Range = (20.0, 100.0)
-"""An hour on a cycle lane: from the 11 % of all trips (Mobilitaet in Deutschland 2017) beside a weak traffic to twice
-that beside a strong one."""
+"""An hour on a cycle lane: from the 11 % of all trips (Mobilitaet in Deutschland 2017) beside a
+weak traffic to twice that beside a strong one."""
 BICYCLES_PER_100M = 0.2
-"""Bicycles that stand on 100 m of pavement. nuScenes annotates 0.26 a keyframe without a rider (8,946 in 34
-thousand) on 200 m of pavement, and a third of them are hidden."""
+"""Bicycles that stand on 100 m of pavement. nuScenes annotates 0.26 a keyframe without a rider
+(8,946 in 34 thousand) on 200 m of pavement, and a third of them are hidden."""
 PERSON_BERTH_M = 0.1
 PAVEMENT_MARGIN_M = 0.5
-"""People keep off walls and kerbs by half a metre (the shy distance of the Highway Capacity Manual)."""
+"""People keep off walls and kerbs by half a metre (the shy distance of the Highway Capacity
+Manual).
+"""
 TRIES = 40
 """Ways drawn for one person until one is free; then the person stays at home."""
 
 
 def populate(draft: Draft, road: Road, span: Span) -> None:
-    """Put people and standing bicycles on the pavements of a road and cyclists on its cycle lanes."""
+    """Put people and standing bicycles on the pavements of a road, cyclists on its cycle lanes."""
     density = draw(draft.rng, PEOPLE_PER_100M)
     for side in road.sides:
         _populate_side(draft, road, side, span, density)
@@ -47,7 +54,9 @@ def populate(draft: Draft, road: Road, span: Span) -> None:
             _cycle(draft, road, side, span)
 
 
-def _populate_side(draft: Draft, road: Road, side: Side, span: Span, people_per_100m: float) -> None:
+def _populate_side(
+    draft: Draft, road: Road, side: Side, span: Span, people_per_100m: float
+) -> None:
     hundreds = (span[1] - span[0]) / 100.0
     people = draft.rng.poisson(people_per_100m * hundreds)
     standing = draft.rng.binomial(people, STANDING_SHARE)
@@ -60,7 +69,9 @@ def _populate_side(draft: Draft, road: Road, side: Side, span: Span, people_per_
 
 
 def cross_and_emerge(draft: Draft, road: Road, span: Span) -> None:
-    """Let people cross a road between what stands and what drives, and step out from between houses and hedges."""
+    """Let people cross a road between what stands and what drives, and step out from between houses
+    and hedges.
+    """
     for _ in range(draft.rng.poisson(CROSSERS)):
         _walk_about(draft, lambda: _crossing(draft, road, span))
     for _ in range(draft.rng.poisson(EMERGING)):
@@ -80,7 +91,7 @@ def _speed(rng: np.random.Generator, mean: float, spread: float) -> float:
 
 
 def _walk(draft: Draft, road: Road, *corners: tuple[float, float], passes: float) -> Floats:
-    """The way of a person past `corners`, `passes` metres of it behind the person at a random time."""
+    """The path of a person past `corners`; at a random time `passes` metres of it are done."""
     speed = _speed(draft.rng, WALKING_MPS, WALKING_SPREAD_MPS)
     starts = draft.rng.uniform(0.0, float(TIMES[-1])) - passes / speed
     return Walked(road.curve, corners, speed, float(starts)).poses(TIMES)
@@ -101,10 +112,13 @@ def _strolling(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
 
 def _crossing(draft: Draft, road: Road, span: Span) -> Floats:
     """Along a pavement, straight across, and on along the other one."""
-    s, sides = draft.rng.uniform(*span), road.sides if draft.rng.random() < EVEN_CHANCE else road.sides[::-1]
+    s = draft.rng.uniform(*span)
+    sides = road.sides if draft.rng.random() < EVEN_CHANCE else road.sides[::-1]
     near, far = (_pavement_d(draft, side) for side in sides)
     before, after = (float(way) * _far() for way in draft.rng.choice((-1, 1), 2))
-    return _walk(draft, road, (s + before, near), (s, near), (s, far), (s + after, far), passes=_far())
+    return _walk(
+        draft, road, (s + before, near), (s, near), (s, far), (s + after, far), passes=_far()
+    )
 
 
 def _emerging(draft: Draft, road: Road, span: Span) -> Floats:
@@ -119,7 +133,9 @@ def _emerging(draft: Draft, road: Road, span: Span) -> Floats:
 def _leaning(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
     """A place (3,) for a bicycle along the wall or fence at the pavement's far edge."""
     d = side.sign * (side.boundary_m - PAVEMENT_MARGIN_M)
-    return road.curve.to_world(np.array([draft.rng.uniform(*span), d, float(draft.rng.choice((0.0, np.pi)))]))
+    return road.curve.to_world(
+        np.array([draft.rng.uniform(*span), d, float(draft.rng.choice((0.0, np.pi)))])
+    )
 
 
 def _cycle(draft: Draft, road: Road, side: Side, span: Span) -> None:
@@ -135,7 +151,9 @@ def _cycle(draft: Draft, road: Road, side: Side, span: Span) -> None:
 
 
 def _pavement_d(draft: Draft, side: Side) -> float:
-    return side.sign * float(draft.rng.uniform(side.kerb_m + PAVEMENT_MARGIN_M, side.boundary_m - PAVEMENT_MARGIN_M))
+    return side.sign * float(
+        draft.rng.uniform(side.kerb_m + PAVEMENT_MARGIN_M, side.boundary_m - PAVEMENT_MARGIN_M)
+    )
 
 
 def _far() -> float:

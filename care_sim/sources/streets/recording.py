@@ -1,4 +1,6 @@
-"""The film of a street: at every keyframe the whole grid is cast once, and six cameras are rendered."""
+"""The film of a street: at every keyframe the whole grid is cast once, and six cameras are
+rendered.
+"""
 
 from contextlib import closing
 from dataclasses import replace
@@ -21,29 +23,36 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
 
 SIGHT_M = 60.0
-"""Bodies whose hull is further than this from the sensor are left out: the LiDAR reaches 50 m, and an adult shows the
-camera its least number of pixels at about 50 m."""
+"""Bodies whose hull is further than this from the sensor are left out: the LiDAR reaches 50 m, and
+an adult shows the camera its least number of pixels at about 50 m."""
 
 
 def record(
-    street: Street, grid: AngularGrid | None = None, cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS
+    street: Street,
+    grid: AngularGrid | None = None,
+    cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS,
 ) -> Film:
-    """The film of a street. `Cloud.objects` and `Annotations.objects` are the columns of `street.poses`.
+    """The film of a street. `Cloud.objects` and `Annotations.objects` are the columns of
+    `street.poses`.
 
-    An object is annotated at a keyframe where a return of the full sweep lies on it or a camera shows it: nuScenes
-    scores what has at least one LiDAR or radar point, and nobody could have seen what is wholly hidden. The street
-    knows what is wholly hidden as well: who is so at its first keyframe is in `Film.hidden`.
+    An object is annotated at a keyframe where a return of the full sweep lies on it or a camera
+    shows it: nuScenes scores what has at least one LiDAR or radar point, and nobody could have seen
+    what is wholly hidden. The street knows what is wholly hidden as well: who is so at its first
+    keyframe is in `Film.hidden`.
     """
     grid = grid or AngularGrid()
     with closing(BulletWorld()) as world:
         stage = _Stage(street, world)
-        shots, hidden = zip(*(stage.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True)
+        shots, hidden = zip(
+            *(stage.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True
+        )
     return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots, hidden[0])
 
 
 def street_film(seed: int, secret: str = "") -> Film:
-    """The film of the street of a seed; the last one is kept, for policies that meet the same street in turn. With a
-    secret it is another street, of a seed that cannot be told; its name says no more than that.
+    """The film of the street of a seed; the last one is kept, for policies that meet the same
+    street in turn. With a secret it is another street, of a seed that cannot be told; its name says
+    no more than that.
     """
     return _street_film(seed, secret)
 
@@ -52,20 +61,31 @@ def street_film(seed: int, secret: str = "") -> Film:
 def _street_film(seed: int, secret: str) -> Film:
     if not secret:
         return record(make_street(seed))
-    return record(replace(make_street(secret_entropy("street", (seed,), secret)), name=f"street-{seed:04d}-secret"))
+    return record(
+        replace(
+            make_street(secret_entropy("street", (seed,), secret)), name=f"street-{seed:04d}-secret"
+        )
+    )
 
 
 class _Stage:
-    """The bodies of a street in a simulator: each enters when it first comes near, then follows its way."""
+    """The bodies of a street in a simulator: each enters when it first comes near, then follows its
+    way.
+    """
 
     def __init__(self, street: Street, world: BulletWorld):
-        self._street, self._world = street, world
+        self._street = street
+        self._world = world
         self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
-        self._classes = np.array([NOBODY if label is None else CLASSES.index(label) for label in labels])
+        self._classes = np.array(
+            [NOBODY if label is None else CLASSES.index(label) for label in labels]
+        )
         self._bodies: dict[int, int] = {}
 
-    def shot(self, keyframe: int, grid: AngularGrid, cameras: tuple[PinholeCamera, ...]) -> tuple[Shot, Annotations]:
+    def shot(
+        self, keyframe: int, grid: AngularGrid, cameras: tuple[PinholeCamera, ...]
+    ) -> tuple[Shot, Annotations]:
         """Everything that can be seen at a keyframe, and who is near and cannot."""
         street = self._street
         x, y, yaw = street.ego[keyframe].tolist()
@@ -73,7 +93,8 @@ class _Stage:
         near = self._set_up(keyframe, sensor)
         everything = sensor.boxes_to_local(self._boxes(keyframe, near))
         reported = self._classes[near] != NOBODY
-        labelled, boxes = near[reported], everything[reported]
+        labelled = near[reported]
+        boxes = everything[reported]
         numbers = {self._bodies[number]: number for number in labelled.tolist()}
         labels = {body: int(self._classes[number]) for body, number in numbers.items()}
         seen = surround_detections(self._world, cameras, sensor, labels, boxes)
@@ -82,22 +103,33 @@ class _Stage:
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
         annotations, hidden = (
-            Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept]) for kept in (shown, ~shown)
+            Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
+            for kept in (shown, ~shown)
         )
-        token, motion = f"{street.name}/{keyframe:02d}", street.motion[keyframe]
-        return Shot(keyframe * KEYFRAME_S, token, sensor, motion, annotations, identified, cloud), hidden
+        token = f"{street.name}/{keyframe:02d}"
+        motion = street.motion[keyframe]
+        return Shot(
+            keyframe * KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
+        ), hidden
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Cells:
         """Put every body that is near where it is now; returns their numbers, ascending."""
         poses = self._street.poses[keyframe]
-        apart = np.hypot(poses[:, 0] - sensor.x, poses[:, 1] - sensor.y) - np.hypot(*self._sizes[:, :2].T) / 2
+        apart = (
+            np.hypot(poses[:, 0] - sensor.x, poses[:, 1] - sensor.y)
+            - np.hypot(*self._sizes[:, :2].T) / 2
+        )
         (near,) = np.nonzero(apart < SIGHT_M)
         placed = np.array([*self._bodies], np.int64)
         moved = placed[np.any(poses[placed] != self._street.poses[keyframe - 1, placed], axis=1)]
-        self._world.move_all(np.array([self._bodies[number] for number in moved.tolist()], np.int64), poses[moved])
+        self._world.move_all(
+            np.array([self._bodies[number] for number in moved.tolist()], np.int64), poses[moved]
+        )
         for number in set(near.tolist()) - set(self._bodies):
             x, y, yaw = poses[number].tolist()
-            self._bodies[number] = self._world.add(CATALOGUE[self._street.kinds[number]], (x, y, yaw))
+            self._bodies[number] = self._world.add(
+                CATALOGUE[self._street.kinds[number]], (x, y, yaw)
+            )
         return near
 
     def _boxes(self, keyframe: int, numbers: Cells) -> Floats:

@@ -1,10 +1,12 @@
-"""A street: everything that stands and moves in a scene over its keyframes. Pure data, drawn from a seed.
+"""A street: everything that stands and moves in a scene over its keyframes. Pure data, drawn from a
+seed.
 
-Every number stands with its reason where it is used, and all were fixed before any policy ran. Counts of nuScenes are
-those of its annotations in trainval (34,149 keyframes), by class and attribute. On seeds 2000 to 2023, which belong to
-neither list below, a scene has 26 first sightings within 50 m, where nuScenes has 28 (31 with `presence="visible"` of
-`care_sim.evaluation.sightings`), and 22 annotated objects a keyframe within 50 m, where nuScenes has 24 of the five
-classes at all ranges.
+Every number stands with its reason where it is used, and all were fixed before any policy ran.
+Counts of nuScenes are those of its annotations in trainval (34,149 keyframes), by class and
+attribute. On seeds 2000 to 2023, which belong to neither list below, a scene has 26 first sightings
+within 50 m, where nuScenes has 28 (31 with `presence="visible"` of
+`care_sim.evaluation.sightings`), and 22 annotated objects a keyframe within 50 m, where nuScenes
+has 24 of the five classes at all ranges.
 """
 
 import hashlib
@@ -21,16 +23,18 @@ from care_sim.sources.streets.layouts import LAYOUTS
 from care_sim.sources.streets.people import cross_and_emerge, populate
 
 EVALUATION_SEEDS = tuple(range(150))
-"""150 scenes, as many as the validation split of nuScenes has. They are the first: nobody chose among them."""
+"""150 scenes, as many as the validation split of nuScenes has. They are the first: nobody chose
+among them.
+"""
 CALIBRATION_SEEDS = tuple(range(1000, 1020))
-"""20 other scenes, for whatever is to be set before the evaluation; far away, so that neither list grows into the
-other."""
+"""20 other scenes, for whatever is to be set before the evaluation; far away, so that neither list
+grows into the other."""
 
 
 @dataclass(frozen=True)
 class Street:
-    """Bodies by `kinds` (n,) of the catalogue, with world `poses` (k, n, 3) at every keyframe; the ego's `ego`
-    poses (k, 3) and `motion` (k,).
+    """Bodies by `kinds` (n,) of the catalogue, with world `poses` (k, n, 3) at every keyframe; the
+    ego's `ego` poses (k, 3) and `motion` (k,).
     """
 
     name: str
@@ -40,8 +44,8 @@ class Street:
     motion: tuple[Ego, ...]
 
     def digest(self) -> str:
-        """SHA-256 over the kinds and over all poses in whole millimetres and milliradians, ego first: the same on
-        every machine whose arithmetic agrees that far.
+        """SHA-256 over the kinds and over all poses in whole millimetres and milliradians, ego
+        first: the same on every machine whose arithmetic agrees that far.
         """
         content = hashlib.sha256(",".join(self.kinds).encode())
         for poses in (self.ego, self.poses):
@@ -56,9 +60,13 @@ def street_name(seed: int) -> str:
 
 
 def make_street(seed: int) -> Street:
-    """The street of a seed. Layouts come in turn, everything else is drawn; nothing outside the seed enters."""
+    """The street of a seed. Layouts come in turn, everything else is drawn; nothing outside the
+    seed enters.
+    """
     layout = _layout(seed)
-    plans, traffic, furniture, people = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4))
+    plans, traffic, furniture, people = (
+        np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4)
+    )
     plan = LAYOUTS[layout](plans)
     draft = Draft(traffic)
     drive = drive_main(draft, plan)
@@ -71,12 +79,17 @@ def make_street(seed: int) -> Street:
     cross_and_emerge(draft, plan.main, (5.0, float(drive.along[-1]) + BEYOND_M / 2))
     for road, reach in (
         (plan.main, span),
-        *((joining.road, (plan.main.side(joining.sign).front_m, JOINING_M)) for joining in plan.joinings),
+        *(
+            (joining.road, (plan.main.side(joining.sign).front_m, JOINING_M))
+            for joining in plan.joinings
+        ),
     ):
         populate(draft, road, reach)
     every = round(KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]
-    return Street(street_name(seed), tuple(draft.kinds), poses, drive.poses[::every], drive.motion[::every])
+    return Street(
+        street_name(seed), tuple(draft.kinds), poses, drive.poses[::every], drive.motion[::every]
+    )
 
 
 def _layout(seed: int) -> str:

@@ -14,12 +14,14 @@ from care_sim.base.extras import import_imageio_ffmpeg
 from care_sim.base.files import GIF, MP4, PNG, WEBP, check_output, replacing, why_unwritable
 
 GIF_COLOURS = 96
-"""Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file goes."""
+"""Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file
+goes.
+"""
 
 
 def check_clip(path: Path) -> None:
-    """Raise InvalidInput for a file whose ending is none of ENDINGS, MissingExtra for MP4 without its library, and what
-    `care_sim.base.files.check_output` raises.
+    """Raise InvalidInput for a file whose ending is none of ENDINGS, MissingExtra for MP4 without
+    its library, and what `care_sim.base.files.check_output` raises.
     """
     check_known("ending of a clip", path.suffix, ENDINGS)
     if path.suffix == ".mp4":
@@ -27,16 +29,22 @@ def check_clip(path: Path) -> None:
     check_output(path, KINDS[path.suffix])
 
 
-def write_clip(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
-    """Write pictures of one size, `picture_s` seconds each, the last for `hold_s`; an animation begins anew.
+def write_clip(
+    path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
+) -> None:
+    """Write pictures of one size, `picture_s` seconds each, the last for `hold_s`; an animation
+    begins anew.
 
-    The ending of `path`, which `check_clip` has let pass, decides the form. The file is there whole or not at all.
+    The ending of `path`, which `check_clip` has let pass, decides the form. The file is there whole
+    or not at all.
     """
     with replacing(path, KINDS[path.suffix]) as unfinished:
         ENDINGS[path.suffix](unfinished, pictures, picture_s, hold_s)
 
 
-def _write_mp4(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
+def _write_mp4(
+    path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
+) -> None:
     shown = iter(pictures)
     first = next(shown)
     ffmpeg = import_imageio_ffmpeg()
@@ -59,19 +67,27 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], picture_s: float, ho
         raise OSError(errno.EIO, why_unwritable(path) or "FFmpeg could not write it", str(path))
 
 
-def _write_animation(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
+def _write_animation(
+    path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
+) -> None:
     first, *others = pictures
     durations = [round(1000 * picture_s)] * len(others) + [round(1000 * hold_s)]
     first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
 
 
-def _write_gif(path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float) -> None:
+def _write_gif(
+    path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
+) -> None:
     _write_animation(path, _in_few_colours(list(pictures)), picture_s, hold_s)
 
 
 def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
-    """The pictures in the colours that serve a dozen of them best; undithered, what stands still is stored once."""
-    sample = np.concatenate([np.asarray(picture) for picture in pictures[:: max(1, len(pictures) // 12)]])
+    """The pictures in the colours that serve a dozen of them best; undithered, what stands still is
+    stored once.
+    """
+    sample = np.concatenate(
+        [np.asarray(picture) for picture in pictures[:: max(1, len(pictures) // 12)]]
+    )
     common = Image.fromarray(sample).quantize(GIF_COLOURS, Image.Quantize.MEDIANCUT)
     return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
 

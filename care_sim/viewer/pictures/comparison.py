@@ -1,4 +1,6 @@
-"""The picture of a keyframe beside that of another policy: chase view, the cells ahead, and what came of it."""
+"""The picture of a keyframe beside that of another policy: chase view, the cells ahead, and what
+came of it.
+"""
 
 from collections.abc import Sequence
 
@@ -13,27 +15,41 @@ from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
 from care_sim.viewer.pictures.furnished_world import add_car, furnished
-from care_sim.viewer.pictures.keyframe import BRAKING, DETECTED, IN_VIEW, mark_first_sighting, mark_tracks
+from care_sim.viewer.pictures.keyframe import (
+    BRAKING,
+    DETECTED,
+    IN_VIEW,
+    mark_first_sighting,
+    mark_tracks,
+)
 
 _VIEW = (512, 320)
 _CAMERA = PinholeCamera(*_VIEW, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
-_TOP, _COLUMN_PIXELS, _ROW_PIXELS = 36, 2, 3
+_TOP = 36
+_COLUMN_PIXELS = 2
+_ROW_PIXELS = 3
 _GRID_TOP = _TOP + _VIEW[1] + 22
 WIDTH, HEIGHT = _VIEW[0], 508
 
 
 def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
-    """A picture WIDTH x HEIGHT of where `loop` stands after the keyframes `frames`, under the heading `name`.
+    """A picture WIDTH x HEIGHT of where `loop` stands after the keyframes `frames`, under the
+    heading `name`.
 
-    Above, the street from behind the car, as in `care_sim.viewer.pictures.keyframe`. Below, the front half of the angular grid
-    with the cells that fired, coloured by range, and whether the first-sighting actor is detected, since when and how
-    far away. The episode is left as it was.
+    Above, the street from behind the car, as in `care_sim.viewer.pictures.keyframe`. Below, the
+    front half of the angular grid with the cells that fired, coloured by range, and whether the
+    first-sighting actor is detected, since when and how far away. The episode is left as it was.
     """
     canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
     draw = ImageDraw.Draw(canvas)
     _write_header(draw, name, loop, frames[-1])
     canvas.paste(_chase_view(loop, frames[-1]), (0, _TOP))
-    draw.text((8, _GRID_TOP - 20), f"{len(frames[-1].fired)} LiDAR cells fired, those ahead:", FAINT, drawing.font(14))
+    draw.text(
+        (8, _GRID_TOP - 20),
+        f"{len(frames[-1].fired)} LiDAR cells fired, those ahead:",
+        FAINT,
+        drawing.font(14),
+    )
     canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
     text, colour = verdict(frames, loop.rig.keyframe_s)
     draw.text((8, HEIGHT - 26), text, colour, drawing.font(18))
@@ -63,7 +79,9 @@ def _cells_ahead(loop: ClosedLoop) -> Image.Image:
     grid = loop.rig.grid
     whole = drawing.grid_picture(grid, loop.belief.ranges, 1)
     ahead = whole.crop((grid.columns // 4, 0, 3 * grid.columns // 4, grid.rows))
-    return ahead.resize((ahead.width * _COLUMN_PIXELS, ahead.height * _ROW_PIXELS), Image.Resampling.NEAREST)
+    return ahead.resize(
+        (ahead.width * _COLUMN_PIXELS, ahead.height * _ROW_PIXELS), Image.Resampling.NEAREST
+    )
 
 
 def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:
@@ -76,5 +94,7 @@ def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing
         return f"in view for {frames[-1].time_s - seen + keyframe_s:.1f} s, not detected", IN_VIEW
     so_far = outcome(frames)
     late = f", {found - seen:.1f} s late" if seen is not None and found > seen else ""
-    clearance = "" if so_far.clearance_m is None else f"; least clearance {so_far.clearance_m:.1f} m"
+    clearance = (
+        "" if so_far.clearance_m is None else f"; least clearance {so_far.clearance_m:.1f} m"
+    )
     return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED

@@ -1,4 +1,6 @@
-"""What is drawn over pictures: boxes in space, boxes in the image, labels, the angular grid in colours."""
+"""What is drawn over pictures: boxes in space, boxes in the image, labels, the angular grid in
+colours.
+"""
 
 from collections.abc import Iterable
 
@@ -13,8 +15,11 @@ from care_sim.core.pinhole import NEAR_M, PinholeCamera
 
 Colour = tuple[int, int, int]
 
-INK, FAINT, PAPER = (235, 237, 240), (150, 155, 162), (24, 26, 30)
-NOT_FIRED, NO_RETURN = (44, 47, 53), (112, 116, 124)
+INK = (235, 237, 240)
+FAINT = (150, 155, 162)
+PAPER = (24, 26, 30)
+NOT_FIRED = (44, 47, 53)
+NO_RETURN = (112, 116, 124)
 _RANGE_COLOURS = colormaps["plasma_r"]
 
 
@@ -23,7 +28,9 @@ def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
     return ImageFont.load_default(size)
 
 
-def label(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour: Colour, size: int = 13) -> None:
+def label(
+    draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour: Colour, size: int = 13
+) -> None:
     """Text centred over a point, on a dark plate, kept inside the picture."""
     left, top, right, bottom = draw.textbbox((0, 0), text, font(size))
     width, height = right - left + 6, bottom - top + 6
@@ -34,7 +41,9 @@ def label(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour:
     draw.text((x + 3 - left, y + 3 - top), text, colour, font(size))
 
 
-def wireframe(draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int) -> None:
+def wireframe(
+    draw: ImageDraw.ImageDraw, camera: PinholeCamera, box: Floats, colour: Colour, width: int
+) -> None:
     """The edges of a sensor-frame box (7,) that lie wholly before the camera."""
     pixels, depth = camera.project(box_corners(box[None])[0])
     for start, end in BOX_EDGES:
@@ -57,7 +66,9 @@ def arrow(draw: ImageDraw.ImageDraw, tip: tuple[float, float], text: str, colour
     label(draw, (x, y - 36), text, colour, 15)
 
 
-def image_boxes(draw: ImageDraw.ImageDraw, boxes: Floats, names: Iterable[str], colours: Iterable[Colour]) -> None:
+def image_boxes(
+    draw: ImageDraw.ImageDraw, boxes: Floats, names: Iterable[str], colours: Iterable[Colour]
+) -> None:
     """Boxes (n, 4: left, top, right, bottom in pixels) with their names."""
     for box, name, colour in zip(boxes.tolist(), names, colours, strict=True):
         draw.rectangle(box, outline=colour, width=2)
@@ -65,7 +76,9 @@ def image_boxes(draw: ImageDraw.ImageDraw, boxes: Floats, names: Iterable[str], 
 
 
 def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: int) -> Image.Image:
-    """The scan (E, A) as the car sees it: left of the picture is the left, straight ahead is the middle."""
+    """The scan (E, A) as the car sees it: left of the picture is the left, straight ahead is the
+    middle.
+    """
     picture = np.full((*grid.shape, 3), NOT_FIRED, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
@@ -76,5 +89,7 @@ def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: in
 
 def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """(..., 3) colours of ranges given as shares of the reach: near is bright."""
-    colours: NDArray[np.uint8] = _RANGE_COLOURS(0.05 + 0.75 * np.asarray(shares), bytes=True)[..., :3]
+    colours: NDArray[np.uint8] = _RANGE_COLOURS(0.05 + 0.75 * np.asarray(shares), bytes=True)[
+        ..., :3
+    ]
     return colours

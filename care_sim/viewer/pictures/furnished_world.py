@@ -1,4 +1,6 @@
-"""A second, furnished copy of the world for pictures that people look at; the episode's own is not touched."""
+"""A second, furnished copy of the world for pictures that people look at; the episode's own is not
+touched.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,13 +14,17 @@ from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
 
 CHASE_SIZE = (960, 460)
-CHASE_CAMERA = PinholeCamera(*CHASE_SIZE, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0))
+CHASE_CAMERA = PinholeCamera(
+    *CHASE_SIZE, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0)
+)
 """Behind the car and above it, in the frame of the LiDAR; low enough to keep a strip of sky."""
 
 METRE_MARKS = (10.0, 20.0, 30.0, 40.0)
 """Distances ahead of the LiDAR at which the path carries a bar, metres."""
 
-_ASPHALT, _PATH, _BAR = (0.36, 0.36, 0.38), (0.47, 0.47, 0.5), (0.8, 0.8, 0.78)
+_ASPHALT = (0.36, 0.36, 0.38)
+_PATH = (0.47, 0.47, 0.5)
+_BAR = (0.8, 0.8, 0.78)
 
 
 @contextmanager
@@ -35,7 +41,8 @@ def furnished(world: World) -> Iterator[BulletWorld]:
 
 
 def add_car(scene: BulletWorld, world: World, sensor_x: float) -> None:
-    """The car itself, and on the ground the strip that the controller guards, with a bar every ten metres.
+    """The car itself, and on the ground the strip that the controller guards, with a bar every ten
+    metres.
 
     `sensor_x` is where the LiDAR stands ahead of the car's centre, metres.
     """

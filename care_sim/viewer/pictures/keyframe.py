@@ -1,4 +1,6 @@
-"""The picture of a keyframe: chase view with boxes, the camera's picture, the angular grid, a line of text."""
+"""The picture of a keyframe: chase view with boxes, the camera's picture, the angular grid, a line
+of text.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,13 @@ from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import FAINT, INK, NO_RETURN, NOT_FIRED, PAPER
-from care_sim.viewer.pictures.furnished_world import CHASE_CAMERA, CHASE_SIZE, METRE_MARKS, add_car, furnished
+from care_sim.viewer.pictures.furnished_world import (
+    CHASE_CAMERA,
+    CHASE_SIZE,
+    METRE_MARKS,
+    add_car,
+    furnished,
+)
 
 WIDTH, HEIGHT = 960, 720
 _HEADER = 40
@@ -23,17 +31,23 @@ _GRID_AT = (392, _PANELS + 44)
 _ROW_PIXELS = 4
 _BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
-TRACKED, COASTING, UNEXPLAINED = (90, 220, 255), (120, 140, 190), (255, 170, 40)
-HIDDEN, IN_VIEW, DETECTED, BRAKING = (225, 225, 225), (255, 170, 40), (80, 230, 110), (255, 80, 70)
+TRACKED = (90, 220, 255)
+COASTING = (120, 140, 190)
+UNEXPLAINED = (255, 170, 40)
+HIDDEN = (225, 225, 225)
+IN_VIEW = (255, 170, 40)
+DETECTED = (80, 230, 110)
+BRAKING = (255, 80, 70)
 
 
 def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]:
-    """A picture (HEIGHT, WIDTH, 3) of where `loop` stands, and of the scan of the keyframe before, `frame`.
+    """A picture (HEIGHT, WIDTH, 3) of where `loop` stands, and of the scan of the keyframe before,
+    `frame`.
 
-    Above, the street from behind the car: tracks as wireframes, an arrow at the first-sighting actor, and
-    on the ground the strip the controller guards. Below, the front camera with its detections, those that
-    no forecast explains in another colour, and the cells that fired, coloured by range. `frame` is None
-    before the first scan. The episode is left as it was.
+    Above, the street from behind the car: tracks as wireframes, an arrow at the first-sighting
+    actor, and on the ground the strip the controller guards. Below, the front camera with its
+    detections, those that no forecast explains in another colour, and the cells that fired,
+    coloured by range. `frame` is None before the first scan. The episode is left as it was.
     """
     canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
     with furnished(loop.world) as scene:
@@ -54,10 +68,13 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
 
 
 def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe | None) -> None:
-    motion, budget = loop.world.ego_motion, loop.rig.budget
+    motion = loop.world.ego_motion
+    budget = loop.rig.budget
     words = [(12, f"{loop.world.time:.1f} s", INK), (90, f"{motion.speed:.1f} m/s", INK)]
     if frame is None:
-        words.append((330, f"nothing fired yet, budget {budget} of {loop.rig.grid.size} cells", FAINT))
+        words.append(
+            (330, f"nothing fired yet, budget {budget} of {loop.rig.grid.size} cells", FAINT)
+        )
     else:
         words.append((330, f"{len(frame.fired)} of {budget} cells fired", INK))
         if np.isfinite(frame.clearance_m):
@@ -82,7 +99,9 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
 
 def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks) -> None:
     """Tracks as wireframes with their classes, faint those that the last scan missed."""
-    for box, number, misses in reversed(list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))):
+    for box, number, misses in reversed(
+        list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))
+    ):
         colour = COASTING if misses else TRACKED
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
         if at := drawing.point_above(camera, box):
@@ -111,26 +130,48 @@ def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
     known = explained(seen, loop.belief.tracks, loop.rig)
     names = [CLASSES[number] for number in seen.classes]
     drawing.image_boxes(
-        ImageDraw.Draw(camera), seen.boxes, names, [TRACKED if is_known else UNEXPLAINED for is_known in known]
+        ImageDraw.Draw(camera),
+        seen.boxes,
+        names,
+        [TRACKED if is_known else UNEXPLAINED for is_known in known],
     )
 
 
-def draw_grid(canvas: Image.Image, draw: ImageDraw.ImageDraw, grid: AngularGrid, ranges: NDArray[np.floating]) -> None:
-    """The angular grid with a scan (E, A), its directions and its colours, in the lower right of a picture."""
+def draw_grid(
+    canvas: Image.Image, draw: ImageDraw.ImageDraw, grid: AngularGrid, ranges: NDArray[np.floating]
+) -> None:
+    """The angular grid with a scan (E, A), its directions and its colours, in the lower right of a
+    picture.
+    """
     left, top = _GRID_AT
     picture = drawing.grid_picture(grid, ranges, _ROW_PIXELS)
     canvas.paste(picture, _GRID_AT)
     bottom = top + picture.height
-    draw.text((left, _PANELS + 8), "LiDAR: cells fired in the last scan, all around the car", INK, drawing.font(14))
+    draw.text(
+        (left, _PANELS + 8),
+        "LiDAR: cells fired in the last scan, all around the car",
+        INK,
+        drawing.font(14),
+    )
     for share, name, anchor in ((0.0, "behind", "la"), (0.25, "left", "ma"), (0.5, "ahead", "ma")):
-        draw.text((left + share * grid.columns, bottom + 4), name, FAINT, drawing.font(13), anchor=anchor)
+        draw.text(
+            (left + share * grid.columns, bottom + 4), name, FAINT, drawing.font(13), anchor=anchor
+        )
     for share, name, anchor in ((0.75, "right", "ma"), (1.0, "behind", "ra")):
-        draw.text((left + share * grid.columns, bottom + 4), name, FAINT, drawing.font(13), anchor=anchor)
+        draw.text(
+            (left + share * grid.columns, bottom + 4), name, FAINT, drawing.font(13), anchor=anchor
+        )
     _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
 
 
-def _draw_legend(canvas: Image.Image, draw: ImageDraw.ImageDraw, left: int, top: int, reach: float) -> None:
-    for x, colour, name in ((0, NOT_FIRED, "not fired"), (95, NO_RETURN, "no return"), (195, None, "")):
+def _draw_legend(
+    canvas: Image.Image, draw: ImageDraw.ImageDraw, left: int, top: int, reach: float
+) -> None:
+    for x, colour, name in (
+        (0, NOT_FIRED, "not fired"),
+        (95, NO_RETURN, "no return"),
+        (195, None, ""),
+    ):
         if colour is not None:
             draw.rectangle((left + x, top, left + x + 14, top + 12), colour)
             draw.text((left + x + 20, top - 2), name, FAINT, drawing.font(13))

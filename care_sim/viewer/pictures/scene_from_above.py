@@ -15,14 +15,18 @@ from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
 from care_sim.viewer.pictures.keyframe import HEIGHT, WIDTH, draw_grid
 from care_sim.world.bodies import CATALOGUE
 
-_TOP, _MAP_SIZE = 40, (WIDTH, 460)
+_TOP = 40
+_MAP_SIZE = (WIDTH, 460)
 _BOTTOM = _TOP + _MAP_SIZE[1]
 _PIXELS_PER_M = _MAP_SIZE[1] / (2 * RANGE_M + 4)
 _RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
 _CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
 _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
 
-FOUND, MISSED, OUT_OF_RANGE, RING = (80, 230, 110), (255, 120, 60), (95, 100, 108), (52, 56, 63)
+FOUND = (80, 230, 110)
+MISSED = (255, 120, 60)
+OUT_OF_RANGE = (95, 100, 108)
+RING = (52, 56, 63)
 RETURN = (172, 176, 184)
 LEGEND = (
     ("found", FOUND),
@@ -40,31 +44,41 @@ def draw_plan(
     scored: NDArray[np.bool_],
     appearing: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
-    """A picture (HEIGHT, WIDTH, 3) of keyframe `index` of a film from above, the car driving to the right.
+    """A picture (HEIGHT, WIDTH, 3) of keyframe `index` of a film from above, the car driving to the
+    right.
 
-    The annotated objects (n,): found, not found, or beyond the range that is `scored`; those `appearing` have a double
-    line. The returns of the fired cells, and below the angular grid with their ranges. `record` is None before the
-    first scan. The episode is left as it was.
+    The annotated objects (n,): found, not found, or beyond the range that is `scored`; those
+    `appearing` have a double line. The returns of the fired cells, and below the angular grid with
+    their ranges. `record` is None before the first scan. The episode is left as it was.
     """
     shot = loop.film.shots[index]
     returned = _returned(shot.cloud, record)
     canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
     draw = ImageDraw.Draw(canvas)
-    colours = [FOUND if one else MISSED if near else OUT_OF_RANGE for one, near in zip(found, scored, strict=True)]
+    colours = [
+        FOUND if one else MISSED if near else OUT_OF_RANGE
+        for one, near in zip(found, scored, strict=True)
+    ]
     canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
     _write_words(draw, loop, shot.time_s, record, int(found[scored].sum()), int(scored.sum()))
     draw_grid(canvas, draw, loop.rig.grid, _ranges(loop, returned, record))
     return np.asarray(canvas)
 
 
-def _map(boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np.bool_], points: Floats) -> Image.Image:
+def _map(
+    boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np.bool_], points: Floats
+) -> Image.Image:
     """Range rings, points (P, 3), the car and boxes (n, 7) with their colours."""
     picture = Image.new("RGB", _MAP_SIZE, PAPER)
     draw = ImageDraw.Draw(picture)
     for metres in _RINGS:
-        (left, top), (right, bottom) = _pixels(np.array([[-metres, metres], [metres, -metres]])).tolist()
+        (left, top), (right, bottom) = _pixels(
+            np.array([[-metres, metres], [metres, -metres]])
+        ).tolist()
         draw.ellipse((left, top, right, bottom), outline=RING)
-        draw.text((right - 4, (top + bottom) / 2), f"{metres:.0f} m", FAINT, drawing.font(11), anchor="rm")
+        draw.text(
+            (right - 4, (top + bottom) / 2), f"{metres:.0f} m", FAINT, drawing.font(11), anchor="rm"
+        )
     draw.point(_pixels(points[:, :2]).ravel().tolist(), RETURN)
     _draw_box(draw, _CAR, INK, 2)
     for box, colour, appears in zip(boxes, colours, appearing, strict=True):
@@ -75,7 +89,12 @@ def _map(boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np
 
 
 def _write_words(
-    draw: ImageDraw.ImageDraw, loop: OpenLoop, time_s: float, record: OpenLoopKeyframe | None, found: int, objects: int
+    draw: ImageDraw.ImageDraw,
+    loop: OpenLoop,
+    time_s: float,
+    record: OpenLoopKeyframe | None,
+    found: int,
+    objects: int,
 ) -> None:
     budget = loop.rig.budget
     fired = (
@@ -83,7 +102,11 @@ def _write_words(
         if record is None
         else f"{len(record.fired)} of {budget} cells fired"
     )
-    for x, text in ((12, f"{time_s:.1f} s"), (110, f"{found} of {objects} objects found"), (420, fired)):
+    for x, text in (
+        (12, f"{time_s:.1f} s"),
+        (110, f"{found} of {objects} objects found"),
+        (420, fired),
+    ):
         draw.text((x, 8), text, INK, drawing.font(20))
     draw.text((WIDTH - 12, 12), loop.film.name[:28], FAINT, drawing.font(14), anchor="ra")
     draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
@@ -98,7 +121,7 @@ def _draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, wi
 
 
 def _pixels(places: Floats) -> Floats:
-    """(n, 2) pixels of the map for places (n, 2) in the sensor frame: ahead is right, left is up."""
+    """(n, 2) map pixels of places (n, 2) in the sensor frame: ahead is right, left is up."""
     pixels: Floats = np.array(_MAP_SIZE) / 2 + places * [_PIXELS_PER_M, -_PIXELS_PER_M]
     return pixels
 
@@ -109,7 +132,9 @@ def _returned(cloud: Cloud, record: OpenLoopKeyframe | None) -> Cloud:
     return cloud.take(np.isin(cloud.cells, fired))
 
 
-def _ranges(loop: OpenLoop, returned: Cloud, record: OpenLoopKeyframe | None) -> NDArray[np.float64]:
+def _ranges(
+    loop: OpenLoop, returned: Cloud, record: OpenLoopKeyframe | None
+) -> NDArray[np.float64]:
     grid = loop.rig.grid
     ranges = np.zeros(grid.size)
     if record is not None:

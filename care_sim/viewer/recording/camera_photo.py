@@ -14,7 +14,9 @@ QUALITY = 80
 
 
 def photograph(loop: ClosedLoop) -> bytes:
-    """A JPEG of what the camera shows now, houses left out, which it need not render; sky and road behind it."""
+    """A JPEG of what the camera shows now, houses left out, which it need not render; sky and road
+    behind it.
+    """
     camera = loop.rig.cameras[0]
     picture = loop.world.bullet.colours(camera, loop.sensor)
     red, green, blue = picture[..., 0], picture[..., 1], picture[..., 2]

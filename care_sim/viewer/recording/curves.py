@@ -16,27 +16,39 @@ from care_sim.viewer.recording import entities as looks
 from care_sim.viewer.recording.lane import Lane
 
 UNITS = {"speed": "m/s", "distance": "m", "clearance": "m", "braking": ""}
-MEASURES = {"speed": "speed_mps", "distance": "distance_m", "clearance": "clearance_m", "braking": "braking"}
+MEASURES = {
+    "speed": "speed_mps",
+    "distance": "distance_m",
+    "clearance": "clearance_m",
+    "braking": "braking",
+}
 
 
 class Curves:
     """Logs the numbers of an episode, in the colour of its lane; `budget` is B in cells."""
 
     def __init__(self, lane: Lane, budget: int, colour: tuple[int, int, int]):
-        self._lane, self._budget = lane, budget
+        self._lane = lane
+        self._budget = budget
         self._states: dict[str, str] = {}
         self._frames: list[Keyframe] = []
         self._counts: list[Cells] = []
         for name, unit in UNITS.items():
             step = InterpolationMode.StepAfter if name == "braking" else InterpolationMode.Linear
-            series = rr.SeriesLines(names=f"{lane.name} {name} {unit}".strip(), colors=colour, interpolation_mode=step)
+            series = rr.SeriesLines(
+                names=f"{lane.name} {name} {unit}".strip(), colors=colour, interpolation_mode=step
+            )
             lane.fix(f"measures/{name}", series)
         for name, colour_ in zip(SHARES[1:], looks.SHARE_COLOURS[1:], strict=True):
             lane.fix(f"budget/{name}", rr.SeriesLines(names=f"{name} %", colors=colour_))
-        actor, brake = looks.ACTOR_COLOURS, {"off": looks.COASTING, "on": looks.BRAKE}
+        actor = looks.ACTOR_COLOURS
+        brake = {"off": looks.COASTING, "on": looks.BRAKE}
         for entity, colours in (("states/actor", actor), ("states/brake", brake)):
             values = list(colours)
-            lane.fix(entity, rr.StateConfiguration(values=values, labels=values, colors=list(colours.values())))
+            lane.fix(
+                entity,
+                rr.StateConfiguration(values=values, labels=values, colors=list(colours.values())),
+            )
 
     def log(self, watched: WatchedKeyframe, state: str) -> None:
         """A keyframe, with the state of the first-sighting actor."""
@@ -44,7 +56,9 @@ class Curves:
         self._frames.append(frame)
         self._counts.append(np.bincount(watched.shares.ravel(), minlength=len(SHARES)))
         brake = "on" if frame.braking else "off"
-        self._change("states/actor", state, f"actor {state}, {frame.distance_m:.1f} m from the sensor")
+        self._change(
+            "states/actor", state, f"actor {state}, {frame.distance_m:.1f} m from the sensor"
+        )
         self._change("states/brake", brake, f"brake {brake} at {frame.speed_mps:.1f} m/s")
         if frame.impact_speed_mps is not None:
             self._lane.log("events", rr.TextLog(f"collision at {frame.impact_speed_mps:.1f} m/s"))
@@ -52,21 +66,35 @@ class Curves:
     def end(self, outcome: Mapping[str, Any] | None) -> None:
         """The episode is over, or was left: log its curves and its result."""
         self._log_curves()
-        lines = [f"| {name} | {'-' if value is None else value} |" for name, value in (outcome or {}).items()]
-        text = "\n".join(["| outcome | |", "|---|---|", *lines]) if outcome else "The episode was not finished."
+        lines = [
+            f"| {name} | {'-' if value is None else value} |"
+            for name, value in (outcome or {}).items()
+        ]
+        text = (
+            "\n".join(["| outcome | |", "|---|---|", *lines])
+            if outcome
+            else "The episode was not finished."
+        )
         self._lane.fix("outcome", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
     def _log_curves(self) -> None:
-        frames, percents = self._frames, 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
+        frames = self._frames
+        percents = 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
         for name, field in MEASURES.items():
-            self._log_curve(f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float))
-        for share in (CHOSEN, FLOOR) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE, FLOOR):
+            self._log_curve(
+                f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float)
+            )
+        for share in (
+            (CHOSEN, FLOOR) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE, FLOOR)
+        ):
             self._log_curve(f"budget/{SHARES[share]}", percents[:, share])
 
     def _log_curve(self, entity: str, values: Floats) -> None:
         kept = np.flatnonzero(np.isfinite(values))
         frames = [self._frames[number] for number in kept]
-        self._lane.log_curve(entity, [f.index for f in frames], [f.time_s for f in frames], values[kept])
+        self._lane.log_curve(
+            entity, [f.index for f in frames], [f.time_s for f in frames], values[kept]
+        )
 
     def _change(self, entity: str, state: str, words: str) -> None:
         before = self._states.get(entity)

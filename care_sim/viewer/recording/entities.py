@@ -8,43 +8,79 @@ SECONDS, KEYFRAME = "seconds", "keyframe"
 """The timelines: time of the scan, and number of the keyframe from 0."""
 
 ROW_PIXELS = 2
-"""Pixel rows of the grid's picture to a row of cells, which is about twice as high as a column is wide."""
+"""Pixel rows of the grid's picture to a row of cells, which is about twice as high as a column is
+wide.
+"""
 WEDGE_M = 30.0
 """How far a wedge, which has no depth, is drawn."""
 MOST_POINTS = 6000
-"""Of a scan with more returns every second or third is drawn: a full scan would fill 9 MB in 6 s."""
+"""Of more returns every second or third is drawn: full scans would fill 9 MB in 6 s."""
 
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",
-    "world/bodies": "boxes of all actors (truth), coloured by class, grey where perception reports none; world frame",
-    "world/first_sighting": "box of the first-sighting actor (truth), coloured by `states/actor`; world frame",
+    "world/bodies": (
+        "boxes of all actors (truth), coloured by class, grey where perception reports none; "
+        "world frame"
+    ),
+    "world/first_sighting": (
+        "box of the first-sighting actor (truth), coloured by `states/actor`; world frame"
+    ),
     "world/ego": "box of the car; world frame",
     "world/driven": "the way of the car's centre so far, on the ground; world frame",
-    "world/lidar": "the sensor frame in the world: x forward, y left, z up; metres. What is below it is in this frame",
+    "world/lidar": (
+        "the sensor frame in the world: x forward, y left, z up; metres. What is below it is in "
+        "this frame"
+    ),
     "world/lidar/path": "the strip that the controller guards, as far as it is drawn; sensor frame",
-    "world/lidar/returns": f"points, coloured by share; every nth of more than {MOST_POINTS} returns; sensor frame",
-    "world/lidar/tracks": "forecasts for this keyframe, faint when the last scan missed them; sensor frame",
+    "world/lidar/returns": (
+        f"points, coloured by share; every nth of more than {MOST_POINTS} returns; sensor frame"
+    ),
+    "world/lidar/tracks": (
+        "forecasts for this keyframe, faint when the last scan missed them; sensor frame"
+    ),
     "world/lidar/velocities": "their motion over ground in the next second, m/s; sensor axes",
-    "world/lidar/wedges/residual": f"edges of the wedges that no forecast explains, {WEDGE_M:.0f} m; sensor frame",
+    "world/lidar/wedges/residual": (
+        f"edges of the wedges that no forecast explains, {WEDGE_M:.0f} m; sensor frame"
+    ),
     "world/lidar/wedges/explained": "the same of those that a forecast explains",
-    "world/lidar/camera": "the camera that the policy knows, and its picture before any fault; pixels",
+    "world/lidar/camera": (
+        "the camera that the policy knows, and its picture before any fault; pixels"
+    ),
     "world/lidar/camera/explained": "detections that a forecast explains, as they arrived; pixels",
     "world/lidar/camera/residual": "detections that no forecast explains; pixels",
-    "world/lidar/camera/missed": "what the camera without its faults would have given besides; pixels",
-    "grid": "the angular grid as the car sees it: left is left, ahead in the middle, behind at both ends",
-    "grid/cells": f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the highest)",
+    "world/lidar/camera/missed": (
+        "what the camera without its faults would have given besides; pixels"
+    ),
+    "grid": (
+        "the angular grid as the car sees it: left is left, ahead in the middle, behind at both "
+        "ends"
+    ),
+    "grid/cells": (
+        f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the highest)"
+    ),
     "grid/hulls": "dilated hulls of the forecasts, as outlines; pixels of `grid/cells`",
     "grid/wedges/residual": "dilated wedges of the residual, as outlines; pixels of `grid/cells`",
-    "grid/wedges/explained": "dilated wedges of explained detections, as outlines; pixels of `grid/cells`",
+    "grid/wedges/explained": (
+        "dilated wedges of explained detections, as outlines; pixels of `grid/cells`"
+    ),
     "measures/speed": "the car's speed at the scan, m/s",
-    "measures/distance": "sensor to the centre of the first-sighting actor at the scan, planar, metres",
-    "measures/clearance": "hull to hull to that actor, at its least until the next keyframe, metres",
+    "measures/distance": (
+        "sensor to the centre of the first-sighting actor at the scan, planar, metres"
+    ),
+    "measures/clearance": (
+        "hull to hull to that actor, at its least until the next keyframe, metres"
+    ),
     "measures/braking": "1 while the brake is on, else 0",
     "budget/exploitation": "cells fired for exploitation, percent of the budget",
     "budget/reserve": "cells fired for the reserve, percent of the budget",
     "budget/floor": "cells that the random floor filled up, percent of the budget",
-    "budget/chosen": "cells that a raw action scored, whose share is not known, percent of the budget",
-    "states/actor": "the first-sighting actor: in or out of view of the unimpaired camera, or detected by this scan",
+    "budget/chosen": (
+        "cells that a raw action scored, whose share is not known, percent of the budget"
+    ),
+    "states/actor": (
+        "the first-sighting actor: in or out of view of the unimpaired camera, or detected by "
+        "this scan"
+    ),
     "states/brake": "on or off",
     "events": "what changed, in words",
     "outcome": "the result of the episode, `care_sim.loops.records.Outcome`",
@@ -52,16 +88,34 @@ ENTITIES = {
 """Entities of an episode, each below the name of its lane, and what they hold."""
 
 BODY_COLOURS = dict(
-    zip(CLASSES, [(88, 142, 212), (196, 154, 92), (206, 112, 178), (146, 190, 92), (240, 200, 70)], strict=True)
+    zip(
+        CLASSES,
+        [(88, 142, 212), (196, 154, 92), (206, 112, 178), (146, 190, 92), (240, 200, 70)],
+        strict=True,
+    )
 )
 NO_CLASS = (120, 124, 132)
 SHARE_COLOURS = ((38, 41, 48), (80, 200, 255), (255, 150, 30), (112, 116, 132), (170, 225, 110))
 """Not fired, exploitation, reserve, floor, chosen."""
-EXPLAINED, RESIDUAL, MISSED = (80, 200, 255), (255, 150, 30), (255, 80, 120)
-OUT_OF_VIEW, IN_VIEW, DETECTED = (225, 225, 225), (255, 170, 40), (80, 230, 110)
-EGO, COASTING, BRAKE, PATH = (200, 204, 212), (110, 130, 165), (255, 80, 70), (46, 54, 68)
+EXPLAINED = (80, 200, 255)
+RESIDUAL = (255, 150, 30)
+MISSED = (255, 80, 120)
+OUT_OF_VIEW = (225, 225, 225)
+IN_VIEW = (255, 170, 40)
+DETECTED = (80, 230, 110)
+EGO = (200, 204, 212)
+COASTING = (110, 130, 165)
+BRAKE = (255, 80, 70)
+PATH = (46, 54, 68)
 ACTOR_COLOURS = {"out of view": OUT_OF_VIEW, "in view": IN_VIEW, "detected": DETECTED}
-LANES = ((170, 225, 110), (230, 120, 200), (240, 200, 70), (130, 160, 255), (255, 120, 90), (225, 225, 225))
+LANES = (
+    (170, 225, 110),
+    (230, 120, 200),
+    (240, 200, 70),
+    (130, 160, 255),
+    (255, 120, 90),
+    (225, 225, 225),
+)
 """Colours of the curves of episodes that are played side by side."""
 
 
@@ -69,7 +123,8 @@ def about() -> str:
     """The entities, as a table in Markdown."""
     rows = "\n".join(f"| `{path}` | {content} |" for path, content in ENTITIES.items())
     return (
-        "Recorded with CARE-Sim. Metres, seconds, radians; timelines `seconds` (of the scan) and `keyframe` (from 0).\n"
+        "Recorded with CARE-Sim. Metres, seconds, radians; timelines `seconds` (of the scan) and "
+        "`keyframe` (from 0).\n"
         "Bodies, pictures, what was missed and the states are truth, which no policy is shown.\n\n"
         f"| entity | content |\n|---|---|\n{rows}\n"
     )

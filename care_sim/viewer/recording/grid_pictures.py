@@ -17,14 +17,19 @@ from care_sim.viewer.recording.outlines import outlines
 
 CAMERA = "world/lidar/camera"
 COLOURS = {"explained": looks.EXPLAINED, "residual": looks.RESIDUAL, "missed": looks.MISSED}
-OUTLINES = {"hulls": looks.EGO, "wedges/explained": looks.EXPLAINED, "wedges/residual": looks.RESIDUAL}
+OUTLINES = {
+    "hulls": looks.EGO,
+    "wedges/explained": looks.EXPLAINED,
+    "wedges/residual": looks.RESIDUAL,
+}
 
 
 class Pictures:
     """Logs the camera's picture and the picture of the grid."""
 
     def __init__(self, lane: Lane, rig: Rig):
-        self._lane, self._rig = lane, rig
+        self._lane = lane
+        self._rig = rig
         camera = rig.cameras[0]
         place = rr.Transform3D(translation=camera.position, mat3x3=camera.axes.T)
         lens = rr.Pinhole(
@@ -35,12 +40,19 @@ class Pictures:
             image_plane_distance=1.0,
         )
         lane.fix(CAMERA, place, lens)
-        shares = [(n, name, colour) for n, (name, colour) in enumerate(zip(SHARES, looks.SHARE_COLOURS, strict=True))]
+        shares = [
+            (n, name, colour)
+            for n, (name, colour) in enumerate(zip(SHARES, looks.SHARE_COLOURS, strict=True))
+        ]
         lane.fix("grid", rr.AnnotationContext(shares))
         for kind, colour in COLOURS.items():
             # explained ones stand side by side: their names would overlap
-            names = rr.Points2D.from_fields(colors=[colour], radii=[0.0], show_labels=kind != "explained")
-            lane.fix(f"{CAMERA}/{kind}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]), names)
+            names = rr.Points2D.from_fields(
+                colors=[colour], radii=[0.0], show_labels=kind != "explained"
+            )
+            lane.fix(
+                f"{CAMERA}/{kind}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]), names
+            )
         for entity, colour in OUTLINES.items():
             lane.fix(f"grid/{entity}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]))
 
@@ -52,18 +64,31 @@ class Pictures:
 
     def _log_detections(self, situation: Situation) -> None:
         seen = situation.belief.detections
-        names = [f"false {name}" if false else name for name, false in zip(_names(seen), situation.false, strict=True)]
+        names = [
+            f"false {name}" if false else name
+            for name, false in zip(_names(seen), situation.false, strict=True)
+        ]
         for kind, chosen in (("explained", situation.known), ("residual", ~situation.known)):
             self._log_named(kind, seen.boxes[chosen], list(compress(names, chosen)))
-        self._log_named("missed", situation.missed.boxes, [f"missed {name}" for name in _names(situation.missed)])
+        self._log_named(
+            "missed",
+            situation.missed.boxes,
+            [f"missed {name}" for name in _names(situation.missed)],
+        )
 
     def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:
         """Boxes, and their names as those of points, which the viewer does not break into lines."""
         below = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, 3]])
-        self._lane.log_list(f"{CAMERA}/{kind}", len(boxes), lambda: (_boxes(boxes), rr.Points2D(below, labels=names)))
+        self._lane.log_list(
+            f"{CAMERA}/{kind}",
+            len(boxes),
+            lambda: (_boxes(boxes), rr.Points2D(below, labels=names)),
+        )
 
     def _log_grid(self, watched: WatchedKeyframe) -> None:
-        belief, known, rig = watched.situation.belief, watched.situation.known, self._rig
+        belief = watched.situation.belief
+        known = watched.situation.known
+        rig = self._rig
         cells = np.repeat(watched.shares[:, ::-1], looks.ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
         sectors = wedges(belief.detections, rig)

@@ -22,7 +22,8 @@ class Lane:
     """Logs below `name` into a stream."""
 
     def __init__(self, stream: rr.RecordingStream, name: str):
-        self._stream, self.name = stream, name
+        self._stream = stream
+        self.name = name
         self._counts: dict[str, int] = {}
 
     def at(self, keyframe: int, time_s: float) -> None:
@@ -35,15 +36,24 @@ class Lane:
         self._stream.log(entity_path(self.name, entity), *content)
 
     def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
-        """Log a list of `count` things at the present keyframe, made by `make`; nothing if it was and is empty."""
+        """Log a list of `count` things at the present keyframe, made by `make`; nothing if it was
+        and is empty.
+        """
         if count or self._counts.get(entity) != 0:
             self.log(entity, *make())
         self._counts[entity] = count
 
-    def log_curve(self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats) -> None:
+    def log_curve(
+        self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats
+    ) -> None:
         """Log a number a keyframe (n,) at once, which costs as much as logging one."""
-        times = rr.TimeColumn(KEYFRAME, sequence=keyframes), rr.TimeColumn(SECONDS, duration=times_s)
-        self._stream.send_columns(entity_path(self.name, entity), times, rr.Scalars.columns(scalars=values))
+        times = (
+            rr.TimeColumn(KEYFRAME, sequence=keyframes),
+            rr.TimeColumn(SECONDS, duration=times_s),
+        )
+        self._stream.send_columns(
+            entity_path(self.name, entity), times, rr.Scalars.columns(scalars=values)
+        )
 
     def fix(self, entity: str, *content: Any) -> None:
         """Log what holds for the whole episode."""

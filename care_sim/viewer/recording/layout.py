@@ -43,7 +43,10 @@ def _one(lane: str) -> rrb.Vertical:
 
 
 def _several(lanes: Sequence[str]) -> rrb.Vertical:
-    columns = [rrb.Vertical(_chase(lane), _camera(lane), _grid(lane), row_shares=[4, 3, 1.3]) for lane in lanes]
+    columns = [
+        rrb.Vertical(_chase(lane), _camera(lane), _grid(lane), row_shares=[4, 3, 1.3])
+        for lane in lanes
+    ]
     below = rrb.Horizontal(_states(lanes), *_plots(lanes))
     return rrb.Vertical(rrb.Horizontal(*columns), below, row_shares=[4, 0.5 + 0.4 * len(lanes)])
 
@@ -51,7 +54,10 @@ def _several(lanes: Sequence[str]) -> rrb.Vertical:
 def _chase(lane: str) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=entity_path(lane, "world/lidar"),
-        contents=[f"+ {entity_path(lane, 'world/**')}", f"- {entity_path(lane, 'world/lidar/camera/**')}"],
+        contents=[
+            f"+ {entity_path(lane, 'world/**')}",
+            f"- {entity_path(lane, 'world/lidar/camera/**')}",
+        ],
         name=f"{lane}: the street",
         background=DARK,
         line_grid=False,
@@ -76,6 +82,8 @@ def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:
 
 def _plots(lanes: Sequence[str]) -> list[rrb.TimeSeriesView]:
     return [
-        rrb.TimeSeriesView(contents=[entity_path(lane, f"measures/{name}") for lane in lanes], name=title)
+        rrb.TimeSeriesView(
+            contents=[entity_path(lane, f"measures/{name}") for lane in lanes], name=title
+        )
         for name, title in (("speed", "Speed, m/s"), ("clearance", "Clearance, m"))
     ]

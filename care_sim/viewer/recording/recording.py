@@ -22,25 +22,31 @@ from care_sim.viewer.recording.space import Space
 
 
 class Recording(AbstractContextManager["Recording"]):
-    """Writes `path`, which is there once this is closed; `lanes` are the names of the episodes that will be in it.
-    Until then it is held in memory: 1 to 9 MB an episode.
+    """Writes `path`, which is there once this is closed; `lanes` are the names of the episodes that
+    will be in it. Until then it is held in memory: 1 to 9 MB an episode.
 
-    Raises InvalidInput for a lane with the name of the page `about`, and as `care_sim.base.files.replacing` does.
+    Raises InvalidInput for a lane with the name of the page `about`, and as
+    `care_sim.base.files.replacing` does.
     """
 
     def __init__(self, path: Path, lanes: Sequence[str]):
         if ABOUT in lanes:
-            raise InvalidInput(f"{ABOUT!r} is a page of every recording: name the episode otherwise")
+            raise InvalidInput(
+                f"{ABOUT!r} is a page of every recording: name the episode otherwise"
+            )
         self._lanes = tuple(lanes)
         self._file = ExitStack()
         self._unfinished = self._file.enter_context(replacing(path, RERUN))
         self._stream = rr.RecordingStream("care-sim")
-        # Rerun's own writer is a thread that a full disk ends, and whatever waits for it then waits for ever.
+        # Rerun's own writer is a thread that a full disk ends, and whatever waits for it then waits
+        # for ever.
         self._memory = self._stream.memory_recording()
         self._stream.send_blueprint(blueprint(self._lanes), make_active=False)
         self._file.callback(self._write)
         self._stream.send_recording_name(path.stem)
-        self._stream.log(ABOUT, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True)
+        self._stream.log(
+            ABOUT, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True
+        )
 
     def episode(self, name: str, loop: ClosedLoop) -> "Episode":
         """Begin the lane `name`. Raises InvalidInput for one that was not announced."""
@@ -66,7 +72,8 @@ class Episode:
 
     def __init__(self, lane: Lane, rig: Rig, ego_width_m: float, colour: tuple[int, int, int]):
         self._lane = lane
-        self._space, self._pictures = Space(lane, rig, ego_width_m), Pictures(lane, rig)
+        self._space = Space(lane, rig, ego_width_m)
+        self._pictures = Pictures(lane, rig)
         self._curves = Curves(lane, rig.budget, colour)
         self._photo = b""
 

@@ -29,7 +29,8 @@ class Space:
     """Logs the 3D part of an episode whose car is `ego_width_m` wide."""
 
     def __init__(self, lane: Lane, rig: Rig, ego_width_m: float):
-        self._lane, self._rig = lane, rig
+        self._lane = lane
+        self._rig = rig
         self._driven: list[Floats] = []
         lane.fix("world", rr.ViewCoordinates.FLU)
         width = ego_width_m + 2 * BrakingRules().side_margin_m
@@ -40,9 +41,18 @@ class Space:
         lane.fix("world/driven", rr.LineStrips3D.from_fields(colors=[looks.EGO], radii=[THIN]))
         lane.fix("world/lidar/returns", rr.Points3D.from_fields(radii=[2 * THIN]))
         lane.fix("world/lidar/tracks", rr.Boxes3D.from_fields(show_labels=False))
-        lane.fix("world/lidar/velocities", rr.Arrows3D.from_fields(colors=[looks.EXPLAINED], radii=[0.08]))
-        for kind, colour in (("residual", (*looks.RESIDUAL, 200)), ("explained", (*looks.EXPLAINED, 50))):
-            lane.fix(f"world/lidar/wedges/{kind}", rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]))
+        lane.fix(
+            "world/lidar/velocities",
+            rr.Arrows3D.from_fields(colors=[looks.EXPLAINED], radii=[0.08]),
+        )
+        for kind, colour in (
+            ("residual", (*looks.RESIDUAL, 200)),
+            ("explained", (*looks.EXPLAINED, 50)),
+        ):
+            lane.fix(
+                f"world/lidar/wedges/{kind}",
+                rr.LineStrips3D.from_fields(colors=[colour], radii=[THIN]),
+            )
 
     def log(self, watched: WatchedKeyframe, state: str) -> None:
         """A keyframe, with the state of the first-sighting actor."""
@@ -52,17 +62,27 @@ class Space:
         self._log_returns(watched)
         self._log_tracks(situation)
         for kind, chosen in (("residual", ~situation.known), ("explained", situation.known)):
-            self._log_wedges(kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, CORNERS])
+            self._log_wedges(
+                kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, CORNERS]
+            )
 
     def _log_bodies(self, situation: Situation, state: str) -> None:
         colours = [
-            looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]] for label in situation.labels
+            looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]]
+            for label in situation.labels
         ]
-        self._lane.log("world/bodies", boxes(situation.bodies, colors=colours, labels=situation.names))
+        self._lane.log(
+            "world/bodies", boxes(situation.bodies, colors=colours, labels=situation.names)
+        )
         if situation.target is not None:
-            around = situation.bodies[[situation.target]] + np.array([0, 0, 0, *[2 * MARGIN_M] * 3, 0])
+            around = situation.bodies[[situation.target]] + np.array(
+                [0, 0, 0, *[2 * MARGIN_M] * 3, 0]
+            )
             text = [f"{situation.names[situation.target]}: {state}"]
-            self._lane.log("world/first_sighting", boxes(around, colors=looks.ACTOR_COLOURS[state], labels=text))
+            self._lane.log(
+                "world/first_sighting",
+                boxes(around, colors=looks.ACTOR_COLOURS[state], labels=text),
+            )
 
     def _log_ego(self, situation: Situation) -> None:
         self._lane.log("world/ego", boxes(situation.ego[None]))
@@ -92,11 +112,13 @@ class Space:
     def _log_wedges(self, kind: str, rays: Floats) -> None:
         ends = looks.WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         strips = [strip for corners in ends for strip in _pyramid(corners)]
-        self._lane.log_list(f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)])
+        self._lane.log_list(
+            f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)]
+        )
 
 
 def _pyramid(corners: Floats) -> list[Floats]:
-    """The edges of a wedge whose far corners (4, 3) are given, seen from the sensor: three lines."""
+    """Three lines: the edges of a wedge, seen from the sensor, with far corners (4, 3)."""
     origin = np.zeros(3)
     a, b, c, d = corners
     return [np.array([origin, a, b, c, d, a]), np.array([b, origin, c]), np.array([origin, d])]

@@ -38,7 +38,11 @@ def test_there_is_a_cloud_and_a_description_for_every_keyframe(played):
     assert clouds == [f"{frame.index:03d}" for frame in keyframes]
     for frame in keyframes:
         text = beside(folder, f"{frame.index:03d}")
-        assert (text["keyframe"], text["time_s"], text["speed_mps"]) == (frame.index, frame.time_s, frame.speed_mps)
+        assert (text["keyframe"], text["time_s"], text["speed_mps"]) == (
+            frame.index,
+            frame.time_s,
+            frame.speed_mps,
+        )
         assert (text["detected"], text["braking"]) == (frame.detected, frame.braking)
         assert text["fired"] == frame.fired.tolist()
     episode = beside(folder, "episode")
@@ -53,7 +57,8 @@ def test_points_are_returns_of_the_fired_cells(played, open3d):
     seen = set()
     for frame in keyframes[::7]:
         cloud = open3d.t.io.read_point_cloud(str(folder / f"{frame.index:03d}.pcd")).point
-        cells, points = cloud["cell"].numpy().ravel(), cloud["positions"].numpy()
+        cells = cloud["cell"].numpy().ravel()
+        points = cloud["positions"].numpy()
         assert set(cells) <= set(frame.fired)
         assert len(points) > 500
         directions = points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -73,7 +78,9 @@ def test_poses_and_boxes_place_the_points_on_the_person(played, open3d):
     (person,) = (body for body in text["bodies"] if body["name"] == "person")
     assert person["class"] == "pedestrian"
     box = np.array(person["box"])
-    here = Frame(*box[:3], box[6]).vectors_to_local(sensor.origin + sensor.vectors_to_world(points) - box[:3])
+    here = Frame(*box[:3], box[6]).vectors_to_local(
+        sensor.origin + sensor.vectors_to_world(points) - box[:3]
+    )
     assert np.count_nonzero((np.abs(here) < box[3:6] / 2 + 0.01).all(axis=1)) >= 3
     assert np.hypot(box[0] - x, box[1] - y) == pytest.approx(outcome["detection_distance_m"])
 

@@ -1,4 +1,6 @@
-"""Wrappers that watch: where they go, what they keep of several episodes, and that they change nothing."""
+"""Wrappers that watch: where they go, what they keep of several episodes, and that they change
+nothing.
+"""
 
 import contextlib
 import sys
@@ -20,7 +22,7 @@ LIBRARIES = {RecordRerun: "rerun", ExportScans: "open3d"}
 
 @pytest.fixture(params=LIBRARIES, ids=lambda wrapper: wrapper.__name__)
 def watcher(request):
-    """The wrapper, where its library is installed; what it makes is called out.rrd, file or folder."""
+    """The wrapper, where its library is installed; it makes out.rrd, a file or a folder."""
     if request.param is ExportScans:
         request.getfixturevalue("open3d")
     else:
@@ -67,7 +69,8 @@ class Kept(Watching):
 
     def __init__(self, env):
         super().__init__(env)
-        self.moments, self.ended = [], []
+        self.moments = []
+        self.ended = []
 
     def begin(self, loop, episode):
         pass
@@ -145,11 +148,16 @@ def test_the_environment_is_closed_where_the_end_cannot_be_kept():
 def test_two_environments_do_not_write_to_one_place(watcher, tmp_path):
     """Nor do the two of a vector environment; with a place each, both are kept."""
     nothing = np.zeros((2, *make().action_space.shape), np.float32)
-    with contextlib.closing(SyncVectorEnv([lambda: watcher(make(), tmp_path / "out.rrd")] * 2)) as envs:
+    with contextlib.closing(
+        SyncVectorEnv([lambda: watcher(make(), tmp_path / "out.rrd")] * 2)
+    ) as envs:
         envs.reset(seed=0)
         with pytest.raises(care_sim.InvalidInput, match=r"out\.rrd"):
             envs.step(nothing)
-    apart = [partial(lambda path: watcher(make(), path), tmp_path / f"out-{number}.rrd") for number in (5, 6)]
+    apart = [
+        partial(lambda path: watcher(make(), path), tmp_path / f"out-{number}.rrd")
+        for number in (5, 6)
+    ]
     with contextlib.closing(SyncVectorEnv(apart)) as envs:
         envs.reset(seed=0)
         envs.step(nothing)
@@ -176,7 +184,8 @@ def test_every_episode_that_was_begun_is_kept_beside_the_first(watcher, tmp_path
 
 
 def test_a_watched_episode_is_the_same_to_the_last_bit(watcher, tmp_path):
-    bare, watched = make(budget=0.05), watcher(make(budget=0.05), tmp_path / "out.rrd")
+    bare = make(budget=0.05)
+    watched = watcher(make(budget=0.05), tmp_path / "out.rrd")
     policy = care_sim.make_policy("care", bare)
     plain, seen = bare.reset(seed=5), watched.reset(seed=5)
     for _ in range(12):

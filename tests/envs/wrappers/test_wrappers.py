@@ -22,7 +22,11 @@ ORDERS = [
 
 @pytest.fixture(params=NAMES)
 def env(request):
-    place = {"source": f"argoverse2:{request.getfixturevalue('drive')}"} if request.param == "CARE-Replay-v0" else {}
+    place = (
+        {"source": f"argoverse2:{request.getfixturevalue('drive')}"}
+        if request.param == "CARE-Replay-v0"
+        else {}
+    )
     made = gymnasium.make(request.param, disable_env_checker=True, budget=0.03, **place)
     yield made
     made.close()
@@ -36,7 +40,10 @@ def test_stable_baselines3_and_gymnasium_find_nothing_to_complain_about(env, wra
         wrapped = wrap(env)
         checker.check_env(wrapped)
         again = gymnasium.make(wrapped.spec, disable_env_checker=True)
-        assert (again.observation_space, again.action_space) == (wrapped.observation_space, wrapped.action_space)
+        assert (again.observation_space, again.action_space) == (
+            wrapped.observation_space,
+            wrapped.action_space,
+        )
         again.close()
     observation, _ = wrapped.reset(seed=1)
     for _ in range(5):
@@ -65,13 +72,18 @@ def test_the_reserve_goes_to_the_best_sector_and_exploitation_stays():
     env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03)
     wrapped = SectorReserve(env)
     scores = np.zeros((4, 32), np.float32)
-    scores[1, 15], scores[2, 16] = 0.9, 0.5
-    best, second = wrapped.sectors.cells[32 + 15], wrapped.sectors.cells[64 + 16]
+    scores[1, 15] = 0.9
+    scores[2, 16] = 0.5
+    best = wrapped.sectors.cells[32 + 15]
+    second = wrapped.sectors.cells[64 + 16]
     wrapped.reset(seed=0)
     for _ in range(10):
-        rig, belief = env.unwrapped.rig, env.unwrapped.belief
+        rig = env.unwrapped.rig
+        belief = env.unwrapped.belief
         hulls = care_sim.Demand(rig.hulls(belief.tracks.boxes))
-        exploited = care_sim.allocate(hulls, rig.budget, rig.reserve_fraction)[: round(0.7 * rig.budget)]
+        exploited = care_sim.allocate(hulls, rig.budget, rig.reserve_fraction)[
+            : round(0.7 * rig.budget)
+        ]
         cells = set(wrapped.step(scores)[-1]["fired"].tolist())
         assert len(cells) == rig.budget
         assert set(exploited.tolist()) <= cells
@@ -85,7 +97,8 @@ def test_the_reserve_goes_to_the_best_sector_and_exploitation_stays():
 def test_scores_of_sectors_fire_the_best_sectors():
     env = SectorScores(gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03))
     scores = np.full((4, 32), -1, np.float32)
-    scores[3, 31], scores[0, 0] = 0.2, 0.1
+    scores[3, 31] = 0.2
+    scores[0, 0] = 0.1
     (cells,) = fired(env, [scores])
     tiles = env.sectors.cells
     assert set(tiles[3 * 32 + 31].tolist()) | set(tiles[0].tolist()) <= set(cells)
@@ -111,7 +124,9 @@ def test_what_does_not_fit_is_refused_in_one_line(wrapper):
     env.close()
 
 
-@pytest.mark.parametrize("action", [np.zeros((32, 4), np.float32), np.full((4, 32), np.nan, np.float32)])
+@pytest.mark.parametrize(
+    "action", [np.zeros((32, 4), np.float32), np.full((4, 32), np.nan, np.float32)]
+)
 @pytest.mark.parametrize("wrapper", [SectorReserve, SectorScores])
 def test_a_wrong_action_is_refused(wrapper, action):
     env = wrapper(gymnasium.make("CARE-Dense-v0", disable_env_checker=True))

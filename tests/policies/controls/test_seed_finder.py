@@ -43,7 +43,9 @@ def played(env, name, seed=3, watch=lambda *_: None, **parameters):
 
 
 @pytest.mark.parametrize("scenario", ENVIRONMENTS)
-def test_it_finds_the_seed_and_expects_the_hidden_one_where_it_is_even_when_the_car_brakes(make, scenario):
+def test_it_finds_the_seed_and_expects_the_hidden_one_where_it_is_even_when_the_car_brakes(
+    make, scenario
+):
     env = make(scenario, budget=0.2)
     braked = []
 
@@ -77,7 +79,8 @@ def test_blind_it_is_as_early_as_the_full_scan_and_with_a_secret_it_is_history(m
 @pytest.mark.parametrize("known", [{"seeds": 3}, {"scenario": "cutin", "seeds": 3}])
 def test_a_seed_that_it_does_not_know_is_played_as_history(make, known):
     env = make(**BLIND)
-    finder, history = care_sim.make_policy("seed-finder", env, **known), care_sim.make_policy("history", env)
+    finder = care_sim.make_policy("seed-finder", env, **known)
+    history = care_sim.make_policy("history", env)
     observation, _ = env.reset(seed=3)
     np.testing.assert_array_equal(finder(observation), history(observation))
     assert finder.found is None
@@ -87,7 +90,8 @@ def test_a_seed_that_it_does_not_know_is_played_as_history(make, known):
 def test_it_knows_the_scenario_of_its_environment(make, scenario):
     env = make(scenario, budget=0.03)
     observation, _ = env.reset(seed=9)
-    told, own = care_sim.make_policy("seed-finder", env, scenario=scenario), care_sim.make_policy("seed-finder", env)
+    told = care_sim.make_policy("seed-finder", env, scenario=scenario)
+    own = care_sim.make_policy("seed-finder", env)
     np.testing.assert_array_equal(own(observation), told(observation))
     assert own.found == 9
 

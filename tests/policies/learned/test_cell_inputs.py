@@ -95,7 +95,9 @@ def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
 
 
 def test_outlooks_are_those_of_the_ray():
-    elevation, ground, cosine, sine, covered = Cues(RIG).outlooks.T.reshape(len(OUTLOOKS), *GRID.shape)
+    elevation, ground, cosine, sine, covered = Cues(RIG).outlooks.T.reshape(
+        len(OUTLOOKS), *GRID.shape
+    )
     assert elevation[:, 0] == pytest.approx(np.linspace(GRID.top, GRID.bottom, 32) / 0.5, abs=1e-6)
     assert ground[7, 3] == 0
     assert ground[20, 3] == pytest.approx(1 - 1.84 / np.sin(np.deg2rad(16)) / 50, abs=1e-3)

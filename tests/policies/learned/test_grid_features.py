@@ -24,7 +24,9 @@ SEEN_CAR = [CLASSES.index("car"), 0.9, 140, 80, 180, 130, 0, 0, 0]
 def belief(tracks=(), detections=(), ranges=None, ego=DRIVING):
     scan = np.zeros((32, 512), np.float32) if ranges is None else ranges
     seen = ImageDetections.from_rows(np.array(detections, float).reshape(-1, 9))
-    return Belief(ego, RIG.budget, seen, Tracks.from_rows(np.array(tracks, float).reshape(-1, 13)), scan)
+    return Belief(
+        ego, RIG.budget, seen, Tracks.from_rows(np.array(tracks, float).reshape(-1, 13)), scan
+    )
 
 
 def pictures(seen, features=FEATURES):
@@ -58,13 +60,17 @@ def test_hulls_and_wedges_are_shares_of_blocks():
     unexplained, explained = camera_layers(seen, RIG)
     assert (len(unexplained), len(explained)) == (1, 1)
     drawn = pictures(seen)
-    np.testing.assert_allclose(drawn["forecast"], pooled(RIG.hulls(seen.tracks.boxes)[0]), atol=1e-6)
+    np.testing.assert_allclose(
+        drawn["forecast"], pooled(RIG.hulls(seen.tracks.boxes)[0]), atol=1e-6
+    )
     np.testing.assert_allclose(drawn["residual"], pooled(unexplained[0]), atol=1e-6)
     np.testing.assert_allclose(drawn["explained"], pooled(explained[0]), atol=1e-6)
 
 
 def test_hulls_that_overlap_count_a_cell_once():
-    np.testing.assert_array_equal(pictures(belief([CAR, CAR]))["forecast"], pictures(belief([CAR]))["forecast"])
+    np.testing.assert_array_equal(
+        pictures(belief([CAR, CAR]))["forecast"], pictures(belief([CAR]))["forecast"]
+    )
 
 
 def test_the_nearest_return_of_a_block_and_the_share_fired():
@@ -99,7 +105,9 @@ def test_a_return_inside_a_forecast_is_no_surprise():
 @given(st.integers(0, 2**32 - 1))
 def test_every_value_stays_within_its_bounds(seed):
     rng = np.random.default_rng(seed)
-    ranges = rng.uniform(0, 50, (32, 512)).astype(np.float32) * (rng.random((32, 512)) < rng.random())
+    ranges = rng.uniform(0, 50, (32, 512)).astype(np.float32) * (
+        rng.random((32, 512)) < rng.random()
+    )
     tracks = np.tile(CAR, (20, 1))
     tracks[:, 2:4] = rng.uniform(-60, 60, (20, 2))
     seen = belief(tracks, ranges=ranges.astype(np.float32), ego=Ego(*rng.uniform(-200, 200, 3)))

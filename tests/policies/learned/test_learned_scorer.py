@@ -26,7 +26,11 @@ CARD = Card("learned-scorer", asdict(AngularGrid()))
 def drawn(tmp_path):
     """Weights with no sense."""
     rng = np.random.default_rng(3)
-    arrays = {"layer": rng.normal(size=(INPUTS, 5)), "bias": rng.normal(size=5), "out": rng.normal(size=5)}
+    arrays = {
+        "layer": rng.normal(size=(INPUTS, 5)),
+        "bias": rng.normal(size=5),
+        "out": rng.normal(size=5),
+    }
     save(tmp_path / "drawn.npz", arrays, CARD)
     return tmp_path / "drawn.npz"
 
@@ -39,7 +43,8 @@ def test_the_highest_are_those_of_a_stable_sort(scores, data):
 
 
 def test_every_cell_is_scored_as_a_plain_network_does(drawn, encounter, environment):
-    weights, cues = load(drawn), Cues(environment.unwrapped.rig)
+    weights = load(drawn)
+    cues = Cues(environment.unwrapped.rig)
     network = CellNetwork(weights, cues.outlooks)
     layer, bias, out = (weights.arrays[name].astype(float) for name in ("layer", "bias", "out"))
     for observation in encounter[::8]:
@@ -50,13 +55,20 @@ def test_every_cell_is_scored_as_a_plain_network_does(drawn, encounter, environm
         np.testing.assert_allclose(network.scores(seen), expected, rtol=1e-4, atol=1e-4)
 
 
-def test_the_reserve_and_no_more_goes_to_the_highest_scores_and_the_rest_is_history(encounter, environment):
-    scorer, history = (care_sim.make_policy(name, environment) for name in ("learned-scorer", "history"))
+def test_the_reserve_and_no_more_goes_to_the_highest_scores_and_the_rest_is_history(
+    encounter, environment
+):
+    scorer, history = (
+        care_sim.make_policy(name, environment) for name in ("learned-scorer", "history")
+    )
     for observation in encounter[::4]:
         belief = Belief.from_observation(observation)
-        asked, hulls = scorer.demand(belief), history.demand(belief).exploitation
+        asked = scorer.demand(belief)
+        hulls = history.demand(belief).exploitation
         ((reserve,),) = asked.layers
-        assert [cells.tolist() for cells in asked.exploitation] == [cells.tolist() for cells in hulls]
+        assert [cells.tolist() for cells in asked.exploitation] == [
+            cells.tolist() for cells in hulls
+        ]
         assert len(np.unique(reserve)) == len(reserve) == 819 - round(0.7 * 819)
 
 
@@ -79,7 +91,12 @@ def test_shipped_weights_are_small_and_say_what_they_are():
     path = shipped("learned-scorer")
     card = load(path).card
     assert path.stat().st_size < 3e6
-    assert (card.kind, card.budget, card.wrapper, card.scenario) == ("learned-scorer", None, None, "CARE-Street-v0")
+    assert (card.kind, card.budget, card.wrapper, card.scenario) == (
+        "learned-scorer",
+        None,
+        None,
+        "CARE-Street-v0",
+    )
     assert card.seeds["calibration"] == list(range(1000, 1020))
     assert card.result["loss held out"] < np.log(2)
 
@@ -94,13 +111,27 @@ def test_weights_of_the_user_are_used(drawn, encounter, environment):
     ("card", "arrays", "message"),
     [
         (replace(CARD, kind="ppo"), {}, "kind is 'ppo', needed is 'learned-scorer'"),
-        (replace(CARD, grid={**CARD.grid, "columns": 256}), {}, "grid is columns 256 .* needed is columns 512"),
+        (
+            replace(CARD, grid={**CARD.grid, "columns": 256}),
+            {},
+            "grid is columns 256 .* needed is columns 512",
+        ),
         (CARD, {}, "no array 'layer'"),
-        (CARD, {"layer": np.zeros((3, 4))}, f"array 'layer' has the shape .3, 4., needed is {INPUTS} x any"),
-        (CARD, {"layer": np.zeros((INPUTS, 4)), "bias": np.zeros(4), "out": np.zeros(5)}, "array 'out' has the shape"),
+        (
+            CARD,
+            {"layer": np.zeros((3, 4))},
+            f"array 'layer' has the shape .3, 4., needed is {INPUTS} x any",
+        ),
+        (
+            CARD,
+            {"layer": np.zeros((INPUTS, 4)), "bias": np.zeros(4), "out": np.zeros(5)},
+            "array 'out' has the shape",
+        ),
     ],
 )
-def test_weights_for_something_else_are_refused_in_one_line(tmp_path, environment, card, arrays, message):
+def test_weights_for_something_else_are_refused_in_one_line(
+    tmp_path, environment, card, arrays, message
+):
     save(tmp_path / "w.npz", arrays, card)
     with pytest.raises(InvalidInput, match=message) as refusal:
         care_sim.make_policy("learned-scorer", environment, path=tmp_path / "w.npz")

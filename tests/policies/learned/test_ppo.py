@@ -1,4 +1,6 @@
-"""The learned allocator as a policy of the benchmark: weights in, the learner's choices out, without PyTorch."""
+"""The learned allocator as a policy of the benchmark: weights in, the learner's choices out,
+without PyTorch.
+"""
 
 import subprocess
 import sys
@@ -31,7 +33,9 @@ def env():
 
 def score_map(wrapping, **arrays):
     """A map of zeros but for the arrays."""
-    zeros = {name: np.zeros(shape, np.float32) for name, shape in shapes(wrapping, hidden=1).items()}
+    zeros = {
+        name: np.zeros(shape, np.float32) for name, shape in shapes(wrapping, hidden=1).items()
+    }
     given = {name: np.asarray(array, np.float32) for name, array in arrays.items()}
     return ScoreMap(Weights("hand", zeros | given, None), wrapping)
 
@@ -47,7 +51,9 @@ def test_every_sector_sees_its_blocks_and_one_more_on_each_side_over_the_seam():
     wrapping = Wrapping(azimuths=4, elevations=2, columns=8, rows=4)
     kernel = np.zeros((1, len(CHANNELS), 4, 4))
     kernel[0, 1] = 1.0
-    scores = score_map(wrapping, **{"window.weight": kernel, "hidden.weight": [[1.0]], "score.weight": [0.1]})
+    scores = score_map(
+        wrapping, **{"window.weight": kernel, "hidden.weight": [[1.0]], "score.weight": [0.1]}
+    )
     lit = np.tanh(0.1)
     for blocks, expected in {
         (0, 0): [[lit, 0, 0, lit], [0, 0, 0, 0]],
@@ -60,7 +66,12 @@ def test_every_sector_sees_its_blocks_and_one_more_on_each_side_over_the_seam():
 
 def test_the_cars_own_motion_and_the_place_count():
     wrapping = Wrapping(azimuths=2, elevations=1, columns=2, rows=1)
-    own = {"ego.weight": [[2, 0, 0, 0]], "window.bias": [-0.25], "hidden.weight": [[2]], "hidden.bias": [0.5]}
+    own = {
+        "ego.weight": [[2, 0, 0, 0]],
+        "window.bias": [-0.25],
+        "hidden.weight": [[2]],
+        "hidden.bias": [0.5],
+    }
     scores = score_map(wrapping, **own, **{"score.weight": [0.5], "place": [[0.0, -1.0]]})
     np.testing.assert_allclose(scores(observation(wrapping, 0)), [np.tanh([1.0, 0.0])], atol=1e-6)
 
@@ -100,7 +111,9 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
         for number, expected in enumerate(actions):
             one = {name: array[number] for name, array in observations.items()}
             np.testing.assert_allclose(numpy(one), expected, atol=2e-6)
-            assert np.array_equal(np.argsort(-numpy(one).ravel())[:3], np.argsort(-expected.ravel())[:3])
+            assert np.array_equal(
+                np.argsort(-numpy(one).ravel())[:3], np.argsort(-expected.ravel())[:3]
+            )
         observations, *_ = envs.step(actions)
     assert np.abs(actions).max() > 0.01
     envs.close()
@@ -129,10 +142,22 @@ def test_it_acts_without_torch(tmp_path):
         ({"budget": 819}, r"budget is 819 cells \(0.04999\), needed is 492"),
         ({"grid": AngularGrid(columns=256)}, "grid is columns 256"),
         ({"kind": "learned-scorer"}, "kind is 'learned-scorer', needed is 'ppo'"),
-        ({"wrapper": "GridObservation"}, "wrapper 'GridObservation' is none of the form 'SectorReserve 32 x 4, Grid"),
-        ({"wrapper": "SectorReserve 16 x 4, GridObservation 64 x 8"}, "array 'window.weight' has the shape"),
-        ({"wrapper": "SectorReserve 0 x 4, GridObservation 64 x 8"}, "azimuths must be a whole number >= 1"),
-        ({"wrapper": "SectorReserve 32 x 4, GridObservation 48 x 8"}, "azimuths must divide columns, got 32 and 48"),
+        (
+            {"wrapper": "GridObservation"},
+            "wrapper 'GridObservation' is none of the form 'SectorReserve 32 x 4, Grid",
+        ),
+        (
+            {"wrapper": "SectorReserve 16 x 4, GridObservation 64 x 8"},
+            "array 'window.weight' has the shape",
+        ),
+        (
+            {"wrapper": "SectorReserve 0 x 4, GridObservation 64 x 8"},
+            "azimuths must be a whole number >= 1",
+        ),
+        (
+            {"wrapper": "SectorReserve 32 x 4, GridObservation 48 x 8"},
+            "azimuths must divide columns, got 32 and 48",
+        ),
     ],
 )
 def test_weights_for_something_else_are_refused_in_one_line(tmp_path, env, card, message):
@@ -156,7 +181,9 @@ def test_the_shipped_weights_fit_any_budget_and_see_the_person_early(name, budge
 
 
 def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env):
-    """What the results say of the shipped weights: without pictures as early, without the place nearly so."""
+    """What the results say of the shipped weights: without pictures as early, without the place
+    nearly so.
+    """
     weights = load(shipped("ppo-dense"))
     paths = [shipped("ppo-dense")]
     for name in ("window.weight", "place"):
@@ -165,14 +192,18 @@ def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env
     distances = []
     for path in paths:
         policy = care_sim.make_policy("ppo", env, path=path)
-        distances.append(evaluate(env, lambda seen, _, policy=policy: policy(seen), range(3)).distance_m)
+        distances.append(
+            evaluate(env, lambda seen, _, policy=policy: policy(seen), range(3)).distance_m
+        )
     assert distances[0] == distances[1] > 15
     assert distances[2] > distances[0] - 1
 
 
 def test_it_is_no_policy_behind_wrappers_of_learners(env):
     for wrapped in (SectorReserve(env), GridObservation(env), GridObservation(SectorScores(env))):
-        with pytest.raises(InvalidInput, match=r"policy ppo plays .*: give and step env\.unwrapped"):
+        with pytest.raises(
+            InvalidInput, match=r"policy ppo plays .*: give and step env\.unwrapped"
+        ):
             care_sim.make_policy("ppo", wrapped)
     care_sim.make_policy("ppo", SectorReserve(env).unwrapped)
 

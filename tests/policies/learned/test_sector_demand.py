@@ -13,14 +13,21 @@ RIG = Rig(GRID, budget=4)
 QUARTERS = Tiling(GRID, 2, 2)
 SCORES = np.array([[0.1, 0.2], [0.3, 0.4]])
 NOTHING = Belief(
-    Ego(), 4, ImageDetections.from_rows(np.empty((0, 9))), Tracks.from_rows(np.empty((0, 13))), np.zeros((4, 4))
+    Ego(),
+    4,
+    ImageDetections.from_rows(np.empty((0, 9))),
+    Tracks.from_rows(np.empty((0, 13))),
+    np.zeros((4, 4)),
 )
 
 
 def test_sectors_become_layers_behind_the_hulls():
     demand = reserve_demand(NOTHING, RIG, QUARTERS, SCORES)
     assert demand.exploitation == []
-    assert [[cells.tolist() for cells in layer] for layer in demand.layers] == [[[10, 11, 14, 15]], [[8, 9, 12, 13]]]
+    assert [[cells.tolist() for cells in layer] for layer in demand.layers] == [
+        [[10, 11, 14, 15]],
+        [[8, 9, 12, 13]],
+    ]
 
 
 def test_sectors_alone_fill_the_budget_best_first():

@@ -27,7 +27,13 @@ def test_the_best_come_first_ties_by_index_and_none_that_is_not_positive():
 
 
 def test_no_more_tiles_than_hold_enough():
-    assert [len(QUARTERS.ranked(np.ones((2, 2)), cells)) for cells in (0, 1, 4, 5, 100)] == [0, 1, 1, 2, 4]
+    assert [len(QUARTERS.ranked(np.ones((2, 2)), cells)) for cells in (0, 1, 4, 5, 100)] == [
+        0,
+        1,
+        1,
+        2,
+        4,
+    ]
 
 
 @given(st.sampled_from([1, 2, 4, 8, 16, 512]), st.sampled_from([1, 2, 4, 32]))
@@ -36,7 +42,9 @@ def test_the_tiles_part_the_grid(azimuths, elevations):
     assert np.array_equal(np.sort(tiling.cells.ravel()), np.arange(AngularGrid().size))
     tall, wide = tiling.tile_shape
     rows, columns = np.divmod(tiling.cells, 512)
-    assert np.array_equal(rows // tall * azimuths + columns // wide, np.indices(tiling.cells.shape)[0])
+    assert np.array_equal(
+        rows // tall * azimuths + columns // wide, np.indices(tiling.cells.shape)[0]
+    )
 
 
 @pytest.mark.parametrize(("azimuths", "elevations"), [(3, 4), (0, 4), (32, 5), (32, 64), (1.5, 4)])

@@ -1,4 +1,6 @@
-"""The files of learned weights: what is written is read back, and anything else is refused in one line."""
+"""The files of learned weights: what is written is read back, and anything else is refused in one
+line.
+"""
 
 import pickle
 from dataclasses import replace
@@ -16,7 +18,13 @@ from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import LARGEST_WEIGHT, Card, load, save, shipped
 
 ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}
-CARD = Card("learned-scorer", AngularGrid(), budget=492, wrapper="SectorReserve 32 x 4", seeds={"train": [1]})
+CARD = Card(
+    "learned-scorer",
+    AngularGrid(),
+    budget=492,
+    wrapper="SectorReserve 32 x 4",
+    seeds={"train": [1]},
+)
 RIG = Rig(budget=492)
 SHIPPED = {"learned-scorer": shipped("learned-scorer"), "ppo": shipped("ppo-dense")}
 
@@ -202,7 +210,9 @@ def one_array(path: Path) -> None:
 def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
     path = tmp_path / "spoilt.npz"
     spoil(path)
-    with pytest.raises(InvalidInput, match=r"spoilt\.npz: no \.npz of weights .*, or damaged") as refusal:
+    with pytest.raises(
+        InvalidInput, match=r"spoilt\.npz: no \.npz of weights .*, or damaged"
+    ) as refusal:
         load(path)
     assert "\n" not in str(refusal.value)
 
@@ -211,10 +221,8 @@ def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
 @pytest.mark.parametrize("largest", [LARGEST_WEIGHT, -LARGEST_WEIGHT])
 @pytest.mark.parametrize("name", ["learned-scorer", "ppo"])
 def test_the_largest_weights_overflow_nowhere(tmp_path, name, largest):
-    arrays, card = (
-        {n: np.full_like(a, largest) for n, a in load(SHIPPED[name]).arrays.items()},
-        load(SHIPPED[name]).card,
-    )
+    arrays = {n: np.full_like(a, largest) for n, a in load(SHIPPED[name]).arrays.items()}
+    card = load(SHIPPED[name]).card
     save(tmp_path / "w.npz", arrays, card)
     with gymnasium.make("CARE-Dartout-v0", budget=0.03, disable_env_checker=True) as env:
         policy = care_sim.make_policy(name, env, path=str(tmp_path / "w.npz"))
@@ -224,7 +232,8 @@ def test_the_largest_weights_overflow_nowhere(tmp_path, name, largest):
 
 
 def test_what_would_run_when_it_is_unpickled_does_not_run(tmp_path):
-    card, sprung = np.frombuffer(CARD.to_json().encode(), np.uint8), tmp_path / "sprung"
+    card = np.frombuffer(CARD.to_json().encode(), np.uint8)
+    sprung = tmp_path / "sprung"
     np.savez(tmp_path / "w.npz", card=card, weight=np.array([Trap(sprung)], object))
     with pytest.raises(InvalidInput, match="allow_pickle=False"):
         load(tmp_path / "w.npz")

@@ -44,11 +44,16 @@ def test_a_car_that_the_plane_would_bury_is_hit_all_the_same(tmp_path):
 
 
 def test_the_tilt_of_the_car_reaches_the_world_and_not_its_own_view(tmp_path):
-    """Boxes are annotated in the car's frame: however the car lies in the city, its sensors see the same."""
+    """Boxes are annotated in the car's frame: however the car lies in the city, its sensors see the
+    same.
+    """
     boxes = [CAR_AHEAD, box("PEDESTRIAN", (8.0, 5.0, 0.6), (0.6, 0.7, 1.8), yaw=0.7)]
     level, tilted = (
         film(parked(tmp_path / name, *boxes, pose=pose)).shots[0]
-        for name, pose in {"level": at(), "tilted": at(3.0, 4.0, 5.0, yaw=2.0, pitch=-0.06, roll=0.04)}.items()
+        for name, pose in {
+            "level": at(),
+            "tilted": at(3.0, 4.0, 5.0, yaw=2.0, pitch=-0.06, roll=0.04),
+        }.items()
     )
     assert tilted.sensor.roll == pytest.approx(0.04)
     assert tilted.sensor.pitch == pytest.approx(-0.06)
@@ -58,16 +63,22 @@ def test_the_tilt_of_the_car_reaches_the_world_and_not_its_own_view(tmp_path):
     up = np.array([0.0, 0.0, UP_LIDAR[2]])
     car = tilted.sensor.origin - tilted.sensor.vectors_to_world(np.array(UP_LIDAR))
     assert car == pytest.approx(np.zeros(3), abs=1e-9), "the world starts at the first pose"
-    ahead = tilted.sensor.vectors_to_world(np.array([15.0, 0.0, 0.42]) - up) + tilted.sensor.vectors_to_world(up)
+    ahead = tilted.sensor.vectors_to_world(
+        np.array([15.0, 0.0, 0.42]) - up
+    ) + tilted.sensor.vectors_to_world(up)
     assert world[0, :3] == pytest.approx(ahead)
 
 
 def test_a_box_has_its_own_roll_and_pitch(tmp_path):
     slab = (6.0, 6.0, 0.1)
     flat = film(parked(tmp_path / "flat", box("SIGN", (12.0, 0.0, 1.64), slab))).shots[0]
-    steep = film(parked(tmp_path / "steep", box("BUS", (12.0, 0.0, 1.64), slab, pitch=1.2))).shots[0]
+    steep = film(parked(tmp_path / "steep", box("BUS", (12.0, 0.0, 1.64), slab, pitch=1.2))).shots[
+        0
+    ]
     assert len(returns_of(steep, 0)) > 100
-    assert np.ptp(returns_of(steep, 0)[:, 2]) > 4.0, "it is hit wherever it stands, however flat it was"
+    assert np.ptp(returns_of(steep, 0)[:, 2]) > 4.0, (
+        "it is hit wherever it stands, however flat it was"
+    )
     assert len(flat.annotations) == 0
 
 
@@ -93,13 +104,19 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
     waiting = box("PEDESTRIAN", (12.0, 5.0, 0.6), (0.6, 0.7, 1.8), track="w", points=0)
     trailer = box("VEHICULAR_TRAILER", (20.0, -6.0, 1.17), (1.0, 8.0, 3.0), points=0)
     late = box("REGULAR_VEHICLE", (0.0, 12.0, 0.42), track="late", points=0)
-    sweeps = [[CAR_AHEAD, waiting, trailer], *([[CAR_AHEAD, late]] * 4), [CAR_AHEAD, waiting | {"num_interior_pts": 3}]]
+    sweeps = [
+        [CAR_AHEAD, waiting, trailer],
+        *([[CAR_AHEAD, late]] * 4),
+        [CAR_AHEAD, waiting | {"num_interior_pts": 3}],
+    ]
     movie = film(write(tmp_path, sweeps, [at()] * 6))
     assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
     assert [CLASSES[n] for n in movie.hidden.classes] == ["pedestrian"]
     assert (
         movie.hidden.objects.tolist()
-        == np.setdiff1d(movie.shots[1].annotations.objects, movie.shots[0].annotations.objects).tolist()
+        == np.setdiff1d(
+            movie.shots[1].annotations.objects, movie.shots[0].annotations.objects
+        ).tolist()
     )
     assert movie.hidden.boxes[0, :2] == pytest.approx(np.subtract((12.0, 5.0), UP_LIDAR[:2]))
 
@@ -118,7 +135,8 @@ def test_every_fifth_annotated_sweep_is_a_keyframe_and_tracks_keep_their_number(
     assert [shot.token for shot in movie.shots] == [str(stamp(n)) for n in (0, 5, 10)]
     assert [shot.time_s for shot in movie.shots] == pytest.approx([0.0, 0.5, 1.0])
     numbers = [
-        shot.annotations.objects[shot.annotations.classes == CLASSES.index("pedestrian")] for shot in movie.shots
+        shot.annotations.objects[shot.annotations.classes == CLASSES.index("pedestrian")]
+        for shot in movie.shots
     ]
     assert len({int(n) for n in np.concatenate(numbers)}) == 1
     assert [len(shot.annotations) for shot in movie.shots] == [2, 1, 1]
@@ -126,7 +144,9 @@ def test_every_fifth_annotated_sweep_is_a_keyframe_and_tracks_keep_their_number(
 
 
 def test_keyframes_stay_half_a_second_apart_where_sweeps_hold_nobody(tmp_path):
-    """Sweeps 3 to 7 and the first one show nobody else: the keyframes there are empty, and none of them moves."""
+    """Sweeps 3 to 7 and the first one show nobody else: the keyframes there are empty, and none of
+    them moves.
+    """
     ego = box("EGO_VEHICLE", (1.4, 0.0, 0.5), (4.9, 1.9, 1.5))
     sweeps = [[ego], *([[CAR_AHEAD]] * 2), *([[]] * 5), *([[CAR_AHEAD]] * 3)]
     movie = film(write(tmp_path, sweeps, [at()] * 11))
@@ -158,13 +178,20 @@ def test_the_cars_motion_comes_from_its_poses(tmp_path):
     ego = movie.shots[1].ego
     assert ego.speed == pytest.approx(5.0, abs=0.01)
     assert ego.yaw_rate == pytest.approx(0.25, abs=0.001)
-    assert ego.acceleration == pytest.approx(2.0, abs=0.1), "of so tight a circle a parabola is not all"
+    assert ego.acceleration == pytest.approx(2.0, abs=0.1), (
+        "of so tight a circle a parabola is not all"
+    )
     assert film(parked(tmp_path / "one", CAR_AHEAD)).shots[0].ego.speed == 0.0
 
 
 def test_the_six_cameras_cover_the_whole_circle(tmp_path):
     ring = [
-        box("PEDESTRIAN", (12 * np.cos(a) + 1.35, 12 * np.sin(a), 0.55), (0.6, 0.7, 1.8), track=f"{n:02}")
+        box(
+            "PEDESTRIAN",
+            (12 * np.cos(a) + 1.35, 12 * np.sin(a), 0.55),
+            (0.6, 0.7, 1.8),
+            track=f"{n:02}",
+        )
         for n, a in enumerate(np.linspace(-np.pi, np.pi, 24, endpoint=False))
     ]
     (shot,) = film(parked(tmp_path, *ring)).shots

@@ -47,7 +47,10 @@ def test_a_point_belongs_to_the_box_it_lies_in_as_the_box_is_turned():
     boxes = np.array([[10.0, 0.0, 0.0, 8.0, 1.0, 2.0, np.pi / 4]])
     on_the_diagonal, across_it = [12.0, 2.0, 0.0], [12.0, -2.0, 0.0]
     annotations = Annotations(np.array([5]), np.array([0]), boxes)
-    assert owners(np.array([on_the_diagonal, across_it]), annotations, UPRIGHT).tolist() == [5, NOBODY]
+    assert owners(np.array([on_the_diagonal, across_it]), annotations, UPRIGHT).tolist() == [
+        5,
+        NOBODY,
+    ]
 
 
 def test_boxes_stand_upright_however_the_sensor_leans():
@@ -74,7 +77,9 @@ def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
     change(root, "ego_pose", lambda rows: rows.append(rows[0] | {"token": "between"}))
     assert len(first(root).shots[0].cloud) == 4
     tables = Database(root)
-    assert "between" not in {*tables.rows("sample_data"), *tables.rows("ego_pose")}, "they would fill the memory"
+    assert "between" not in {*tables.rows("sample_data"), *tables.rows("ego_pose")}, (
+        "they would fill the memory"
+    )
 
 
 def test_a_keyframe_without_annotations_plays(tmp_path):
@@ -99,7 +104,9 @@ def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
     near = (12.0, 0.0, 0.9)
     size = (0.7, 0.7, 1.8)
     boxes = [
-        annotated("human.pedestrian.adult", (near[0], y, near[2]), size, instance=name, visible=level)
+        annotated(
+            "human.pedestrian.adult", (near[0], y, near[2]), size, instance=name, visible=level
+        )
         for name, y, level in [("a", 3.0, "4"), ("b", 1.0, "2"), ("c", -1.0, "1"), ("d", -3.0, "")]
     ]
     (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
@@ -111,7 +118,10 @@ def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
 
 
 def test_an_object_too_small_for_a_picture_has_no_box(tmp_path):
-    boxes = [annotated("human.pedestrian.adult", (d, 0.0, 0.9), (0.7, 0.7, 1.8), instance=f"{d}") for d in (20, 130)]
+    boxes = [
+        annotated("human.pedestrian.adult", (d, 0.0, 0.9), (0.7, 0.7, 1.8), instance=f"{d}")
+        for d in (20, 130)
+    ]
     (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
     assert len(shot.annotations) == 2
     assert len(shot.seen.objects) == 1
@@ -119,7 +129,9 @@ def test_an_object_too_small_for_a_picture_has_no_box(tmp_path):
 
 @pytest.mark.parametrize("channel", [name for name in SENSORS if name.startswith("CAM")])
 def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
-    """Mount, roll and principal point: pixels of the recorded picture come back to a tenth of a pixel."""
+    """Mount, roll and principal point: pixels of the recorded picture come back to a tenth of a
+    pixel.
+    """
     movie = first(database(tmp_path))
     camera = movie.cameras[list(SENSORS)[1:].index(channel)]
     translation, (w, x, y, z), (focal, u, v) = SENSORS[channel]
@@ -138,26 +150,40 @@ def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
 
 
 def test_every_category_of_the_taxonomy_has_its_place():
-    assert len(CATEGORIES) == 23 + 9, "the 23 of the annotations, and 9 more of the lidarseg extension"
+    assert len(CATEGORIES) == 23 + 9, (
+        "the 23 of the annotations, and 9 more of the lidarseg extension"
+    )
     assert {*CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
     assert len(DETECTION_NAMES) == 10
 
 
 def test_what_lies_outside_the_classes_or_holds_no_point_is_left_out(tmp_path):
-    boxes = [CAR, annotated("vehicle.trailer", (30, 0, 2)), annotated("vehicle.bicycle", (9, 3, 0.6), points=0)]
+    boxes = [
+        CAR,
+        annotated("vehicle.trailer", (30, 0, 2)),
+        annotated("vehicle.bicycle", (9, 3, 0.6), points=0),
+    ]
     (shot,) = first(database(tmp_path, [(boxes, pose(), as_recorded(WORLD))])).shots
     assert len(shot.annotations) == 1
 
 
 def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
     waiting, seen = (
-        annotated("human.pedestrian.adult", (30.0, 4.0, 0.9), (0.7, 0.7, 1.8), instance="w", points=n) for n in (0, 5)
+        annotated(
+            "human.pedestrian.adult", (30.0, 4.0, 0.9), (0.7, 0.7, 1.8), instance="w", points=n
+        )
+        for n in (0, 5)
     )
     trailer = annotated("vehicle.trailer", (30, 0, 2), points=0)
-    samples = [([CAR, waiting, trailer], pose(), as_recorded(WORLD)), ([CAR, seen], pose(4.0), as_recorded(WORLD))]
+    samples = [
+        ([CAR, waiting, trailer], pose(), as_recorded(WORLD)),
+        ([CAR, seen], pose(4.0), as_recorded(WORLD)),
+    ]
     movie = first(database(tmp_path, samples))
     assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
-    assert movie.hidden.objects.tolist() == [number for number in movie.shots[1].annotations.objects if number]
+    assert movie.hidden.objects.tolist() == [
+        number for number in movie.shots[1].annotations.objects if number
+    ]
     world = movie.shots[0].sensor.boxes_to_world(movie.hidden.boxes)
     assert world[0, :3] == pytest.approx([30.0, 4.0, 0.9])
 
@@ -175,7 +201,9 @@ def test_splits_choose_scenes(tmp_path):
     tables = Database(root)
     assert [row["name"] for row in scenes(tables)] == ["scene-0103", "scene-0916"]
     assert len(scenes(tables, "all")) == 3
-    (root / "v1.0-trainval" / "splits.json").write_text(json.dumps({"mine": ["scene-0061"], "gone": ["scene-9"]}))
+    (root / "v1.0-trainval" / "splits.json").write_text(
+        json.dumps({"mine": ["scene-0061"], "gone": ["scene-9"]})
+    )
     assert [row["name"] for row in scenes(tables, "mine")] == ["scene-0061"]
     with pytest.raises(InvalidInput, match=r"splits.json: the split 'gone' names 'scene-9'"):
         scenes(tables, "gone")
@@ -185,7 +213,9 @@ def test_splits_choose_scenes(tmp_path):
 
 def test_an_empty_split_names_those_that_hold_scenes(tmp_path):
     root = write(tmp_path, {"scene-0061": [([CAR], pose(), as_recorded(WORLD))]})
-    with pytest.raises(InvalidInput, match=r"scene.json: holds no scene of the split 'val'; splits it holds: all$"):
+    with pytest.raises(
+        InvalidInput, match=r"scene.json: holds no scene of the split 'val'; splits it holds: all$"
+    ):
         scenes(Database(root))
     own = {"mine": ["scene-0061"], "gone": ["scene-9"], "none": []}
     (root / "v1.0-trainval" / "splits.json").write_text(json.dumps(own))
@@ -210,7 +240,9 @@ def test_every_real_point_off_our_own_car_falls_inside_the_grid(sweep):
 
 
 def test_real_rings_are_rows_one_to_one(sweep):
-    """Ring 0 is the lowest. Near the sensor points stray by a row: lasers stand at different places in their head."""
+    """Ring 0 is the lowest. Near the sensor points stray by a row: lasers stand at different places
+    in their head.
+    """
     points, rings = sweep
     ranges = np.linalg.norm(points, axis=1)
     rows = AngularGrid().cells_of(points) // AngularGrid().columns
@@ -223,7 +255,9 @@ def test_real_rings_are_rows_one_to_one(sweep):
 
 def test_the_real_sweep_plays_in_a_scene(tmp_path, sweep):
     points, rings = sweep
-    rows = np.column_stack([-points[:, 1], points[:, 0], points[:, 2], np.zeros(len(points)), rings])
+    rows = np.column_stack(
+        [-points[:, 1], points[:, 0], points[:, 2], np.zeros(len(points)), rings]
+    )
     (shot,) = first(database(tmp_path, [([CAR], pose(), rows)])).shots
     ranges = np.linalg.norm(points, axis=1)
     assert len(shot.cloud) == np.sum((ranges > 1.0) & (ranges <= 50.0))

@@ -17,7 +17,8 @@ def picture(channel):
 def whole_box(root):
     """The projected box of CAR in the front picture, in recorded pixels, and its film."""
     movie = first(root)
-    shot, front = movie.shots[0], movie.cameras[0]
+    shot = movie.shots[0]
+    front = movie.cameras[0]
     _, _, (_, u, v) = SENSORS["CAM_FRONT"]
     shift = np.tile(np.array([front.width, front.height]) / 2 - (u, v), 2)
     return (shot.seen.detections.boxes[0] - shift).tolist(), shot
@@ -25,7 +26,8 @@ def whole_box(root):
 
 def forms(box):
     left, top, right, bottom = box
-    token, file = picture("CAM_FRONT"), f"samples/CAM_FRONT/{SCENE}-0.jpg"
+    token = picture("CAM_FRONT")
+    file = f"samples/CAM_FRONT/{SCENE}-0.jpg"
     coco = {"bbox": [left, top, right - left, bottom - top], "category_id": 3, "score": 0.6}
     own = {"bbox_corners": box, "category_name": "vehicle.car", "score": 0.6}
     named = {"bbox_corners": box, "detection_name": "car", "detection_score": 0.6}
@@ -34,7 +36,7 @@ def forms(box):
         "results": {"meta": {}, "results": {token: [named]}},
         "coco": [coco | {"image_id": token}, coco | {"image_id": token, "category_id": 4}],
         "coco by file": [coco | {"image_id": file}],
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("form", ["rows", "results", "coco", "coco by file"])
@@ -81,7 +83,10 @@ OWN = {"sample_data_token": "t", "bbox_corners": [0, 0, 5, 5], "category_name": 
         (COCO | {"category_id": 0}, "category_id must be a whole number >= 1 and <= 90, got 0"),
         (COCO | {"category_id": 91}, "category_id must be a whole number >= 1 and <= 90, got 91"),
         (OWN | {"bbox_corners": [0, 0, 5, float("nan")]}, "no box of four numbers"),
-        (OWN | {"category_name": "vehicle.carr"}, "unknown category 'vehicle.carr'; known: animal, "),
+        (
+            OWN | {"category_name": "vehicle.carr"},
+            "unknown category 'vehicle.carr'; known: animal, ",
+        ),
         (OWN | {"score": 87}, r"score must lie in \[0, 1\], got 87"),
         (OWN | {"score": "0.5"}, r"score must lie in \[0, 1\], got '0.5'"),
         (OWN | {"sample_data_token": None}, "no token of a picture: None"),
@@ -95,11 +100,15 @@ def test_a_detection_that_cannot_be_read_is_named(tmp_path, row, reason):
         DetectionFile(path)
 
 
-@pytest.mark.parametrize("content", [{"annotations": 3}, {"results": 3}, {"results": {"t": 3}}, None, "x"])
+@pytest.mark.parametrize(
+    "content", [{"annotations": 3}, {"results": 3}, {"results": {"t": 3}}, None, "x"]
+)
 def test_a_file_without_detections_is_named(tmp_path, content):
     path = tmp_path / "found.json"
     path.write_text(json.dumps(content))
-    with pytest.raises(InvalidInput, match=r"found.json: must hold a list of detections, or a map `results`"):
+    with pytest.raises(
+        InvalidInput, match=r"found.json: must hold a list of detections, or a map `results`"
+    ):
         DetectionFile(path)
 
 
@@ -107,6 +116,7 @@ def test_a_detection_on_no_picture_of_the_database_is_named(tmp_path):
     path = tmp_path / "found.json"
     path.write_text(json.dumps([OWN | {"sample_data_token": "nowhere"}]))
     with pytest.raises(
-        InvalidInput, match=r"found.json: a detection on 'nowhere', which is no keyframe of .*sample_data.json"
+        InvalidInput,
+        match=r"found.json: a detection on 'nowhere', which is no keyframe of .*sample_data.json",
     ):
         first(database(tmp_path), detections=DetectionFile(path))

@@ -30,61 +30,109 @@ BREAKS = {
         "sample_data.json: no readable JSON file",
     ),
     "no list": (
-        lambda root: (root / "v1.0-trainval" / "sensor.json").write_text("{}"), "sensor.json: must hold a list"
+        lambda root: (root / "v1.0-trainval" / "sensor.json").write_text("{}"),
+        "sensor.json: must hold a list",
     ),
     "no field": (
         lambda root: change(root, "instance", lambda rows: rows[0].pop("category_token")),
         "instance.json: row scene-0103-a lacks 'category_token'",
     ),
-    "no pose": (drop("ego_pose"), f"ego_pose.json: no row with the token 'pose-{SCENE}-0-LIDAR_TOP'"),
-    "no instance": (dangling("instance_token", "sample_annotation"), "instance.json: no row with the token 'nowhere'"),
-    "no category": (dangling("category_token", "instance"), "category.json: no row with the token 'nowhere'"),
-    "no sample": (dangling("first_sample_token", "scene"), "sample.json: no row with the token 'nowhere'"),
-    "no sensor": (dangling("sensor_token", "calibrated_sensor"), "sensor.json: no row with the token 'nowhere'"),
-    "no calibration": (
-        dangling("calibrated_sensor_token", "sample_data"), "calibrated_sensor.json: no row with the token 'nowhere'"
+    "no pose": (
+        drop("ego_pose"),
+        f"ego_pose.json: no row with the token 'pose-{SCENE}-0-LIDAR_TOP'",
     ),
-    "no visibility": (dangling("visibility_token", "sample_annotation"), "visibility.json: no row with the token"),
-    "odd visibility": (dangling("level", "visibility", "v9"), r"visibility.json: '4' has the unknown level 'v9'"),
+    "no instance": (
+        dangling("instance_token", "sample_annotation"),
+        "instance.json: no row with the token 'nowhere'",
+    ),
+    "no category": (
+        dangling("category_token", "instance"),
+        "category.json: no row with the token 'nowhere'",
+    ),
+    "no sample": (
+        dangling("first_sample_token", "scene"),
+        "sample.json: no row with the token 'nowhere'",
+    ),
+    "no sensor": (
+        dangling("sensor_token", "calibrated_sensor"),
+        "sensor.json: no row with the token 'nowhere'",
+    ),
+    "no calibration": (
+        dangling("calibrated_sensor_token", "sample_data"),
+        "calibrated_sensor.json: no row with the token 'nowhere'",
+    ),
+    "no visibility": (
+        dangling("visibility_token", "sample_annotation"),
+        "visibility.json: no row with the token",
+    ),
+    "odd visibility": (
+        dangling("level", "visibility", "v9"),
+        r"visibility.json: '4' has the unknown level 'v9'",
+    ),
     "no recording": (
         lambda root: change(root, "sample_data", lambda rows: rows.pop(0)),
         f"sample_data.json: no LIDAR_TOP of the sample '{SCENE}-0'",
     ),
-    "no sweep": (dangling("filename", "sample_data", "samples/gone.bin"), "samples/gone.bin: no such file"),
+    "no sweep": (
+        dangling("filename", "sample_data", "samples/gone.bin"),
+        "samples/gone.bin: no such file",
+    ),
     "short sweep": (
         lambda root: next(root.glob("samples/LIDAR_TOP/*")).write_bytes(b"0" * 47),
         "47 bytes are no whole number of points of 20 bytes",
     ),
     "no rotation": (
-        dangling("rotation", "ego_pose", [0, 0, 0, 0]), f"rotation of 'pose-{SCENE}-0-LIDAR_TOP': a quat"
+        dangling("rotation", "ego_pose", [0, 0, 0, 0]),
+        f"rotation of 'pose-{SCENE}-0-LIDAR_TOP': a quat",
     ),
-    "no size": (dangling("size", "sample_annotation", [1, 2]), "sample_annotation.json: 'scene-0103-0-0' has no size"),
+    "no size": (
+        dangling("size", "sample_annotation", [1, 2]),
+        "sample_annotation.json: 'scene-0103-0-0' has no size",
+    ),
     "odd category": (
         dangling("name", "category", "vehicle.spaceship"),
-        "category.json: 'category-vehicle.car': unknown category 'vehicle.spaceship'; known: animal, ",
+        "category.json: 'category-vehicle.car': unknown category 'vehicle.spaceship'; known: "
+        "animal, ",
     ),
-    "box of no sample": (dangling("sample_token", "sample_annotation"), "sample.json: no row with the token 'nowhere'"),
+    "box of no sample": (
+        dangling("sample_token", "sample_annotation"),
+        "sample.json: no row with the token 'nowhere'",
+    ),
     "two alike": (
         lambda root: change(root, "sample_annotation", lambda rows: rows.append(rows[0])),
         f"sample_annotation.json: 2 rows with the token '{SCENE}-0-0'",
     ),
     "an object twice": (
-        lambda root: change(root, "sample_annotation", lambda rows: rows.append(rows[0] | {"token": "other"})),
+        lambda root: change(
+            root, "sample_annotation", lambda rows: rows.append(rows[0] | {"token": "other"})
+        ),
         f"sample_annotation.json: the sample '{SCENE}-0' holds the instance '{SCENE}-a' 2 times",
     ),
-    "no first sample": (dangling("first_sample_token", "scene", ""), "sample.json: no row with the token ''"),
+    "no first sample": (
+        dangling("first_sample_token", "scene", ""),
+        "sample.json: no row with the token ''",
+    ),
     "other last sample": (
         dangling("last_sample_token", "scene"),
         f"sample.json: {SCENE} ends with '{SCENE}-0', and should with 'nowhere'",
     ),
-    "no row": (lambda root: change(root, "sensor", lambda rows: rows.insert(2, 7)), "sensor.json: row 2 must be a map"),
-    "no time": (dangling("timestamp", "sample", "now"), f"row {SCENE}-0: timestamp must be a whole number, got 'now'"),
+    "no row": (
+        lambda root: change(root, "sensor", lambda rows: rows.insert(2, 7)),
+        "sensor.json: row 2 must be a map",
+    ),
+    "no time": (
+        dangling("timestamp", "sample", "now"),
+        f"row {SCENE}-0: timestamp must be a whole number, got 'now'",
+    ),
     "a circle": (dangling("next", "sample", f"{SCENE}-0"), "is no later than the sample before it"),
     "no intrinsics": (
-        lambda root: change(root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=[])),
-        "calibrated_sensor.json: 'calibrated-CAM_FRONT' has no camera_intrinsic of 3 x 3 finite numbers",
+        lambda root: change(
+            root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=[])
+        ),
+        "calibrated_sensor.json: 'calibrated-CAM_FRONT' has no camera_intrinsic of 3 x 3 finite "
+        "numbers",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BREAKS)
@@ -136,7 +184,9 @@ def test_what_no_drive_holds_is_named(tmp_path, table, field, value, reason):
         return
     root = database(tmp_path)
     change(root, table, lambda rows: rows[0].update({field: value}))
-    with pytest.raises(InvalidInput, match=rf"{table}.json: {field} of '.*{SCENE}-0-[^']*':? {reason}"):
+    with pytest.raises(
+        InvalidInput, match=rf"{table}.json: {field} of '.*{SCENE}-0-[^']*':? {reason}"
+    ):
         first(root)
 
 
@@ -144,7 +194,8 @@ def test_a_box_far_from_the_car_is_named(tmp_path):
     root = database(tmp_path)
     change(root, "sample_annotation", lambda rows: rows[0].update(translation=[2e4, 0, 0]))
     with pytest.raises(
-        InvalidInput, match=f"annotation.json: '{SCENE}-0-0' lies 19993.2 m from the LiDAR, may lie 10000 m"
+        InvalidInput,
+        match=f"annotation.json: '{SCENE}-0-0' lies 19993.2 m from the LiDAR, may lie 10000 m",
     ):
         first(root)
 
@@ -152,14 +203,26 @@ def test_a_box_far_from_the_car_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("translation", "rotation", "reason"),
     [
-        ([0, 0, 1e3], [1, 0, 0, 0], r"translation of 'calibrated-.*' must lie in \[-100, 100\], got 1000"),
-        ([0, 0, 1], [1, 1, 0, 0], "rotation of 'calibrated-.*': a quaternion that is not of length 1"),
+        (
+            [0, 0, 1e3],
+            [1, 0, 0, 0],
+            r"translation of 'calibrated-.*' must lie in \[-100, 100\], got 1000",
+        ),
+        (
+            [0, 0, 1],
+            [1, 1, 0, 0],
+            "rotation of 'calibrated-.*': a quaternion that is not of length 1",
+        ),
     ],
 )
 @pytest.mark.parametrize("row", [0, 1])
 def test_a_sensor_elsewhere_than_on_a_car_is_named(tmp_path, row, translation, rotation, reason):
     root = database(tmp_path)
-    change(root, "calibrated_sensor", lambda rows: rows[row].update(translation=translation, rotation=rotation))
+    change(
+        root,
+        "calibrated_sensor",
+        lambda rows: rows[row].update(translation=translation, rotation=rotation),
+    )
     with pytest.raises(InvalidInput, match=f"calibrated_sensor.json: {reason}"):
         first(root)
 
@@ -168,7 +231,8 @@ def test_a_lidar_below_the_road_is_named(tmp_path):
     root = database(tmp_path)
     change(root, "calibrated_sensor", lambda rows: rows[0].update(translation=[1, 0, -0.1]))
     with pytest.raises(
-        InvalidInput, match=r"calibrated_sensor.json: 'calibrated-LIDAR_TOP' lies below the road, at -0.1 m"
+        InvalidInput,
+        match=r"calibrated_sensor.json: 'calibrated-LIDAR_TOP' lies below the road, at -0.1 m",
     ):
         first(root)
 
@@ -176,7 +240,11 @@ def test_a_lidar_below_the_road_is_named(tmp_path):
 @pytest.mark.filterwarnings("error")
 def test_a_camera_may_look_straight_down(tmp_path):
     root = database(tmp_path)
-    change(root, "calibrated_sensor", lambda rows: rows[0].update(rotation=[0.5**0.5, 0, 0, -(0.5**0.5)]))
+    change(
+        root,
+        "calibrated_sensor",
+        lambda rows: rows[0].update(rotation=[0.5**0.5, 0, 0, -(0.5**0.5)]),
+    )
     change(root, "calibrated_sensor", lambda rows: rows[1].update(rotation=[0, 1, 0, 0]))
     (camera, *_) = first(root).cameras
     assert camera.axes[0] == pytest.approx([0, 0, -1], abs=1e-7)
@@ -185,14 +253,22 @@ def test_a_camera_may_look_straight_down(tmp_path):
 @pytest.mark.parametrize(
     ("stamps", "reason"),
     [
-        ((0, 10**22), rf"timestamp of '{SCENE}-1' must be a whole number >= 0 and <= 4611686018427387, got 10000"),
+        (
+            (0, 10**22),
+            rf"timestamp of '{SCENE}-1' must be a whole number >= 0 and <= 4611686018427387, got "
+            rf"10000",
+        ),
         ((-5, 0), f"timestamp of '{SCENE}-0' must be a whole number >= 0"),
         ((0, 10**12), r"its times span 1e\+06 s, and a drive may last 86400 s"),
     ],
 )
 def test_times_are_those_of_a_drive(tmp_path, stamps, reason):
     root = database(tmp_path, [([CAR], pose(), as_recorded(WORLD))] * 2)
-    change(root, "sample", lambda rows: [row.update(timestamp=t) for row, t in zip(rows, stamps, strict=True)])
+    change(
+        root,
+        "sample",
+        lambda rows: [row.update(timestamp=t) for row, t in zip(rows, stamps, strict=True)],
+    )
     with pytest.raises(InvalidInput, match=f"sample.json: {reason}"):
         first(root)
 
@@ -214,7 +290,9 @@ def test_times_are_those_of_a_drive(tmp_path, stamps, reason):
 def test_wrong_intrinsics_are_named(tmp_path, intrinsic):
     root = database(tmp_path)
     change(root, "calibrated_sensor", lambda rows: rows[1].update(camera_intrinsic=intrinsic))
-    with pytest.raises(InvalidInput, match=r"calibrated_sensor.json: 'calibrated-CAM_FRONT' has .*camera_intrinsic"):
+    with pytest.raises(
+        InvalidInput, match=r"calibrated_sensor.json: 'calibrated-CAM_FRONT' has .*camera_intrinsic"
+    ):
         first(root)
 
 
@@ -248,14 +326,18 @@ def test_a_sweep_of_gigabytes_is_named(tmp_path):
     root = database(tmp_path)
     (sweep,) = root.glob("samples/LIDAR_TOP/*")
     os.truncate(sweep, 20 * 2**30)
-    with pytest.raises(InvalidInput, match=r"pcd.bin: 21474836480 bytes, a sweep may hold 268435456"):
+    with pytest.raises(
+        InvalidInput, match=r"pcd.bin: 21474836480 bytes, a sweep may hold 268435456"
+    ):
         first(root)
 
 
 def test_samples_run_forward_in_time(tmp_path):
     root = database(tmp_path, [([CAR], pose(), as_recorded(WORLD))] * 2)
     change(root, "sample", lambda rows: rows[1].update(timestamp=rows[0]["timestamp"]))
-    with pytest.raises(InvalidInput, match=rf"sample.json: '{SCENE}-1' is no later than the sample before it"):
+    with pytest.raises(
+        InvalidInput, match=rf"sample.json: '{SCENE}-1' is no later than the sample before it"
+    ):
         first(root)
 
 

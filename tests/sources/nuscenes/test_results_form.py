@@ -22,7 +22,9 @@ CAR = [10.0, 2.0, -1.0, 4.6, 1.9, 1.7, 0.3]
 def shot(sensor):
     nobody = Annotations(NOTHING, NOTHING, np.empty((0, 7)))
     identified = IdentifiedDetections(ImageDetections.from_rows(np.empty((0, 9))), NOTHING)
-    return Shot(0.0, "sample", sensor, Ego(), nobody, identified, Cloud(NOTHING, np.empty((0, 3)), NOTHING))
+    return Shot(
+        0.0, "sample", sensor, Ego(), nobody, identified, Cloud(NOTHING, np.empty((0, 3)), NOTHING)
+    )
 
 
 def detections(*names, box=CAR, returns=None, scores=None):
@@ -39,9 +41,12 @@ def test_a_box_has_the_place_heading_and_velocity_of_the_world_and_its_width_fir
     assert found.pop("rotation") == pytest.approx([np.cos(half), 0, 0, np.sin(half)])
     assert found.pop("velocity") == pytest.approx([0.0, 3.0])
     assert found == {
-        "sample_token": "sample", "size": [1.9, 4.6, 1.7], "detection_name": "car", "detection_score": 5 / 8,
+        "sample_token": "sample",
+        "size": [1.9, 4.6, 1.7],
+        "detection_name": "car",
+        "detection_score": 5 / 8,
         "attribute_name": "vehicle.moving",
-    }  # fmt: skip
+    }
 
 
 angles = st.floats(-np.pi, np.pi)
@@ -51,7 +56,9 @@ angles = st.floats(-np.pi, np.pi)
 def test_a_box_of_the_world_comes_back_from_any_sensor_that_stands_upright(x, y, yaw, heading):
     sensor = Frame(x, y, 1.84, yaw)
     world = np.array([[3.0, -4.0, 0.8, 4.6, 1.9, 1.7, heading]])
-    (found,) = boxes(shot(sensor), detections("car", box=sensor.boxes_to_local(world)[0]), np.zeros((1, 2)))
+    (found,) = boxes(
+        shot(sensor), detections("car", box=sensor.boxes_to_local(world)[0]), np.zeros((1, 2))
+    )
     assert found["translation"] == pytest.approx(world[0, :3], abs=1e-9)
     w, _, _, z = found["rotation"]
     assert (w * np.cos(heading / 2) + z * np.sin(heading / 2)) ** 2 == pytest.approx(1.0)
@@ -64,7 +71,8 @@ def test_the_annotations_of_a_database_come_back_as_its_tables_hold_them(tmp_pat
     for scene in scenes(tables):
         for moment in film(tables, scene).shots:
             truth = moment.annotations
-            counts, still = np.arange(100, 100 - len(truth), -1), np.zeros((len(truth), 2))
+            counts = np.arange(100, 100 - len(truth), -1)
+            still = np.zeros((len(truth), 2))
             found = boxes(moment, Detections(truth.classes, truth.boxes, counts), still)
             for box, row in zip(found, tables.annotations(moment.token), strict=True):
                 assert box["sample_token"] == row["sample_token"]
@@ -86,7 +94,12 @@ def test_the_annotations_of_a_database_come_back_as_its_tables_hold_them(tmp_pat
     ],
 )
 def test_the_speed_tells_the_attribute(name, standing, moving):
-    assert [attribute(name, speed) for speed in (0.0, 0.5, 0.51, 9.0)] == [standing, standing, moving, moving]
+    assert [attribute(name, speed) for speed in (0.0, 0.5, 0.51, 9.0)] == [
+        standing,
+        standing,
+        moving,
+        moving,
+    ]
     velocities = np.array([[0.3, 0.3], [-0.4, -0.4]])
     found = boxes(shot(Frame(0, 0, 0, 1.0)), detections(name, name), velocities)
     assert [box["attribute_name"] for box in found] == [standing, moving]
@@ -101,16 +114,24 @@ def test_confidence_grows_with_the_returns_and_is_never_0_or_1():
 
 def test_a_detectors_own_scores_count():
     given_scores = np.array([0.2, 0.9, 0.9])
-    found = boxes(shot(Frame(0, 0, 0, 0)), detections("car", "bus", "truck", scores=given_scores), np.zeros((3, 2)))
+    found = boxes(
+        shot(Frame(0, 0, 0, 0)),
+        detections("car", "bus", "truck", scores=given_scores),
+        np.zeros((3, 2)),
+    )
     assert [(box["detection_name"], box["detection_score"]) for box in found] == [
-        ("bus", 0.9), ("truck", 0.9), ("car", 0.2),
-    ]  # fmt: skip
+        ("bus", 0.9),
+        ("truck", 0.9),
+        ("car", 0.2),
+    ]
 
 
 def test_a_sample_holds_at_most_the_500_surest():
     scores = np.random.default_rng(0).permutation(np.linspace(0.0, 1.0, MOST_BOXES + 7))
     found = boxes(
-        shot(Frame(0, 0, 0, 0)), detections(*["car"] * len(scores), scores=scores), np.zeros((len(scores), 2))
+        shot(Frame(0, 0, 0, 0)),
+        detections(*["car"] * len(scores), scores=scores),
+        np.zeros((len(scores), 2)),
     )
     assert len(found) == 500
     assert [box["detection_score"] for box in found] == sorted(scores, reverse=True)[:500]

@@ -15,7 +15,10 @@ curves = st.builds(
 
 
 def places(s, d=0.0, heading=0.0):
-    return np.stack([np.asarray(s, dtype=float), np.full(np.shape(s), d), np.full(np.shape(s), heading)], axis=-1)
+    return np.stack(
+        [np.asarray(s, dtype=float), np.full(np.shape(s), d), np.full(np.shape(s), heading)],
+        axis=-1,
+    )
 
 
 def test_a_straight_road_is_its_own_coordinates():
@@ -67,5 +70,7 @@ def test_a_walker_turns_at_corners_and_stands_at_both_ends():
 
 def test_a_walker_follows_the_bend_of_the_pavement():
     curve = Curve((0.0, 0.0, 0.0), 10.0, 15.0 * np.pi, 1 / 30.0)
-    poses = Walked(curve, ((10.0, -8.0), (10.0 + 15.0 * np.pi, -8.0)), 1.5).poses(np.arange(0, 30, 0.5))
+    poses = Walked(curve, ((10.0, -8.0), (10.0 + 15.0 * np.pi, -8.0)), 1.5).poses(
+        np.arange(0, 30, 0.5)
+    )
     assert np.hypot(poses[:, 0] - 10.0, poses[:, 1] - 30.0) == pytest.approx(38.0, abs=0.01)

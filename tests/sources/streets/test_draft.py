@@ -55,7 +55,9 @@ def test_nobody_walks_through_a_parked_car_or_into_a_driving_one(draft):
     draft.stand("car", np.array([0.0, 5.0, 0.0]))
     draft.drive("car", straight_way(-50.0, 8.0), 0.5)
     assert not draft.move("pedestrian", straight_way(-10.0, 1.4, y=5.0), 0.1)
-    crossing = np.column_stack([np.zeros_like(TIMES), 1.4 * TIMES - 9.0, np.full_like(TIMES, np.pi / 2)])
+    crossing = np.column_stack(
+        [np.zeros_like(TIMES), 1.4 * TIMES - 9.0, np.full_like(TIMES, np.pi / 2)]
+    )
     hit = crossing + np.array([2.0, 0.0, 0.0])
     assert not draft.move("pedestrian", hit, 0.1)
     later = crossing + np.array([20.0, -8.0, 0.0])

@@ -19,7 +19,12 @@ LABELLED = ("car", "van", "truck", "bus", "bicycle", "pedestrian")
 
 
 def cut(street, keyframes):
-    return replace(street, poses=street.poses[keyframes], ego=street.ego[keyframes], motion=street.motion[keyframes])
+    return replace(
+        street,
+        poses=street.poses[keyframes],
+        ego=street.ego[keyframes],
+        motion=street.motion[keyframes],
+    )
 
 
 @pytest.fixture(scope="module", params=[1, 2])
@@ -34,9 +39,9 @@ def film(street):
 
 def standing_street(*bodies, keyframes=1, ego=(0.0, 0.0, 0.0)):
     """A street where bodies (kind, x, y) stand; a pose may also be a list, one a keyframe."""
-    poses = np.array([np.broadcast_to([*place, 0.0], (keyframes, 3)) for _, *place in bodies]).reshape(
-        len(bodies), keyframes, 3
-    )
+    poses = np.array(
+        [np.broadcast_to([*place, 0.0], (keyframes, 3)) for _, *place in bodies]
+    ).reshape(len(bodies), keyframes, 3)
     kinds = tuple(kind for kind, *_ in bodies)
     way = np.broadcast_to(np.array(ego), (keyframes, 3)).copy()
     return Street("hand-built", kinds, np.moveaxis(poses, 0, 1).copy(), way, (Ego(),) * keyframes)
@@ -68,7 +73,9 @@ def test_returns_lie_in_their_cells_which_ascend(film):
 
 def test_returns_of_an_object_lie_in_its_box(film):
     for shot in film.shots:
-        for number, box in zip(shot.annotations.objects.tolist(), shot.annotations.boxes, strict=True):
+        for number, box in zip(
+            shot.annotations.objects.tolist(), shot.annotations.boxes, strict=True
+        ):
             points = shot.cloud.points[shot.cloud.objects == number] - box[:3]
             cos, sin = np.cos(-box[6]), np.sin(-box[6])
             x, y = cos * points[:, 0] - sin * points[:, 1], sin * points[:, 0] + cos * points[:, 1]
@@ -81,7 +88,10 @@ def test_only_labelled_bodies_are_objects_and_keep_number_class_and_size(street,
         annotations = shot.annotations
         assert (np.diff(annotations.objects) > 0).all()
         for number, label, box in zip(
-            annotations.objects.tolist(), annotations.classes.tolist(), annotations.boxes, strict=True
+            annotations.objects.tolist(),
+            annotations.classes.tolist(),
+            annotations.boxes,
+            strict=True,
         ):
             kind = CATALOGUE[street.kinds[number]]
             assert CLASSES[label] == kind.label
@@ -91,7 +101,9 @@ def test_only_labelled_bodies_are_objects_and_keep_number_class_and_size(street,
 def test_boxes_stand_where_the_street_has_them(street, film):
     for keyframe, shot in enumerate(film.shots):
         world = shot.sensor.boxes_to_world(shot.annotations.boxes)
-        assert world[:, [0, 1]] == pytest.approx(street.poses[keyframe, shot.annotations.objects][:, :2])
+        assert world[:, [0, 1]] == pytest.approx(
+            street.poses[keyframe, shot.annotations.objects][:, :2]
+        )
         assert world[:, 2] == pytest.approx(world[:, 5] / 2)
 
 
@@ -104,8 +116,12 @@ def test_whatever_is_seen_is_annotated_and_nothing_else(film):
 def test_camera_boxes_are_of_their_objects_and_confident_by_pixels(film):
     for shot in film.shots:
         identified = shot.seen.detections
-        classes = dict(zip(shot.annotations.objects.tolist(), shot.annotations.classes.tolist(), strict=True))
-        assert [classes[number] for number in shot.seen.objects.tolist()] == identified.classes.tolist()
+        classes = dict(
+            zip(shot.annotations.objects.tolist(), shot.annotations.classes.tolist(), strict=True)
+        )
+        assert [
+            classes[number] for number in shot.seen.objects.tolist()
+        ] == identified.classes.tolist()
         assert identified.confidences.min() >= MIN_PIXELS / (MIN_PIXELS + FULL_CONFIDENCE)
         assert set(identified.cameras.tolist()) <= set(range(6))
         assert not identified.ages.any()
@@ -142,9 +158,12 @@ def test_a_person_behind_a_house_is_not_annotated_until_it_steps_out():
     assert set(shot.cloud.objects.tolist()) == {NOBODY, 1}
 
 
-def test_who_stands_hidden_at_the_first_keyframe_was_present_and_is_annotated_nowhere_until_it_shows():
-    house, waiting = ("building", 20.0, 10.0), ("pedestrian", 20.0, 16.0)
-    street = standing_street(house, waiting, ("car", 15.0, -5.0), ("pedestrian", 90.0, 0.0), keyframes=2)
+def test_who_stands_hidden_at_first_was_present_and_is_annotated_nowhere_until_it_shows():
+    house = ("building", 20.0, 10.0)
+    waiting = ("pedestrian", 20.0, 16.0)
+    street = standing_street(
+        house, waiting, ("car", 15.0, -5.0), ("pedestrian", 90.0, 0.0), keyframes=2
+    )
     street.poses[1, 1, 1] = 4.0
     film = record(street)
     assert film.hidden.objects.tolist() == [1]
@@ -164,7 +183,9 @@ def test_a_car_beyond_the_lidar_is_annotated_where_a_camera_shows_it():
     assert len(shot_of(("car", SIGHT_M + 3.0, 0.0)).annotations) == 0
 
 
-@pytest.mark.parametrize(("place", "camera"), [((15, 0), 0), ((9, 13), 1), ((9, -13), 2), ((-5, 14), 3), ((-15, 0), 5)])
+@pytest.mark.parametrize(
+    ("place", "camera"), [((15, 0), 0), ((9, 13), 1), ((9, -13), 2), ((-5, 14), 3), ((-15, 0), 5)]
+)
 def test_the_ring_of_cameras_sees_all_around(place, camera):
     assert camera in shot_of(("car", *place)).seen.detections.cameras.tolist()
 
@@ -187,8 +208,12 @@ def test_a_body_that_left_and_returned_is_where_it_then_is():
     street = standing_street(("car", 20.0, 0.0), keyframes=4)
     street.poses[1:, 0, 0] = (200.0, 200.0, 25.0)
     shots = record(street).shots
-    nearest = [np.min(shot.cloud.points[shot.cloud.objects == 0, 0], initial=np.inf) for shot in shots]
-    assert nearest[0] == pytest.approx(20.0 - LIDAR_POSITION[0] - CATALOGUE["car"].size[0] / 2, abs=0.3)
+    nearest = [
+        np.min(shot.cloud.points[shot.cloud.objects == 0, 0], initial=np.inf) for shot in shots
+    ]
+    assert nearest[0] == pytest.approx(
+        20.0 - LIDAR_POSITION[0] - CATALOGUE["car"].size[0] / 2, abs=0.3
+    )
     assert nearest[1:3] == [np.inf, np.inf]
     assert nearest[3] == pytest.approx(nearest[0] + 5.0, abs=0.3)
     for shot in shots[1:3]:

@@ -7,7 +7,12 @@ import pytest
 from care_sim.evaluation.sightings import Sightings
 from care_sim.sources.streets.draft import KEYFRAME_S, footprints_meet
 from care_sim.sources.streets.layouts import LAYOUTS
-from care_sim.sources.streets.people import CYCLING_MPS, CYCLING_SPREAD_MPS, WALKING_MPS, WALKING_SPREAD_MPS
+from care_sim.sources.streets.people import (
+    CYCLING_MPS,
+    CYCLING_SPREAD_MPS,
+    WALKING_MPS,
+    WALKING_SPREAD_MPS,
+)
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
 from care_sim.world.bodies import CATALOGUE
@@ -112,7 +117,8 @@ def test_vehicles_keep_the_limit_and_drive_forwards(street):
 
 def test_the_ego_moves_as_its_odometry_says(street):
     motion = np.array([[ego.speed, ego.yaw_rate] for ego in street.motion])
-    speeds, turns = speeds_of(street.ego[:, None])[:, 0], np.diff(street.ego[:, 2]) / KEYFRAME_S
+    speeds = speeds_of(street.ego[:, None])[:, 0]
+    turns = np.diff(street.ego[:, 2]) / KEYFRAME_S
     assert speeds == pytest.approx((motion[1:, 0] + motion[:-1, 0]) / 2, abs=0.3)
     between = np.sort(np.stack([motion[1:, 1], motion[:-1, 1]]), axis=0)
     assert (turns > between[0] - 0.02).all()
@@ -122,7 +128,9 @@ def test_the_ego_moves_as_its_odometry_says(street):
 
 def test_oncoming_traffic_keeps_right_of_the_middle():
     street = make_street(0)
-    vehicles = [kind in VEHICLES for kind in street.kinds] & (speeds_of(street.poses).max(axis=0) > 0)
+    vehicles = [kind in VEHICLES for kind in street.kinds] & (
+        speeds_of(street.poses).max(axis=0) > 0
+    )
     forwards = np.cos(street.poses[0, vehicles, 2]) > 0
     assert street.poses[0, vehicles, 1][forwards] == pytest.approx(0.0, abs=0.1)
     assert street.poses[0, vehicles, 1][~forwards] == pytest.approx(3.5, abs=0.1)
@@ -155,9 +163,12 @@ def test_a_junction_has_a_side_street_with_houses_on_both_sides_of_it():
 
 def test_what_a_dozen_scenes_hold_lies_where_the_sources_put_it():
     streets = [make_street(seed) for seed in range(2000, 2012)]
-    assert 3.6 * np.mean([ego.speed for street in streets for ego in street.motion]) == pytest.approx(16.0, abs=4.0)
+    assert 3.6 * np.mean(
+        [ego.speed for street in streets for ego in street.motion]
+    ) == pytest.approx(16.0, abs=4.0)
     kinds = [kind for street in streets for kind in street.kinds]
-    vehicles, people = sum(kind in VEHICLES for kind in kinds), kinds.count("pedestrian")
+    vehicles = sum(kind in VEHICLES for kind in kinds)
+    people = kinds.count("pedestrian")
     assert kinds.count("car") / vehicles == pytest.approx(0.85, abs=0.07)
     still = [speeds_of(street.poses).max(axis=0) == 0 for street in streets]
     standing = sum(
@@ -174,7 +185,9 @@ def test_what_a_dozen_scenes_hold_lies_where_the_sources_put_it():
 def test_a_scene_has_about_as_many_entries_as_one_of_nuscenes(seed):
     """There 28 events a scene and 24 annotations of the five classes a keyframe, of any range."""
     film = record(make_street(seed))
-    sightings = Sightings.of(film.name, [shot.annotations for shot in film.shots], hidden=film.hidden)
+    sightings = Sightings.of(
+        film.name, [shot.annotations for shot in film.shots], hidden=film.hidden
+    )
     assert len(film.shots) == 40
     assert 28 / 3 < len(sightings.events) < 28 * 3
     assert 24 / 3 < len(sightings.frames) / 40 < 24 * 2
@@ -185,7 +198,9 @@ def test_nothing_stands_in_the_mouth_of_a_side_street(seed):
     plan = LAYOUTS["junction"](np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[0]))
     street = make_street(seed)
     still = speeds_of(street.poses).max(axis=0) == 0
-    kerbside = still & (np.array(street.kinds) != "pedestrian") & (np.array(street.kinds) != "bicycle")
+    kerbside = (
+        still & (np.array(street.kinds) != "pedestrian") & (np.array(street.kinds) != "bicycle")
+    )
     assert plan.joinings
     for joining in plan.joinings:
         places = np.array([[s, d, 0.0] for s in range(4, 40, 2) for d in (0.0, 3.5)])

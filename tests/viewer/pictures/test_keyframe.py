@@ -11,7 +11,15 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.envs import CLOSED_LOOP
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.keyframe import BRAKING, DETECTED, HEIGHT, HIDDEN, TRACKED, WIDTH, draw_keyframe
+from care_sim.viewer.pictures.keyframe import (
+    BRAKING,
+    DETECTED,
+    HEIGHT,
+    HIDDEN,
+    TRACKED,
+    WIDTH,
+    draw_keyframe,
+)
 
 
 def make(name, **arguments):
@@ -67,7 +75,9 @@ def test_it_has_one_size_before_and_after_the_first_scan(name):
 
 
 def test_rendering_changes_no_observation():
-    for plain, drawn in zip(play("CARE-Dense-v0", 6, draw=False), play("CARE-Dense-v0", 6, draw=True), strict=True):
+    for plain, drawn in zip(
+        play("CARE-Dense-v0", 6, draw=False), play("CARE-Dense-v0", 6, draw=True), strict=True
+    ):
         assert all(np.array_equal(plain[key], drawn[key]) for key in plain)
 
 
@@ -80,7 +90,8 @@ def test_it_says_what_happened(dense):
     assert shows(picture, BRAKING, 1000)
     assert shows(picture, DETECTED, 50)
     assert shows(picture, TRACKED, 500)
-    loop, frame = dense.unwrapped.loop, dense.unwrapped.keyframes[-1]
+    loop = dense.unwrapped.loop
+    frame = dense.unwrapped.keyframes[-1]
     calm = draw_keyframe(loop, replace(frame, braking=False, detected=False))
     assert not shows(calm, BRAKING)
     assert not shows(calm, DETECTED)
@@ -90,7 +101,8 @@ def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
     grid = AngularGrid(columns=8, rows=2)
     ranges = np.zeros(grid.shape)
     left, right = 6, 1
-    ranges[0, left], ranges[1, right] = grid.range_m, 10.0
+    ranges[0, left] = grid.range_m
+    ranges[1, right] = 10.0
     picture = np.asarray(drawing.grid_picture(grid, ranges, 3))
     assert picture.shape == (6, 8, 3)
     assert tuple(picture[0, 1]) == drawing.NO_RETURN

@@ -21,11 +21,16 @@ def play(drive):
     def make(policy, budget=1.0, draw=True, keyframes=10):
         mode = "rgb_array" if draw else None
         env = gymnasium.make(
-            "CARE-Replay-v0", disable_env_checker=True, source=f"argoverse2:{drive}", budget=budget, render_mode=mode
+            "CARE-Replay-v0",
+            disable_env_checker=True,
+            source=f"argoverse2:{drive}",
+            budget=budget,
+            render_mode=mode,
         )
         chooses = care_sim.make_policy(policy, env)
         observation, _ = env.reset(seed=0)
-        pictures, observations = [env.render()], [observation]
+        pictures = [env.render()]
+        observations = [observation]
         for _ in range(keyframes):
             observation, *_ = env.step(chooses(observation))
             pictures.append(env.render())
@@ -43,7 +48,9 @@ def count(picture, colour):
 def test_there_is_a_picture_before_the_first_scan_and_after_the_last(play):
     pictures, _ = play("full")
     assert len(pictures) == 11
-    assert all(picture.shape == (HEIGHT, WIDTH, 3) and picture.dtype == np.uint8 for picture in pictures)
+    assert all(
+        picture.shape == (HEIGHT, WIDTH, 3) and picture.dtype == np.uint8 for picture in pictures
+    )
     assert all(np.any(one != next_) for one, next_ in pairwise(pictures))
 
 
