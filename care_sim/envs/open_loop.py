@@ -68,8 +68,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     ### Arguments
     `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in
-    the closed loop; `detector` by name (`care_sim.perception.detectors.detector_names`)
-    and `detector_parameters`; `presence` "annotated" or "visible", who is present at scene start and so
+    the closed loop; `detector` by name (`care_sim.perception.detectors.detector_names`) and
+    `detector_parameters`; `presence` "annotated" or "visible", who is present at scene start and so
     never a first sighting (`care_sim.evaluation.sightings`); any field of
     `care_sim.core.conditions.Conditions` but those for which the scene would have to be filmed
     anew: an error of the cameras' mount, the engine. `min_returns` is the `returns` detector's. A
