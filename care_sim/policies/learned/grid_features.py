@@ -23,8 +23,8 @@ EGO = ("speed", "yaw_rate", "acceleration", "budget")
 EGO_SCALES = np.array([30.0, 1.0, 10.0, 1.0], np.float32)
 """m/s, rad/s, m/s^2 and the share of the cells that are shown as 1."""
 STANDING_M = (KERB_CLEARANCE_M, 4.0)
-"""Heights above the road between which a return stands for something: over kerbs, under the bodies of bridges and the
-crowns of trees. The tallest of the five classes are lower.
+"""Heights above the road between which a return stands for something: over kerbs, under the bodies
+of bridges and the crowns of trees. The tallest of the five classes are lower.
 """
 
 
