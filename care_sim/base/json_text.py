@@ -10,29 +10,29 @@ MOST_LEVELS = 200
 """Levels that lists and maps may be nested: more than any file here needs, few enough for all that
 walk them.
 """
-LARGEST = 2**28
+MOST_BYTES = 2**28
 """Bytes of a file: more than the longest of ours, the configurations of a study (100,000 tasks of 2
 kB).
 """
 
 
-def read(
-    path: Path, most: int = LARGEST, taken: Callable[[dict[str, Any]], object] | None = None
+def json_content(
+    path: Path, most: int = MOST_BYTES, taken: Callable[[dict[str, Any]], object] | None = None
 ) -> Any:
     """The content of a file of at most `most` bytes, every map in it replaced by what is `taken` of
     it.
 
-    Raises OSError for a file that cannot be read, ValueError as `check_size` and `parsed` do, and
-    for one that the memory does not hold.
+    Raises OSError for a file that cannot be read, ValueError as `check_file_size` and `parsed` do,
+    and for one that the memory does not hold.
     """
-    check_size(path, most)
+    check_file_size(path, most)
     try:
         return parsed(path.read_text(encoding="utf-8"), taken)
     except MemoryError as error:
         raise ValueError("it is larger than the memory that is free") from error
 
 
-def check_size(path: Path, most: int = LARGEST) -> None:
+def check_file_size(path: Path, most: int = MOST_BYTES) -> None:
     """Raise ValueError for a file of more than `most` bytes, and for what is none, such as a device
     without end.
     """

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from care_sim.base.interrupts import SIGNALS, held_back
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 LOOK_S = 1.0
 """Between two looks whether the starter is there."""
@@ -53,7 +53,7 @@ def end_with_parent() -> None:
         ).start()
 
 
-def following(make: Callable[[], T]) -> T:
+def following(make: Callable[[], _T]) -> _T:
     """What `make` makes, in a process that ends with its parent."""
     end_with_parent()
     return make()

@@ -20,7 +20,7 @@ from care_sim.core.grid import (
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
 
-SENSOR_HEIGHT_M = 1.84
+LIDAR_HEIGHT_M = 1.84
 """Of the LiDAR above the road: LIDAR_TOP of nuScenes."""
 
 
@@ -41,7 +41,7 @@ class Rig:
     keyframe_s: float = bounded(0.1, 0.001, 60)
     azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
-    sensor_height_m: float = bounded(SENSOR_HEIGHT_M, 0, 100)
+    sensor_height_m: float = bounded(LIDAR_HEIGHT_M, 0, 100)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -9,12 +9,12 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.rig import SENSOR_HEIGHT_M
+from care_sim.core.rig import LIDAR_HEIGHT_M
 from care_sim.core.types import Scan
 from care_sim.sensors.engines import RayEngine
 from care_sim.world.bullet import NO_BODY
 
-LIDAR_POSITION = (-0.445, 0.0, SENSOR_HEIGHT_M)
+LIDAR_POSITION = (-0.445, 0.0, LIDAR_HEIGHT_M)
 """Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault
 Zoe.
 """

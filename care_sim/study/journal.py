@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import check_size, parsed
+from care_sim.base.json_text import check_file_size, parsed
 from care_sim.study.rows import with_tuples
 from care_sim.study.task import Row
 
@@ -102,7 +102,7 @@ class Journal:
 
 def _check_journal(path: Path) -> None:
     try:
-        check_size(path, LARGEST_JOURNAL)
+        check_file_size(path, LARGEST_JOURNAL)
     except ValueError as error:
         raise InvalidInput(f"{path} is no journal: {error}") from error
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from care_sim.base.checks import LARGEST_INTEGER, check_known, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
-from care_sim.base.json_text import check_size, read
+from care_sim.base.json_text import check_file_size, json_content
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save
 from care_sim.training.card_provenance import machine, versions
@@ -152,7 +152,7 @@ def read_rules(path: Path) -> dict[str, dict[str, Any]]:
 
 def _read_map(path: Path) -> dict[str, Any]:
     try:
-        content = read(path)
+        content = json_content(path)
     except ValueError as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
     if not isinstance(content, dict):
@@ -165,7 +165,7 @@ def read_curve(path: Path) -> list[Evaluation]:
     if not path.exists():
         return []
     try:
-        check_size(path)
+        check_file_size(path)
         with path.open(newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
         if tuple(head) != COLUMNS:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import LARGEST, MOST_LEVELS, parsed, read
+from care_sim.base.json_text import MOST_BYTES, MOST_LEVELS, json_content, parsed
 from care_sim.policies.learned.weights import load
 from care_sim.reports.page.provenance import CONFIG, _description
 from care_sim.sources.nuscenes.tables import LARGEST_TABLE, read_json
@@ -75,7 +75,7 @@ def test_every_reader_refuses_what_is_too_large_before_it_is_read(
     zeros(path, more and LARGEST_JOURNAL + more)
     with pytest.raises(InvalidInput, match=rf"config\.json is no journal: {reason}"):
         Journal(path)
-    zeros(path, more and LARGEST + more)
+    zeros(path, more and MOST_BYTES + more)
     for reader in (read_config, read_curve):
         with pytest.raises(InvalidInput, match=rf"config\.json is damaged: {reason}"):
             reader(path)
@@ -89,7 +89,7 @@ def test_what_exceeds_the_memory_is_a_value_error(tmp_path, monkeypatch):
         raise MemoryError
 
     (tmp_path / "a.json").write_text("{}")
-    assert read(tmp_path / "a.json") == {}
+    assert json_content(tmp_path / "a.json") == {}
     monkeypatch.setattr(json, "loads", full)
     with pytest.raises(ValueError, match="memory"):
-        read(tmp_path / "a.json")
+        json_content(tmp_path / "a.json")

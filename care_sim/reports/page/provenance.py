@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.base.json_text import read
+from care_sim.base.json_text import json_content
 from care_sim.core.conditions import DEFAULTS
 from care_sim.study.provenance import code_digest
 from care_sim.study.results_files import Kind, is_parameter
@@ -82,7 +82,7 @@ def _text(value: Any) -> str:
 def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
     """The file that a study writes first of all, and what is wrong with it."""
     try:
-        description = read(path)
+        description = json_content(path)
     except FileNotFoundError:
         return {}, [
             f"{CONFIG} is missing: machine, versions and the list of what was to be played are not "

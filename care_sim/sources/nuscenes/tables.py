@@ -10,7 +10,7 @@ import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import read
+from care_sim.base.json_text import json_content
 from care_sim.core.frames import Floats
 from care_sim.sources.plausible import STAMPS_NS, Range, check_span
 
@@ -205,7 +205,7 @@ def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
     Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
     """
     try:
-        return read(path, LARGEST_TABLE, taken)
+        return json_content(path, LARGEST_TABLE, taken)
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
