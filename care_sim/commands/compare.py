@@ -1,25 +1,29 @@
-"""The same seed under several policies: a table, and a recording or a film with one beside the other."""
+"""The same seed under several policies: a table, and a recording or a film with one beside the
+other.
+"""
 
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
+from rich.table import Table
+from rich.text import Text
 
 from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.base.text import printable
 from care_sim.commands.shared.options import USUAL, Options
 from care_sim.commands.shared.running import DONE, FAILED, console, playable
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from rich.table import Table
-
-    from care_sim.study.episode_config import EpisodeConfig
-    from care_sim.study.episode_play import Environment
-    from care_sim.study.task import Row
+from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
+from care_sim.reports.episodes.clips import Film
+from care_sim.reports.episodes.timeline import text
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.episode_play import Environment, answer, trace
+from care_sim.study.task import Row
+from care_sim.viewer.pictures.comparison import draw_panel
 
 COLUMNS = {
     "detection_distance_m": "detected at\n(sensor to actor) m",
@@ -39,24 +43,30 @@ class Compare:
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense or cutin; `care-sim scenarios` lists them."""
     policies: tuple[str, ...] = ("history", "care")
-    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget 1.0."""
+    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget
+    1.0."""
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     seed: int = 0
     """Draws scenario, camera faults, noise and floor: the same for every policy."""
     record: Path | None = None
-    """File (.rrd) for a recording of all, side by side; `care-sim view FILE` plays it (extra 'viewer')."""
+    """File (.rrd) for a recording of all, side by side; `care-sim view FILE` plays it (extra
+    'viewer').
+    """
     video: Path | None = None
-    """File for a film of all, side by side: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its ending."""
+    """File for a film of all, side by side: MP4 (extra 'video'), or animated GIF, WebP or PNG, by
+    its ending.
+    """
     conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
     """Further conditions."""
 
     def __call__(self) -> int:
         """Run it."""
-        from care_sim.study.episode_config import grid
 
-        def made(names: "Sequence[str]") -> "list[EpisodeConfig]":
-            return grid([self.scenario], names, [self.budget], [self.seed], **self.conditions.arguments())
+        def made(names: Sequence[str]) -> list[EpisodeConfig]:
+            return grid(
+                [self.scenario], names, [self.budget], [self.seed], **self.conditions.arguments()
+            )
 
         policies, left_out = playable(self.policies, lambda name: made([name]))
         if not policies:
@@ -65,24 +75,26 @@ class Compare:
         return FAILED if left_out or failures else DONE
 
 
-def play(configs: "Sequence[EpisodeConfig]", record: Path | None = None, video: Path | None = None) -> list[str]:
-    """Play one after the other, into one recording and one film if there are to be any, and print their outcomes. What
-    was played is printed whatever happens to the others; a line for each that failed is printed too, and returned.
+def play(
+    configs: Sequence[EpisodeConfig], record: Path | None = None, video: Path | None = None
+) -> list[str]:
+    """Play one after the other, into one recording and one film if there are to be any, and print
+    their outcomes. What was played is printed whatever happens to the others; a line for each that
+    failed is printed too, and returned.
     """
-    from care_sim.reports.episodes.clips import Film
-    from care_sim.study.episode_play import answer, trace
-    from care_sim.viewer.pictures.comparison import draw_panel
-
     film = Film(video, draw_panel)
     answers: list[Row | str] = []
     try:
         with _recorded(configs, record) as wrapped:
 
-            def played(config: "EpisodeConfig") -> "Row":
-                return trace(config, film.episode(config.policy), wrap=partial(wrapped, config.policy))[0]
+            def played(config: EpisodeConfig) -> Row:
+                return trace(
+                    config, film.episode(config.policy), wrap=partial(wrapped, config.policy)
+                )[0]
 
             for config in configs:
-                answers.append(answer(played, config))  # noqa: PERF401, what is there stays where one is interrupted
+                # One by one: what is there stays where one is interrupted.
+                answers.append(answer(played, config))  # noqa: PERF401
     finally:
         failures = _report(configs, answers)
     if record is not None:
@@ -92,40 +104,42 @@ def play(configs: "Sequence[EpisodeConfig]", record: Path | None = None, video: 
     return failures
 
 
-def _report(configs: "Sequence[EpisodeConfig]", answers: "Sequence[Row | str]") -> list[str]:
+def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> list[str]:
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
         console().print(outcomes(rows))
-    failures = [f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)]
+    failures = [
+        f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)
+    ]
     report_problems(failures)
     return failures
 
 
 @contextmanager
-def _recorded(configs: "Sequence[EpisodeConfig]", record: Path | None) -> "Iterator[Callable[..., Environment]]":
-    """What puts an environment, with its policy and the policy's name, under the recording; or leaves it as it is."""
+def _recorded(
+    configs: Sequence[EpisodeConfig], record: Path | None
+) -> Iterator[Callable[..., Environment]]:
+    """What puts an environment, with its policy and the policy's name, under the recording; or
+    leaves it as it is.
+    """
     if record is None:
         yield lambda _name, env, _policy: env
         return
-    from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
-
     with recording(record, [config.policy for config in configs]) as shared:
         yield lambda name, env, policy: RecordRerun(env, shared, policy, name)
 
 
-def outcomes(played: "Sequence[tuple[EpisodeConfig, Row]]") -> "Table":
+def outcomes(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
     """A line an episode."""
-    from rich.table import Table
-    from rich.text import Text
-
-    from care_sim.base.text import printable
-    from care_sim.reports.episodes.timeline import text
-
     config = played[0][0]
     table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)
     for column in ("policy", "budget", *COLUMNS.values()):
         table.add_column(column, justify="left" if column == "policy" else "right", no_wrap=True)
     for config, row in played:
-        table.add_row(Text(printable(config.policy)), f"{config.budget:.4g}", *(text(row[name]) for name in COLUMNS))
+        table.add_row(
+            Text(printable(config.policy)),
+            f"{config.budget:.4g}",
+            *(text(row[name]) for name in COLUMNS),
+        )
     return table

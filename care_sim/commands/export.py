@@ -1,24 +1,33 @@
-"""The command `care-sim export`: a policy's detections on nuScenes scenes, for the official devkit to score."""
+"""The command `care-sim export`: a policy's detections on nuScenes scenes, for the official devkit
+to score.
+"""
 
 import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import tyro
+from rich.console import Console
+from rich.progress import track
 
+import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.base.files import JSON, replacing
 from care_sim.commands.shared.play_options import PlayOptions
-
-if TYPE_CHECKING:
-    from care_sim.sources.nuscenes.tables import Row
-    from care_sim.study.play_config import PlayConfig
+from care_sim.sources.nuscenes.results_form import MODALITIES, boxes
+from care_sim.sources.nuscenes.tables import Row
+from care_sim.sources.recordings import NuScenes
+from care_sim.study.play_config import PlayConfig, play_grid
+from care_sim.study.scene_play import play
 
 
 @dataclass(frozen=True, kw_only=True)
 class Export(PlayOptions):
-    """Play a policy over nuScenes scenes and write its detections in the results form of the official devkit."""
+    """Play a policy over nuScenes scenes and write its detections in the results form of the
+    official devkit.
+    """
 
     source: str = tyro.MISSING
     """nuscenes:FOLDER, the folder of a nuScenes v1.0 database."""
@@ -31,50 +40,45 @@ class Export(PlayOptions):
 
     def __call__(self) -> int:
         """Run it."""
-        from rich.console import Console
-        from rich.progress import track
-
-        from care_sim.base.files import JSON, replacing
-
         configs = self._configs()
         with replacing(self.out, JSON) as unfinished:
-            shown = track(configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty())
+            shown = track(
+                configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty()
+            )
             results = {token: boxes for config in shown for token, boxes in found(config).items()}
-            unfinished.write_text(json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8")
+            unfinished.write_text(
+                json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
+            )
         count = sum(map(len, results.values()))
         print(f"{count} boxes in {len(results)} samples of {len(configs)} scenes are in {self.out}")
         if not count:
             print("care-sim: the official devkit refuses results without a box", file=sys.stderr)
         return 0
 
-    def _configs(self) -> "list[PlayConfig]":
+    def _configs(self) -> list[PlayConfig]:
         """A play for every scene of the split: the devkit asks for each of its samples."""
-        from care_sim.sources.recordings import NuScenes
-        from care_sim.study.play_config import play_grid
-
         if self.source.partition(":")[0] != NuScenes.kind:
             raise InvalidInput(
-                f"source must be nuscenes:FOLDER, whose samples the official form names, got {self.source!r}"
+                "source must be nuscenes:FOLDER, whose samples the official form names, got "
+                f"{self.source!r}"
             )
         source, common = self.scene_source(), self.common()
         floors, latencies = [common.pop("floor_seed")], [common.pop("camera_latency")]
-        return play_grid(source, source.scenes(), [self.policy], [self.budget], floors, latencies, **common)
+        return play_grid(
+            source, source.scenes(), [self.policy], [self.budget], floors, latencies, **common
+        )
 
-    def _meta(self, config: "PlayConfig") -> dict[str, Any]:
+    def _meta(self, config: PlayConfig) -> dict[str, Any]:
         """What the form asks about the origin of results, and under `care_sim` what made them."""
-        import care_sim
-        from care_sim.sources.nuscenes.results_form import MODALITIES
-
         own = {"version": care_sim.__version__, "split": self.split or "val", **config.row()}
         del own["scene"]
         return MODALITIES | {"care_sim": own}
 
 
-def found(config: "PlayConfig") -> "dict[str, list[Row]]":
+def found(config: PlayConfig) -> dict[str, list[Row]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
-    from care_sim.sources.nuscenes.results_form import boxes
-    from care_sim.study.scene_play import play
-
     film = config.source.film(config.scene)
     moments = zip(film.shots, play(config, film).keyframes, strict=True)
-    return {shot.token: boxes(shot, record.detections, record.velocities) for shot, record in moments}
+    return {
+        shot.token: boxes(shot, record.detections, record.velocities) for shot, record in moments
+    }

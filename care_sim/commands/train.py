@@ -45,7 +45,9 @@ class TrainRecurrentPpo(RecurrentPpo):
 
 @dataclass(frozen=True)
 class Curves:
-    """Draw the learning curves of training runs, a panel a task, a line a training seed; PNG and SVG."""
+    """Draw the learning curves of training runs, a panel a task, a line a training seed; PNG and
+    SVG.
+    """
 
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDERS")]
     """The --out of training runs."""

@@ -1,4 +1,6 @@
-"""`care-sim view`: the Rerun viewer over a recording, on this machine or in a browser, without a network."""
+"""`care-sim view`: the Rerun viewer over a recording, on this machine or in a browser, without a
+network.
+"""
 
 import os
 import signal
@@ -28,18 +30,19 @@ threading.Thread(target=follow, daemon=True).start()
 from rerun_cli.__main__ import main
 sys.exit(main())
 """
-"""Rerun's own launcher, which as a module would not tell whether the viewer failed. Its input ends with this process,
-however that ends: then it and its children end too.
+"""Rerun's own launcher, which as a module would not tell whether the viewer failed. Its input ends
+with this process, however that ends: then it and its children end too.
 """
 FAILED = 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra 'viewer').
+    """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra
+    'viewer').
 
-    It needs no network. Where there is one, the viewer looks for its updates and counts its use, which
-    `rerun analytics disable` ends; its page in a browser fetches a font too.
+    It needs no network. Where there is one, the viewer looks for its updates and counts its use,
+    which `rerun analytics disable` ends; its page in a browser fetches a font too.
     """
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -58,12 +61,16 @@ class View:
         if not self.web:
             if not _rerun(str(self.file), "--port", "auto"):
                 return 0
-            print("care-sim: the viewer failed; with --web a browser shows the recording", file=sys.stderr)
+            print(
+                "care-sim: the viewer failed; with --web a browser shows the recording",
+                file=sys.stderr,
+            )
             return FAILED
         data, pages = _free_ports(2)
         source = quote(f"rerun+http://{HERE}:{data}/proxy", safe="")
         print(
-            f"Open http://{HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a browser; Ctrl-C ends it.",
+            f"Open http://{HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a "
+            "browser; Ctrl-C ends it.",
             flush=True,
         )
         ports = ("--bind", HERE, "--port", str(data), "--web-viewer-port", str(pages))
@@ -71,7 +78,9 @@ class View:
 
 
 def _rerun(*options: str) -> int:
-    """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes outlives this one."""
+    """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes
+    outlives this one.
+    """
     quiet = {"RUST_LOG": "warn"} | os.environ
     command = [sys.executable, "-c", VIEWER, *options]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=quiet)

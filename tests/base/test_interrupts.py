@@ -50,7 +50,7 @@ except KeyboardInterrupt:
     [
         ("numpy", "SIGINT"),
         ("tyro", "SIGTERM"),
-        ("care_sim.commands.view", "SIGHUP"),
+        ("care_sim.commands.run", "SIGHUP"),
         ("care_sim.reports.episodes.brake_photo", "SIGINT"),
     ],
 )

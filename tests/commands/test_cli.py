@@ -1,3 +1,4 @@
+import inspect
 import signal
 import subprocess
 import sys
@@ -7,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from care_sim.base.interrupts import SIGNALS
-from care_sim.cli import main
-from care_sim.commands.closed_loop import Reproduce
+from care_sim.cli import COMMANDS, main
+from care_sim.commands.reproduce import Reproduce
 from care_sim.commands.shared.options import Options
 from care_sim.policies import contenders
 from care_sim.scenarios import SCENARIOS
@@ -60,7 +61,10 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         (["run", "dense", "--seed", "-1"], ["seed", ">= 0"]),
         (["run", "dense", "--scenario-parameters", "wheels=3"], ["'wheels'", "vehicles"]),
         (["run", "dense", "--scenario-parameters", "wheels"], ["NAME=VALUE", "'wheels'"]),
-        (["run", "dense", "--scenario-parameters", "vehicles=3", "vehicles=4"], ["once", "'vehicles' 2 times"]),
+        (
+            ["run", "dense", "--scenario-parameters", "vehicles=3", "vehicles=4"],
+            ["once", "'vehicles' 2 times"],
+        ),
         (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
         (["sweep", "--seeds", "0"], ["seeds", "from 1 to"]),
         (["sweep", "--budgets"], ["--budgets", "at least one"]),
@@ -91,12 +95,18 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_pat
         "report NOTHING -o",
     ],
 )
-def test_what_stands_where_a_file_is_wanted_is_one_line_before_anything_is_computed(command, capsys, tmp_path):
+def test_what_stands_where_a_file_is_wanted_is_one_line_before_anything_is_computed(
+    command, capsys, tmp_path
+):
     """Somebody's table, and a folder."""
     table, results = tmp_path / "table.png", tmp_path / "results"
     table.write_bytes(b"PAR1 and rows")
     write_rows(
-        [run_episode(EpisodeConfig("dartout", "random", scenario_parameters=(("duration_s", 0.1),)))],
+        [
+            run_episode(
+                EpisodeConfig("dartout", "random", scenario_parameters=(("duration_s", 0.1),))
+            )
+        ],
         results / EPISODES.file,
     )
     for place in (table, tmp_path) if "video" not in command else (table,):
@@ -125,7 +135,8 @@ def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
     code, _, err = run(capsys, "report", tmp_path)
     assert (code, err) == (
         2,
-        f"care-sim: {tmp_path} holds an unfinished study; the command that began it goes on there\n",
+        f"care-sim: {tmp_path} holds an unfinished study; the command that began it goes on "
+        "there\n",
     )
     code, _, err = run(capsys, "report", tmp_path / "nowhere")
     assert "no results at" in err
@@ -134,7 +145,11 @@ def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
 def test_the_detectors_are_listed_with_a_line_each(capsys):
     code, out, _ = run(capsys, "detectors")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()[:3]] == ["returns", "cluster", "torchscript"]
+    assert [line.split()[0] for line in out.splitlines()[:3]] == [
+        "returns",
+        "cluster",
+        "torchscript",
+    ]
     assert all(len(line.split()) > 5 for line in out.splitlines())
 
 
@@ -143,12 +158,16 @@ def test_run_prints_the_timeline_and_the_outcome(capsys):
     assert code == 0
     assert out.count("16384") == 2
     assert max(map(len, out.splitlines())) <= 100
-    assert all(word in out for word in ("sensor to", "0.3 s after", "detection_distance_m", "episode_hash"))
+    assert all(
+        word in out for word in ("sensor to", "0.3 s after", "detection_distance_m", "episode_hash")
+    )
 
 
 def test_a_sweep_runs_the_grid_and_its_folder_can_be_reported(capsys, tmp_path):
     axes = ["--scenarios", "dartout", "--policies", "random", "full", "--budgets", "0.05", "0.1"]
-    code, out, err = run(capsys, "sweep", *axes, "--seeds", "3", "4", "--out", tmp_path, "--workers", "1", *SHORT)
+    code, out, err = run(
+        capsys, "sweep", *axes, "--seeds", "3", "4", "--out", tmp_path, "--workers", "1", *SHORT
+    )
     assert code == 0, err
     rows = read_rows(tmp_path / EPISODES.file)
     assert {(row["policy"], row["budget"], row["seed"]) for row in rows} == {
@@ -173,9 +192,22 @@ def torn(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(package.parent)
 
 
-def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_named(capsys, tmp_path, torn):
+def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_named(
+    capsys, tmp_path, torn
+):
     out = tmp_path / "out"
-    axes = ["--policies", "all", "--scenarios", "all", "--seeds", "1", "--workers", "1", "--out", out]
+    axes = [
+        "--policies",
+        "all",
+        "--scenarios",
+        "all",
+        "--seeds",
+        "1",
+        "--workers",
+        "1",
+        "--out",
+        out,
+    ]
     short = ["--scenario-parameters", "duration_s=0.1"]
     code, _, err = run(capsys, "sweep", *axes, *short)
     assert code == 1
@@ -191,13 +223,21 @@ def test_all_scenarios_and_policies_are_swept_but_for_a_broken_one_which_is_name
 
 def test_further_policies_join_a_set_study_and_a_broken_one_is_left_out(capsys, tmp_path, torn):
     def short(seeds, also):
-        return grid(["dartout"], ["care", *also], [0.1], seeds, scenario_parameters=(("duration_s", 0.1),))
+        return grid(
+            ["dartout"], ["care", *also], [0.1], seeds, scenario_parameters=(("duration_s", 0.1),)
+        )
 
     study = Reproduce(seeds=(1,), workers=1, also=("torn", "uncertainty"))
     assert study.play("sweep", short, tmp_path / "out") == 1
     assert "left out: policy torn cannot be loaded" in capsys.readouterr().err
-    assert {row["policy"] for row in read_rows(tmp_path / "out" / EPISODES.file)} == {"care", "uncertainty"}
-    assert Reproduce(seeds=(1,), workers=1, also=("torn",)).play("sweep", short, tmp_path / "alone") == 1
+    assert {row["policy"] for row in read_rows(tmp_path / "out" / EPISODES.file)} == {
+        "care",
+        "uncertainty",
+    }
+    assert (
+        Reproduce(seeds=(1,), workers=1, also=("torn",)).play("sweep", short, tmp_path / "alone")
+        == 1
+    )
     assert {row["policy"] for row in read_rows(tmp_path / "alone" / EPISODES.file)} == {"care"}
 
 
@@ -206,6 +246,28 @@ def test_a_condition_has_one_value_or_several(capsys, tmp_path):
     code, _, err = run(capsys, "sweep", *rates, "--out", tmp_path)
     assert (code, err.count("\n")) == (2, 1)
     assert "give false_negative_rate one value or several, not both" in err
+
+
+def test_the_list_of_commands_says_what_each_command_says_of_itself():
+    for name, command in COMMANDS.items():
+        if name != "train":
+            first, _, _ = inspect.getdoc(command.loaded()).partition("\n\n")
+            assert " ".join(first.split()) == command.about
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("run dense --seed abc", "--seed: must be a whole number, got 'abc'"),
+        ("run dense --camera-latency 1.5", "--camera-latency: must be a whole number, got '1.5'"),
+        ("certify --episode abc", "--episode: must be a whole number, got 'abc'"),
+        ("bench --seconds x", "--seconds: must be a number, got 'x'"),
+    ],
+)
+def test_what_is_no_number_is_told_in_plain_words(arguments, message, capsys):
+    code, _, err = run(capsys, *arguments.split())
+    assert (code, err.count("\n")) == (2, 1)
+    assert message in err
 
 
 def test_the_lists(capsys):
@@ -217,11 +279,15 @@ def test_the_lists(capsys):
     assert parameters(["ego_speed_mps=8.03,8.63"]) == (("ego_speed_mps", (8.03, 8.63)),)
 
 
-def test_an_installed_policy_that_does_not_load_is_listed_with_the_reason(capsys, tmp_path, monkeypatch):
+def test_an_installed_policy_that_does_not_load_is_listed_with_the_reason(
+    capsys, tmp_path, monkeypatch
+):
     info = tmp_path / "torn-1.5.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: torn\nVersion: 1.5\n")
-    (info / "entry_points.txt").write_text("[care_sim.policies]\ntorn = torn_policy:Torn\nzeta = care_sim:Policy\n")
+    (info / "entry_points.txt").write_text(
+        "[care_sim.policies]\ntorn = torn_policy:Torn\nzeta = care_sim:Policy\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     code, out, _ = run(capsys, "policies")
     assert code == 0
@@ -234,12 +300,17 @@ def test_the_defaults_are_those_of_an_episode():
     assert all(getattr(usual, name) == value for name, value in Options().arguments().items())
 
 
-@pytest.mark.parametrize("command", ["", "run", "sweep", "reproduce", "ablate", "faults", "crowding", "report"])
+@pytest.mark.parametrize(
+    "command", ["", "run", "sweep", "reproduce", "ablate", "faults", "crowding", "report"]
+)
 def test_help_is_quick_and_complete(command):
     code = "import sys; from care_sim.cli import main; main(sys.argv[1:])"
     started = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", code, *command.split(), "--help"], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code, *command.split(), "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert time.perf_counter() - started < 5
     assert "--help" in done.stdout
@@ -259,7 +330,9 @@ def test_a_picture_of_the_braking_car(capsys, tmp_path):
 def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
     picture = tmp_path / "keyframe.png"
     with pytest.raises(SystemExit):
-        main(["run", "dartout", "--picture", str(picture), "--scenario-parameters", "duration_s=0.2"])
+        main(
+            ["run", "dartout", "--picture", str(picture), "--scenario-parameters", "duration_s=0.2"]
+        )
     assert "no picture" in capsys.readouterr().err
     assert not picture.exists()
 
@@ -274,7 +347,10 @@ def test_no_picture_when_the_car_never_brakes(capsys, tmp_path):
         (["run", "dense", "--floor-seed", str(2**64)], "floor_seed"),
         (["run", "dense", "--false-negative-burst", str(10**19)], "false_negative_burst"),
         (["run", "dense", "--ego-speed-sigma", "1e19"], "ego_speed_sigma"),
-        (["run", "dense", "--scenario-parameters", "ego_speed_mps=(1e300,1e300)"], "ego_speed_mps of dense"),
+        (
+            ["run", "dense", "--scenario-parameters", "ego_speed_mps=(1e300,1e300)"],
+            "ego_speed_mps of dense",
+        ),
         (["run", "dense", "--scenario-parameters", "self=1"], "parameter of dense"),
         (["run", "dense", "--policy-parameters", "a={[1]}"], "unknown parameter"),
         (["run", "dense", "--policy-parameters", "a=" + "-" * 5000 + "1"], "unknown parameter"),
@@ -308,7 +384,7 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
         raise fault("deep\ninside")
 
     monkeypatch.delenv("CARE_SIM_DEBUG", raising=False)
-    monkeypatch.setattr("care_sim.cli.Scenarios.__call__", fails)
+    monkeypatch.setattr("care_sim.commands.listings.Scenarios.__call__", fails)
     code, _, err = run(capsys, "scenarios")
     assert code == 70
     assert err.startswith(f"care-sim: unexpected {fault.__name__}: deep inside; please report it")
@@ -330,10 +406,16 @@ def test_a_fault_of_the_software_is_one_line_and_its_trace_is_to_be_had(fault, c
         ("COLUMNS=1 timeout 60 {} run --help > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} policies > /dev/null", 0, ""),
         ("PYTHONIOENCODING=ascii {} bench --x", 2, "care-sim: Unrecognized options: --x\n"),
-        ("PYTHONIOENCODING=ascii {} bench --seconds 0", 2, "care-sim: seconds must lie in [0.001, 3600], got 0.0\n"),
+        (
+            "PYTHONIOENCODING=ascii {} bench --seconds 0",
+            2,
+            "care-sim: seconds must lie in [0.001, 3600], got 0.0\n",
+        ),
     ],
 )
 def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):
     command = shell.format(f"{sys.executable} -c 'from care_sim.cli import main; main()'")
-    ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
+    ended = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
+    )
     assert (ended.returncode, ended.stderr) == (code, complaint)

@@ -24,16 +24,21 @@ def export(capsys, drive, out, *options):
     return end.value.code, *capsys.readouterr()
 
 
-def test_a_full_scan_finds_every_object_in_every_sample_where_it_is_and_as_fast_as_it_is(capsys, tmp_path, drive):
+def test_a_full_scan_finds_every_object_in_every_sample_where_it_is_and_as_fast_as_it_is(
+    capsys, tmp_path, drive
+):
     path = tmp_path / "new" / "full.json"
     code, out, err = export(capsys, drive, path, "--policy", "full")
     assert (code, err) == (0, "")
-    assert out == f"{len(TOKENS) * len(OBJECTS)} boxes in {len(TOKENS)} samples of 2 scenes are in {path}\n"
+    boxes = len(TOKENS) * len(OBJECTS)
+    assert out == f"{boxes} boxes in {len(TOKENS)} samples of 2 scenes are in {path}\n"
     content = json.loads(path.read_text())
     assert [*content["results"]] == TOKENS
     for scene, heading in SPLIT.items():
         for number in range(KEYFRAMES):
-            assert seen(content["results"][f"{scene}-{number}"], heading) == pytest.approx(true(number), abs=1e-3)
+            assert seen(content["results"][f"{scene}-{number}"], heading) == pytest.approx(
+                true(number), abs=1e-3
+            )
 
 
 def seen(found, heading):
@@ -56,13 +61,23 @@ def in_order(classes, places, velocities):
 
 
 def test_the_origin_is_told(capsys, tmp_path, drive):
-    options = ["--policy", "care-sbf", "--policy-parameters", "k_safe=1.5", "--budget", "0.2", "--floor-seed", "2"]
+    options = [
+        "--policy",
+        "care-sbf",
+        "--policy-parameters",
+        "k_safe=1.5",
+        "--budget",
+        "0.2",
+        "--floor-seed",
+        "2",
+    ]
     options += ["--camera-latency", "1"]
     export(capsys, drive, tmp_path / "out.json", *options)
     meta = json.loads((tmp_path / "out.json").read_text())["meta"]
     own = meta.pop("care_sim")
     assert meta == {
-        "use_camera": True, "use_lidar": True, "use_radar": False, "use_map": False, "use_external": False,
+        "use_camera": True, "use_lidar": True, "use_radar": False, "use_map": False,
+        "use_external": False,
     }  # fmt: skip
     assert (own["policy"], own["policy.k_safe"], own["budget"]) == ("care-sbf", 1.5, 0.2)
     assert (own["floor_seed"], own["camera_latency"]) == (2, 1)
@@ -78,17 +93,30 @@ def test_the_same_command_writes_the_same_file_and_another_floor_another(capsys,
     assert a == b != c
 
 
-def test_samples_in_which_nothing_is_found_are_there_and_a_file_without_a_box_is_told(capsys, tmp_path, drive):
-    code, _, err = export(capsys, drive, tmp_path / "out.json", "--policy", "random", "--budget", "0.0005")
+def test_samples_in_which_nothing_is_found_are_there_and_a_file_without_a_box_is_told(
+    capsys, tmp_path, drive
+):
+    code, _, err = export(
+        capsys, drive, tmp_path / "out.json", "--policy", "random", "--budget", "0.0005"
+    )
     assert code == 0
     assert err == "care-sim: the official devkit refuses results without a box\n"
-    assert json.loads((tmp_path / "out.json").read_text())["results"] == {token: [] for token in TOKENS}
+    assert json.loads((tmp_path / "out.json").read_text())["results"] == {
+        token: [] for token in TOKENS
+    }
 
 
 def test_a_split_of_splits_json_and_camera_detections_from_a_file(capsys, tmp_path, drive):
     (drive / "v1.0-trainval" / "splits.json").write_text('{"mine": ["scene-0916"]}')
     (tmp_path / "found.json").write_text("[]")
-    options = ["--split", "mine", "--camera-detections", tmp_path / "found.json", "--version", "v1.0-trainval"]
+    options = [
+        "--split",
+        "mine",
+        "--camera-detections",
+        tmp_path / "found.json",
+        "--version",
+        "v1.0-trainval",
+    ]
     code, _, _ = export(capsys, drive, tmp_path / "out.json", *options)
     content = json.loads((tmp_path / "out.json").read_text())
     assert code == 0

@@ -49,7 +49,10 @@ def test_the_same_results_make_the_same_page(results, tmp_path, capsys):
     ("content", "says"),
     [
         ({}, "no results at"),
-        ({"journal.jsonl": b"{}\n"}, "holds an unfinished study; the command that began it goes on there"),
+        (
+            {"journal.jsonl": b"{}\n"},
+            "holds an unfinished study; the command that began it goes on there",
+        ),
         ({"episodes.parquet": b"PAR1 torn"}, "is not a readable Parquet file"),
     ],
 )
@@ -65,7 +68,8 @@ def test_what_is_no_results_is_one_line(content, says, tmp_path, capsys):
 
 def test_results_of_another_version_are_one_line(results, tmp_path, capsys):
     write_rows(
-        [{name: value for name, value in row.items() if name != "floor"} for row in STUDY], results / "episodes.parquet"
+        [{name: value for name, value in row.items() if name != "floor"} for row in STUDY],
+        results / "episodes.parquet",
     )
     code, _, err = report(capsys, results, "-o", tmp_path / "report.html")
     assert code == 2

@@ -1,4 +1,6 @@
-"""The first-sighting protocol over hand-built drives: plays, rows, events, and a run that meets damaged files."""
+"""The first-sighting protocol over hand-built drives: plays, rows, events, and a run that meets
+damaged files.
+"""
 
 import json
 import shutil
@@ -45,8 +47,12 @@ def source(folder):
     return source_of(f"argoverse2:{folder}")
 
 
-def small(source, policies=("history", "care"), budgets=(0.05,), floors=(0,), scenes=("a",), **common):
-    return play_grid(source, [Scene(name, 0) for name in scenes], policies, budgets, floors, **common)
+def small(
+    source, policies=("history", "care"), budgets=(0.05,), floors=(0,), scenes=("a",), **common
+):
+    return play_grid(
+        source, [Scene(name, 0) for name in scenes], policies, budgets, floors, **common
+    )
 
 
 def steady(row):
@@ -73,9 +79,13 @@ def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):
 
 
 def test_one_policy_alone_is_read_again(source, tmp_path):
-    """What differs from the reference is known of no row then: a column of nothing, which is still one of counts."""
+    """What differs from the reference is known of no row then: a column of nothing, which is still
+    one of counts.
+    """
     assert not conduct(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
-    counts = pq.read_table(tmp_path / "out" / PLAYS.file).select(["differing_keyframes", "differing_cells"])
+    counts = pq.read_table(tmp_path / "out" / PLAYS.file).select(
+        ["differing_keyframes", "differing_cells"]
+    )
     assert [str(column.type) for column in counts.columns] == ["int64", "int64"]
     (row,) = reported(tmp_path / "out")[0]
     assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
@@ -97,7 +107,9 @@ def test_a_film_has_one_hash_and_floors_give_other_episodes(source):
 
 
 def test_allocations_are_compared_with_those_of_care_under_the_same_conditions(source):
-    rows = {row["policy"]: row for row in attempted(small(source, ["history", "care-priority", "full"]))}
+    rows = {
+        row["policy"]: row for row in attempted(small(source, ["history", "care-priority", "full"]))
+    }
     assert rows["full"]["differing_keyframes"] is None
     assert 0 < rows["history"]["differing_keyframes"] <= 10
     assert rows["history"]["differing_cells"] > 10
@@ -106,15 +118,21 @@ def test_allocations_are_compared_with_those_of_care_under_the_same_conditions(s
 
 
 def test_full_plays_once_for_all_that_it_does_not_feel(source):
-    configs = small(source, ["full", "care"], budgets=(0.1, 0.2), floors=(0, 1, 2), camera_latencies=(0, 1))
+    configs = small(
+        source, ["full", "care"], budgets=(0.1, 0.2), floors=(0, 1, 2), camera_latencies=(0, 1)
+    )
     full = [config for config in configs if config.policy == "full"]
-    assert [(config.budget, config.camera_latency, config.floor_seed) for config in full] == [(1.0, 0, 0)]
+    assert [(config.budget, config.camera_latency, config.floor_seed) for config in full] == [
+        (1.0, 0, 0)
+    ]
     assert len(configs) == 1 + 2 * 3 * 2
     assert len({config.digest() for config in configs}) == len(configs)
 
 
 def test_the_row_names_every_condition_and_the_label_what_departs(source):
-    (config,) = small(source, ["care-sbf"], camera_latency=1, policy_parameters=(("k_safe", 1.0),), floors=(2,))
+    (config,) = small(
+        source, ["care-sbf"], camera_latency=1, policy_parameters=(("k_safe", 1.0),), floors=(2,)
+    )
     assert set(config.row()) == {*PLAY_FIELDS, "recording", "policy.k_safe"}
     assert config.label == "a care-sbf 0.05 camera_latency=1 floor_seed=2 policy.k_safe=1.0"
     assert listed([config])["scenes"] == ["a"]
@@ -130,9 +148,13 @@ def test_the_row_names_every_condition_and_the_label_what_departs(source):
 def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rule(tmp_path):
     van = box("BOX_TRUCK", (20.0, -4.0, 0.9), (6.0, 2.2, 2.6), track="van")
     person = box("PEDESTRIAN", (14.0, 3.0, 0.6), (0.6, 0.7, 1.8), track="p", points=0)
-    write(tmp_path / "a", [[van, person]] * 5 + [[van, person | {"num_interior_pts": 4}]], [at()] * 6)
+    write(
+        tmp_path / "a", [[van, person]] * 5 + [[van, person | {"num_interior_pts": 4}]], [at()] * 6
+    )
     source = source_of(f"argoverse2:{tmp_path}")
-    rule, sight = (small(source, ["full"], presence=presence)[0] for presence in ("annotated", "visible"))
+    rule, sight = (
+        small(source, ["full"], presence=presence)[0] for presence in ("annotated", "visible")
+    )
     assert rule.digest() != sight.digest()
     assert "presence" not in rule.row()
     assert (sight.row()["presence"], sight.label) == ("visible", "a full 1 presence=visible")
@@ -140,7 +162,11 @@ def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rul
     assert (by_rule["events"], by_rule["emerging"], by_rule["ttfds"]) == (0.0, 1, ())
     assert (by_sight["events"], by_sight["emerging"], by_sight["ttfds"]) == (1.0, 1, (0,))
     assert by_rule["episode_hash"] == by_sight["episode_hash"]
-    assert (by_rule["frames"], by_rule["found"]) == (by_sight["frames"], by_sight["found"]) == (3.0, 3.0)
+    assert (
+        (by_rule["frames"], by_rule["found"])
+        == (by_sight["frames"], by_sight["found"])
+        == (3.0, 3.0)
+    )
     assert [plays_of([row])[0].setting.label for row in (by_rule, by_sight)] == [
         "Argoverse 2, detector returns",
         "Argoverse 2, detector returns, presence visible",
@@ -162,11 +188,18 @@ def test_a_damaged_scene_is_named_left_out_and_the_rest_goes_on(source, tmp_path
     assert line.startswith("2 plays, the first torn history 0.05: ")
     assert "annotations.feather" in line
     assert f"Left out: {line}." in (tmp_path / "out" / "tables.md").read_text()
-    assert json.loads((tmp_path / "out" / "config.json").read_text())["failed"] == [*map(str, failures)]
+    assert json.loads((tmp_path / "out" / "config.json").read_text())["failed"] == [
+        *map(str, failures)
+    ]
 
 
 def test_the_events_are_kept_one_by_one(source, tmp_path):
-    assert conduct(small(source, floors=(0, 1), scenes=("a", "b")), tmp_path, workers=1, study=PROTOCOL) == []
+    assert (
+        conduct(
+            small(source, floors=(0, 1), scenes=("a", "b")), tmp_path, workers=1, study=PROTOCOL
+        )
+        == []
+    )
     events = pq.read_table(tmp_path / "events.parquet").to_pylist()
     rows, *_ = reported(tmp_path)
     assert len(events) == 8
@@ -182,7 +215,12 @@ def test_a_policy_that_joins_later_is_all_that_is_played(source, tmp_path):
     before = small(source, scenes=("a", "b"))
     conduct(before, tmp_path, workers=1, study=PROTOCOL)
     lines = (tmp_path / JOURNAL).read_text().splitlines()
-    conduct([*before, *small(source, ["random"], scenes=("a", "b"))], tmp_path, workers=1, study=PROTOCOL)
+    conduct(
+        [*before, *small(source, ["random"], scenes=("a", "b"))],
+        tmp_path,
+        workers=1,
+        study=PROTOCOL,
+    )
     after = (tmp_path / JOURNAL).read_text().splitlines()
     assert after[:4] == lines
     assert [json.loads(line)["policy"] for line in after[4:]] == ["random", "random"]
@@ -193,13 +231,34 @@ def test_workers_get_whole_scenes_and_equal_what_is_played_at_home(source, tmp_p
     with Journal(tmp_path / JOURNAL) as journal:
         assert run_all(configs, journal, 2, attempt=PLAYS.attempt) == []
         kept = [journal[config.digest()] for config in configs]
-    at_home = [row for name in "ab" for row in attempted([config for config in configs if config.scene.name == name])]
+    at_home = [
+        row
+        for name in "ab"
+        for row in attempted([config for config in configs if config.scene.name == name])
+    ]
     assert [steady(row) for row in kept] == [steady(row) for row in at_home]
 
 
 def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
-    arguments = ["protocol", "--source", f"argoverse2:{folder}", "--policies", "history", "care", "full"]
-    options = ["--budgets", "0.05", "--floor-seeds", "2", "--out", str(tmp_path / "out"), "--workers", "1"]
+    arguments = [
+        "protocol",
+        "--source",
+        f"argoverse2:{folder}",
+        "--policies",
+        "history",
+        "care",
+        "full",
+    ]
+    options = [
+        "--budgets",
+        "0.05",
+        "--floor-seeds",
+        "2",
+        "--out",
+        str(tmp_path / "out"),
+        "--workers",
+        "1",
+    ]
     for found in (False, True):
         with pytest.raises(SystemExit) as end:
             main([*arguments, *options])
@@ -216,7 +275,10 @@ def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--source", "waymo:."], "unknown source 'waymo:.'; known: streets, argoverse2:FOLDER, nuscenes:FOLDER"),
+        (
+            ["--source", "waymo:."],
+            "unknown source 'waymo:.'; known: streets, argoverse2:FOLDER, nuscenes:FOLDER",
+        ),
         (["--source", "argoverse2:nowhere"], "source argoverse2:nowhere: nowhere is no folder"),
         (["--split", "val"], "unknown split of the streets 'val'; known: calibration, evaluation"),
         (["--version", "v1.0-mini"], "version says nothing to streets"),
@@ -227,7 +289,10 @@ def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
         (["--floor-seeds", "0"], "floor_seeds must be a whole number >= 1 and <= 1000, got 0"),
         (["--detector", "yolo"], "unknown detector 'yolo'"),
         (["--engine", "bullet"], "engine cannot be changed in the open loop"),
-        (["--camera-latency", "1", "--camera-latencies", "0", "1"], "give camera_latency one value or several"),
+        (
+            ["--camera-latency", "1", "--camera-latencies", "0", "1"],
+            "give camera_latency one value or several",
+        ),
     ],
 )
 def test_what_the_command_does_not_take_is_one_line(arguments, complaint, capsys, tmp_path):
@@ -248,9 +313,14 @@ def test_scenes_are_chosen_by_number_or_by_name():
     scenes = Streets().scenes()
     assert [scene.seed for scene in scenes] == list(range(150))
     assert chosen(scenes, ()) == scenes
-    assert [scene.name for scene in chosen(scenes, ("2",))] == ["street-0000-straight", "street-0001-bend"]
+    assert [scene.name for scene in chosen(scenes, ("2",))] == [
+        "street-0000-straight",
+        "street-0001-bend",
+    ]
     assert chosen(scenes, (scenes[7].name,)) == [scenes[7]]
-    assert {scene.seed for scene in Streets("calibration").scenes()}.isdisjoint(scene.seed for scene in scenes)
+    assert {scene.seed for scene in Streets("calibration").scenes()}.isdisjoint(
+        scene.seed for scene in scenes
+    )
 
 
 def test_a_scene_without_an_event_has_a_row_too(tmp_path):
@@ -274,7 +344,11 @@ def test_a_play_is_named_by_the_file_that_its_detector_is_given(source, tmp_path
     digests = set()
     for content in (b"one", b"another"):
         model.write_bytes(content)
-        digests.add(plain.changed(detector="torchscript", detector_parameters=(("file", str(model)),)).digest())
+        digests.add(
+            plain.changed(
+                detector="torchscript", detector_parameters=(("file", str(model)),)
+            ).digest()
+        )
         digests.add(plain.changed(policy_parameters=(("weights", str(tmp_path)),)).digest())
     assert len(digests | {plain.digest()}) == 5
 
@@ -290,14 +364,18 @@ def test_what_changed_in_a_recording_is_played_again(source, folder, drive, tmp_
 
 
 def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
-    """Whole scenes go to a worker; the one that dies takes the others down, which are then played without it."""
+    """Whole scenes go to a worker; the one that dies takes the others down, which are then played
+    without it.
+    """
     configs = small(source, ["history", "dies", "care", "raises"], floors=(0, 1), scenes=("a", "b"))
     with Journal(tmp_path / JOURNAL) as journal:
         failures = run_all(configs, journal, 2, attempt=PLAYS.attempt)
         kept = [config.policy for config in configs if config.digest() in journal]
     assert sorted(kept) == ["care"] * 4 + ["history"] * 4
     reasons = sorted((failure.config.policy, failure.reason) for failure in failures)
-    assert reasons[4:] == [("raises", "RuntimeError: no idea, at all (misbehaving.py, line 20)")] * 4
+    assert (
+        reasons[4:] == [("raises", "RuntimeError: no idea, at all (misbehaving.py, line 20)")] * 4
+    )
     assert reasons[0] == ("dies", "the worker process died")
     assert reasons[3] == ("dies", "the worker process died 3 times before")
 
@@ -305,7 +383,9 @@ def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
 def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
     read = []
     film = type(source.recordings).film
-    monkeypatch.setattr(type(source.recordings), "film", lambda own, scene: read.append(scene) or film(own, scene))
+    monkeypatch.setattr(
+        type(source.recordings), "film", lambda own, scene: read.append(scene) or film(own, scene)
+    )
     configs = small(source, floors=(0, 1, 2), scenes=("torn",))
     (reason,) = set(attempted(configs))
     assert "annotations.feather" in reason
@@ -314,5 +394,7 @@ def test_a_scene_that_cannot_be_read_is_read_once(source, monkeypatch):
 
 def test_a_folder_of_another_kind_of_study_is_refused(source, tmp_path):
     (tmp_path / "episodes.parquet").touch()
-    with pytest.raises(InvalidInput, match="holds episodes of another study; the plays of the study protocol need"):
+    with pytest.raises(
+        InvalidInput, match="holds episodes of another study; the plays of the study protocol need"
+    ):
         conduct(small(source), tmp_path, workers=1, study=PROTOCOL, force=True)

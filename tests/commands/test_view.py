@@ -63,7 +63,9 @@ def test_a_place_that_cannot_be_written_is_one_line(capsys, tmp_path):
         ("compare", "--video", "out.gif"),
     ],
 )
-def test_what_stands_in_the_way_is_one_line_and_nothing_is_played(command, option, name, capsys, tmp_path, request):
+def test_what_stands_in_the_way_is_one_line_and_nothing_is_played(
+    command, option, name, capsys, tmp_path, request
+):
     if option == "--export":
         request.getfixturevalue("open3d")
     (tmp_path / name).mkdir()
@@ -83,7 +85,14 @@ def test_without_a_display_the_browser_is_recommended(recording, capfd, monkeypa
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_the_web_viewer_is_served_and_ends_with_its_children(recording, end):
-    command = [sys.executable, "-c", "from care_sim.cli import main; main()", "view", str(recording), "--web"]
+    command = [
+        sys.executable,
+        "-c",
+        "from care_sim.cli import main; main()",
+        "view",
+        str(recording),
+        "--web",
+    ]
     with Marked(command, stderr=None) as started:
         server = started.process
         url = re.search(r"http://(127\.0\.0\.1):(\d+)/\S*", server.stdout.readline())
@@ -113,7 +122,9 @@ def test_compare_prints_and_records_the_same_seed_under_every_policy(capsys, tmp
     file = tmp_path / "both.rrd"
     names = ("history", "all-camera", "care")
     options = ["--budget", "0.05", "--seed", "2", "--scenario-parameters", "duration_s=4"]
-    code, out, _ = run(capsys, "compare", "dartout", "--policies", *names, *options, "--record", file)
+    code, out, _ = run(
+        capsys, "compare", "dartout", "--policies", *names, *options, "--record", file
+    )
     assert code == 0
     assert f"care-sim view {file}" in out
     found = read(file)
@@ -140,7 +151,16 @@ def test_compare_without_a_recording_writes_nothing(capsys, tmp_path, monkeypatc
 
 
 def test_run_exports_every_scan(capsys, tmp_path, open3d):
-    code, _, _ = run(capsys, "run", "dartout", "--export", tmp_path / "scans", "--record", tmp_path / "out.rrd", *SHORT)
+    code, _, _ = run(
+        capsys,
+        "run",
+        "dartout",
+        "--export",
+        tmp_path / "scans",
+        "--record",
+        tmp_path / "out.rrd",
+        *SHORT,
+    )
     assert code == 0
     assert len(list((tmp_path / "scans").glob("*.pcd"))) == 5
     assert (tmp_path / "out.rrd").stat().st_size > 10_000

@@ -9,15 +9,11 @@ import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 
 import pytest
-import tyro
 
 import care_sim.wrappers
 from care_sim import cli
-from care_sim.commands.train import LEARNERS
+from care_sim.base.errors import InvalidInput
 from care_sim.envs import IDS
-from care_sim.measure.bench.config import BenchConfig
-from care_sim.measure.certify.config import CertifyConfig
-from care_sim.measure.parity.config import ParityConfig
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.places import ROOT
 
@@ -65,19 +61,11 @@ def test_a_block_runs_on_its_own(block, tmp_path, drive):
     assert done.stdout.strip()
 
 
-def parsed(arguments):
-    """What the command line makes of arguments, without running it."""
-    measures = {"bench": BenchConfig, "parity": ParityConfig, "certify": CertifyConfig}
-    first, *rest = arguments
-    if first in measures:
-        return tyro.cli(measures[first], args=rest)
-    commands = LEARNERS if first == "train" else cli.COMMANDS
-    return tyro.extras.subcommand_cli_from_dict(commands, args=rest if first == "train" else arguments)
-
-
 def understood(line):
     try:
-        parsed(shlex.split(line)[1:])
+        cli.parsed(shlex.split(line)[1:])
+    except InvalidInput:
+        return False
     except SystemExit as end:
         return end.code == 0
     return True

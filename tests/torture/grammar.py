@@ -42,7 +42,7 @@ WORK = {
 }  # fmt: skip
 """Options that say how much is to be done; a large value is an honest wish, which takes its time."""
 TINY = {
-    "workers": "1", "seeds": "1", "scenes": "1", "episodes": "0", "floor_seeds": "1", "steps": "64", "repeats": "1",
+    "workers": "1", "seeds": "1", "scenes": "1", "episodes": "0", "episode": "0", "floor_seeds": "1", "steps": "64", "repeats": "1",
     "samples": "1", "resets": "1", "seconds": "0.01", "environments": "1", "rollout": "8", "evaluate_every": "64",
 }  # fmt: skip
 LONG = (
@@ -53,6 +53,7 @@ LONG = (
     "protocol",
     "bench",
     "parity",
+    "certify",
     "train",
     "sweep",
     "report",
@@ -64,13 +65,9 @@ LONG = (
 def commands():
     """Every command line that can begin, with the dataclass of its options."""
     from care_sim.cli import COMMANDS
-    from care_sim.commands.train import LEARNERS
-    from care_sim.measure.bench.config import BenchConfig
-    from care_sim.measure.parity.config import ParityConfig
 
-    measures = {"bench": BenchConfig, "parity": ParityConfig}
-    found = {(name,): measures.get(name, kind) for name, kind in COMMANDS.items() if name != "train"}
-    return found | {("train", name): kind for name, kind in LEARNERS.items()}
+    found = {(name,): command.loaded() for name, command in COMMANDS.items() if name != "train"}
+    return found | {("train", name): kind for name, kind in COMMANDS["train"].loaded().items()}
 
 
 def options(kind):

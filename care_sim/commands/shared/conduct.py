@@ -29,14 +29,16 @@ def conduct(
     study: Study = SWEEP,
     force: bool = False,
 ) -> list[Failure]:
-    """Run a study into `folder`, going on where an earlier run stopped; returns the tasks that failed.
+    """Run a study into `folder`, going on where an earlier run stopped; returns the tasks that
+    failed.
 
-    Writes `journal.jsonl` as they finish; then, if there are any, `config.json` with the configurations and what
-    failed, the Parquet files of the study's kind with the rows of `configs` in their order, `tables.md`, `tables.tex`
-    and the figures of `study`; the folder is this study's until all that is written. Where tasks failed and the folder
-    holds rows that were therefore not obtained, these files stay, unless `force`. Raises InvalidInput for no task
-    or no worker, when the folder cannot be written, and unless `force` when it holds another study, finished or not, or
-    rows of this one that are none of `configs`.
+    Writes `journal.jsonl` as they finish; then, if there are any, `config.json` with the
+    configurations and what failed, the Parquet files of the study's kind with the rows of `configs`
+    in their order, `tables.md`, `tables.tex` and the figures of `study`; the folder is this study's
+    until all that is written. Where tasks failed and the folder holds rows that were therefore not
+    obtained, these files stay, unless `force`. Raises InvalidInput for no task or no worker, when
+    the folder cannot be written, and unless `force` when it holds another study, finished or not,
+    or rows of this one that are none of `configs`.
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
@@ -62,17 +64,27 @@ def summary(failures: Sequence[Failure], unit: str) -> list[str]:
     by_reason: dict[str, list[Failure]] = {}
     for failure in failures:
         by_reason.setdefault(failure.reason, []).append(failure)
-    return [str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}" for own in by_reason.values()]
+    return [
+        str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}"
+        for own in by_reason.values()
+    ]
 
 
 def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failure]) -> str:
-    settings = {"study": study.name, "versions": versions(), "machine": machine(), "failed": [*map(str, failures)]}
+    settings = {
+        "study": study.name,
+        "versions": versions(),
+        "machine": machine(),
+        "failed": [*map(str, failures)],
+    }
     return json.dumps(settings | study.kind.listed(configs), indent=1) + "\n"
 
 
-def _check(folder: Path, configs: Sequence[Task], study: Study, force: bool, journal: Journal | None = None) -> None:
-    """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves a file there, and
-    after.
+def _check(
+    folder: Path, configs: Sequence[Task], study: Study, force: bool, journal: Journal | None = None
+) -> None:
+    """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves
+    a file there, and after.
     """
     check_kind(folder, study)
     if not force:
@@ -91,11 +103,14 @@ def _journal(folder: Path, study: Study) -> Journal:
 
 
 def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, unit: str) -> None:
-    """One line when tasks will not be played again, or others share the journal; one for what is damaged there."""
+    """One line when tasks will not be played again, or others share the journal; one for what is
+    damaged there.
+    """
     if journal.damaged:
         lines = counted(journal.damaged, "line")
         print(
-            f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no checksums; what they "
+            f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no "
+            "checksums; what they "
             "held is played again where it is asked for",
             file=sys.stderr,
         )
@@ -107,7 +122,11 @@ def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, 
 
 
 def _write(
-    rows: Sequence[Row], configs: Sequence[Task], folder: Path, study: Study, failures: Sequence[Failure]
+    rows: Sequence[Row],
+    configs: Sequence[Task],
+    folder: Path,
+    study: Study,
+    failures: Sequence[Failure],
 ) -> None:
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.kind

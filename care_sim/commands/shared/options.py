@@ -1,16 +1,16 @@
-"""What several commands take: conditions that all episodes share, parameters as NAME=VALUE, seeds."""
+"""What several commands take: conditions that all episodes share, parameters as NAME=VALUE,
+seeds.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.text import shown
 from care_sim.core.conditions import Conditions
 from care_sim.study.parameters import parameters
-
-if TYPE_CHECKING:
-    pass
+from care_sim.study.task import MOST_TASKS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,11 +18,11 @@ class Options(Conditions):
     """Conditions that all episodes share."""
 
     scenario_parameters: tuple[str, ...] = ()
-    """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7 gap_m=0.8,1.2; see
-    `care-sim scenarios`."""
+    """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7
+    gap_m=0.8,1.2; see `care-sim scenarios`."""
     policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
-    POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among
+    several as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
 
     def arguments(self) -> dict[str, Any]:
         """As arguments of `EpisodeConfig`."""
@@ -38,14 +38,13 @@ USUAL = Options()
 
 
 def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
-    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one, and for more than a
-    study can hold.
+    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one, and
+    for more than a study can hold.
     """
-    from care_sim.study.task import MOST_TASKS
-
     if len(numbers) == 1 and not 1 <= numbers[0] <= MOST_TASKS:
         raise InvalidInput(
-            f"seeds must be a number of seeds from 1 to {MOST_TASKS:,}, whose rows a study holds in memory, "
+            f"seeds must be a number of seeds from 1 to {MOST_TASKS:,}, whose rows a study holds "
+            "in memory, "
             f"or a list of seeds, got {shown(numbers[0])}"
         )
     return range(numbers[0]) if len(numbers) == 1 else numbers

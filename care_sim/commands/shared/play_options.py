@@ -1,16 +1,16 @@
-"""What the commands of the open loop take: where the scenes come from, who detects, under which conditions."""
+"""What the commands of the open loop take: where the scenes come from, who detects, under which
+conditions.
+"""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
 from care_sim.core.conditions import Conditions
+from care_sim.sources.scenes import Source, source_of
 from care_sim.study.parameters import parameters
-
-if TYPE_CHECKING:
-    from care_sim.sources.scenes import Source
 
 USUAL_CONDITIONS = Conditions()
 """The defaults."""
@@ -23,26 +23,33 @@ class PlayOptions:
     source: str = "streets"
     """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
     split: str | None = None
-    """Of streets: evaluation (150 scenes) or calibration (20). Of nuScenes: val, all, or one of splits.json."""
+    """Of streets: evaluation (150 scenes) or calibration (20). Of nuScenes: val, all, or one of
+    splits.json.
+    """
     version: str | None = None
     """Of nuScenes: the version, where the folder holds several."""
     camera_detections: Path | None = None
     """Of nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
     detector: str = "returns"
-    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed package."""
+    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
+    package.
+    """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
     policy_parameters: tuple[str, ...] = ()
-    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among several as
-    POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
+    """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among
+    several as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
     conditions: Annotated[Conditions, tyro.conf.arg(name="")] = USUAL_CONDITIONS
     """Further conditions."""
 
-    def scene_source(self) -> "Source":
+    def scene_source(self) -> Source:
         """The source of the scenes. Raises InvalidInput where there is none."""
-        from care_sim.sources.scenes import source_of
-
-        return source_of(self.source, split=self.split, version=self.version, camera_detections=self.camera_detections)
+        return source_of(
+            self.source,
+            split=self.split,
+            version=self.version,
+            camera_detections=self.camera_detections,
+        )
 
     def common(self) -> dict[str, Any]:
         """What all plays share, as fields of `care_sim.study.play_config.PlayConfig`."""

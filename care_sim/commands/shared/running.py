@@ -4,17 +4,21 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, report_problems
+from care_sim.commands.shared.conduct import conduct, summary
 from care_sim.commands.shared.options import USUAL
+from care_sim.commands.shared.selection import ALL, expanded, made
+from care_sim.policies import contenders
+from care_sim.reports.report import print_report, reported
+from care_sim.reports.studies import STUDIES
+from care_sim.study import executors
 from care_sim.study.executors import CORES, MOST_WORKERS
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from care_sim.study.task import Task
+from care_sim.study.task import Task
 
 DONE, FAILED = 0, 1
 PIPE_WIDTH = 180
@@ -26,42 +30,48 @@ class Running:
     """What commands have in common that play a study."""
 
     workers: int = bounded(CORES, 1, MOST_WORKERS)
-    """Processes that play at the same time on this machine; a cluster plays as many as it has threads."""
+    """Processes that play at the same time on this machine; a cluster plays as many as it has
+    threads.
+    """
     cluster: str | None = None
-    """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra 'cluster')."""
+    """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra
+    'cluster').
+    """
     force: bool = False
-    """Play into a folder that holds another study, finished or not, or rows that are not asked for now: its tables,
-    figures and Parquet files are replaced at the end; its journal stays. Episodes never replace the plays of a
-    protocol, nor plays episodes: their files have other names."""
+    """Play into a folder that holds another study, finished or not, or rows that are not asked for
+    now: its tables, figures and Parquet files are replaced at the end; its journal stays. Episodes
+    never replace the plays of a protocol, nor plays episodes: their files have other names."""
 
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def conduct(self, study: str, configs: "Sequence[Task]", out: Path, left_out: Sequence[str] = ()) -> int:
-        """Play the tasks, print their tables, name those that failed and the policies that were left out."""
-        from care_sim.commands.shared.conduct import conduct, summary
-        from care_sim.reports.report import print_report, reported
-        from care_sim.reports.studies import STUDIES
-        from care_sim.study import executors
-
+    def conduct(
+        self, study: str, configs: Sequence[Task], out: Path, left_out: Sequence[str] = ()
+    ) -> int:
+        """Play the tasks, print their tables, name those that failed and the policies that were
+        left out.
+        """
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
         failures = conduct(configs, out, self.workers, make_executor, STUDIES[study], self.force)
         if len(failures) < len(configs):
             rows, _, missing = reported(out)
             print_report(rows, console(), STUDIES[study], missing)
             print(f"Results are in {out}")
-        report_problems([*(f"failed: {line}" for line in summary(failures, STUDIES[study].kind.unit)), *left_out])
+        report_problems(
+            [
+                *(f"failed: {line}" for line in summary(failures, STUDIES[study].kind.unit)),
+                *left_out,
+            ]
+        )
         return FAILED if failures or left_out else DONE
 
 
 def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[str], list[str]]:
-    """The policies whose tasks `make` can make, and a line for each that cannot be made, which is printed too.
+    """The policies whose tasks `make` can make, and a line for each that cannot be made, which is
+    printed too.
 
     Raises InvalidInput where something else is wrong.
     """
-    from care_sim.commands.shared.selection import ALL, expanded, made
-    from care_sim.policies import contenders
-
     policies, broken = made(expanded(names, contenders() if ALL in names else ()), make)
     left_out = [f"left out: {reason}" for reason in broken.values()]
     report_problems(left_out)
@@ -76,8 +86,10 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
     return several or (one,)
 
 
-def console() -> "Console":
+def console() -> Console:
     """Where tables are printed: a terminal as wide as it is, a pipe as wide as a table needs."""
-    from rich.console import Console
-
-    return Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=PIPE_WIDTH)
+    return (
+        Console(highlight=False)
+        if sys.stdout.isatty()
+        else Console(highlight=False, width=PIPE_WIDTH)
+    )

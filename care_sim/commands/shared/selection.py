@@ -10,11 +10,16 @@ ALL = "all"
 
 def expanded(names: Sequence[str], known: Collection[str]) -> list[str]:
     """The names, each once; `all` stands for those that are known."""
-    return list(dict.fromkeys(each for name in names for each in (known if name == ALL else [name])))
+    return list(
+        dict.fromkeys(each for name in names for each in (known if name == ALL else [name]))
+    )
 
 
-def made(policies: Iterable[str], make: Callable[[str], object]) -> tuple[list[str], dict[str, str]]:
-    """The policies of which `make` can make tasks, and for each of the others the reason why it cannot.
+def made(
+    policies: Iterable[str], make: Callable[[str], object]
+) -> tuple[list[str], dict[str, str]]:
+    """The policies of which `make` can make tasks, and for each of the others the reason why it
+    cannot.
 
     Raises what `make` raises where the policy is not to blame.
     """

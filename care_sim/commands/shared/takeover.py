@@ -1,4 +1,6 @@
-"""Whether a study may take a folder: what lies there already, and whether the new rows hold all of it."""
+"""Whether a study may take a folder: what lies there already, and whether the new rows hold all of
+it.
+"""
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -28,14 +30,16 @@ def check_kind(folder: Path, study: Study) -> None:
     for other in KINDS:
         if other is not kind and (folder / other.file).exists():
             raise InvalidInput(
-                f"{folder} holds {other.unit} of another study; the {kind.unit} of the study {study.name} need another "
+                f"{folder} holds {other.unit} of another study; the {kind.unit} of the study "
+                f"{study.name} need another "
                 "--out, with --force too"
             )
 
 
 def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
-    """Raise InvalidInput where the results of another study lie, or rows of this one that were asked with parameters
-    that nobody asks for now: they would be gone. Damaged results are told as they are read.
+    """Raise InvalidInput where the results of another study lie, or rows of this one that were
+    asked with parameters that nobody asks for now: they would be gone. Damaged results are told as
+    they are read.
     """
     path = folder / study.kind.file
     if not path.is_file():
@@ -46,35 +50,41 @@ def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
     here, wanted = counted(len(rows), unit), counted(len(configs), unit)
     if there != study.name:
         raise InvalidInput(
-            f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, would replace: "
+            f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, "
+            "would replace: "
             f"{WAYS_OUT}"
         )
     if gone:
         raise InvalidInput(
             f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first "
-            f"{_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study {study.name} that is asked "
+            f"{_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study "
+            f"{study.name} that is asked "
             f"for, {wanted}: {WAYS_OUT}"
         )
 
 
 def lost(folder: Path, played: Sequence[Task], study: Study) -> str:
-    """In one line, which rows of the folder are not among those played, where others failed; empty for none."""
+    """In one line, which rows of the folder are not among those played, where others failed; empty
+    for none.
+    """
     path = folder / study.kind.file
     rows, gone = _rows_and_gone(path, played, study) if path.is_file() else ([], [])
     unit = study.kind.unit.removesuffix("s")
     if not gone:
         return ""
     return (
-        f"the results in {folder} stay as they were: {len(gone)} of their {counted(len(rows), unit)}, the first "
-        f"{_label(gone[0])}, would be gone, since this time only {counted(len(played), unit)} did not fail; the "
+        f"the results in {folder} stay as they were: {len(gone)} of their "
+        f"{counted(len(rows), unit)}, the first "
+        f"{_label(gone[0])}, would be gone, since this time only {counted(len(played), unit)} did "
+        "not fail; the "
         "journal keeps what was played: mend what failed, or --force to replace them"
     )
 
 
 def check_journal(folder: Path, configs: Sequence[Task], journal: Journal, study: Study) -> None:
-    """Raise InvalidInput where an interrupted study is to go on that has another name, or rows that nobody asks for
-    now: once other results lie there, its own command is refused. A row counts by its parameters, whatever code
-    played it, so that a command goes on after a change of the code.
+    """Raise InvalidInput where an interrupted study is to go on that has another name, or rows that
+    nobody asks for now: once other results lie there, its own command is refused. A row counts by
+    its parameters, whatever code played it, so that a command goes on after a change of the code.
     """
     if not len(journal) or (folder / study.kind.file).is_file():
         return
@@ -86,13 +96,17 @@ def check_journal(folder: Path, configs: Sequence[Task], journal: Journal, study
         )
     if gone := _gone(journal.rows, configs):
         raise InvalidInput(
-            f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}; {len(gone)} of them, the first "
-            f"{_label(gone[0])}{_differing(gone[0], configs)}, are not asked for now: give the command that began it, "
+            f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}; {len(gone)} "
+            "of them, the first "
+            f"{_label(gone[0])}{_differing(gone[0], configs)}, are not asked for now: give the "
+            "command that began it, "
             "another --out, or --force to play beside them"
         )
 
 
-def _rows_and_gone(path: Path, configs: Sequence[Task], study: Study) -> tuple[list[Row], list[Row]]:
+def _rows_and_gone(
+    path: Path, configs: Sequence[Task], study: Study
+) -> tuple[list[Row], list[Row]]:
     """The rows of a file, and those that are none of `configs`."""
     rows = read_rows(path, study.kind.schema.lenient)
     return rows, _gone(rows, configs)
@@ -108,7 +122,9 @@ def _identity(row: Row) -> frozenset[tuple[str, object]]:
 
 
 def _asked(row: Row) -> Row:
-    """What a row was asked with, but for what is usual. A file that was given counts as given, whatever it held."""
+    """What a row was asked with, but for what is usual. A file that was given counts as given,
+    whatever it held.
+    """
     given = {name: value for name, value in row.items() if is_parameter(name) and value is not None}
     if "camera_detections" in given:
         given["camera_detections"] = True
@@ -121,7 +137,9 @@ def _label(row: Row) -> str:
 
 
 def _differing(row: Row, configs: Sequence[Task]) -> str:
-    """In brackets, what tells a row from the task nearest to it, where their labels are the same."""
+    """In brackets, what tells a row from the task nearest to it, where their labels are the
+    same.
+    """
     label, there, found = _label(row), _asked(row), []
     for asked in (config.row() for config in configs):
         if _label(asked) == label:

@@ -1,0 +1,21 @@
+"""`care-sim ablate`: the paper's ablations, one thing varied at a time."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_sim.commands.shared.episode_studies import FixedStudy
+from care_sim.reports.tables.ablations import configurations
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ablate(FixedStudy):
+    """Vary one thing at a time as the paper's ablations do, 162 configurations per seed: a table
+    each.
+    """
+
+    out: Path = Path("runs/ablate")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        return self.play("ablate", configurations, self.out)

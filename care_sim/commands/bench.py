@@ -1,0 +1,18 @@
+"""`care-sim bench`: how fast the benchmark is on this machine."""
+
+from dataclasses import dataclass
+
+from care_sim.measure.bench.config import BenchConfig
+from care_sim.measure.bench.run import run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench(BenchConfig):
+    """Measure speed: keyframe, scans, steps and memory, beside other engines and environments.
+
+    All of it runs on one core, and the others are measured in the same run.
+    """
+
+    def __call__(self) -> int:
+        """Run it."""
+        return run(self)

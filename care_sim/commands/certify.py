@@ -1,0 +1,19 @@
+"""`care-sim certify`: whether episodes go on this machine as published."""
+
+from dataclasses import dataclass
+
+from care_sim.measure.certify.config import CertifyConfig
+from care_sim.measure.certify.run import run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certify(CertifyConfig):
+    """Play a published list of episodes and say whether they go as published, or where one does
+    not.
+
+    The list holds every environment, built-in policy and fault, alone and in every kind of vector.
+    """
+
+    def __call__(self) -> int:
+        """Run it."""
+        return run(self)

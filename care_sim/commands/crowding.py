@@ -1,0 +1,21 @@
+"""`care-sim crowding`: vehicles fill the dense street."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_sim.commands.shared.episode_studies import FixedStudy
+from care_sim.reports.tables.crowding import configurations
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowding(FixedStudy):
+    """Find where the all-camera reserve collapses as vehicles fill the dense street, 221
+    configurations per seed.
+    """
+
+    out: Path = Path("runs/crowding")
+    """Folder of the results; an interrupted study goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        return self.play("crowding", configurations, self.out)

@@ -1,0 +1,65 @@
+"""`care-sim policies`, `care-sim detectors` and `care-sim scenarios`: what there is, by name."""
+
+import inspect
+from dataclasses import Field, dataclass, fields
+from typing import Any
+
+from care_sim.base.bounds import allowed
+from care_sim.perception.detectors import detector_lines
+from care_sim.policies.listing import listing
+from care_sim.scenarios import SCENARIOS
+from care_sim.scenarios.crossing import OCCLUDERS
+
+
+@dataclass(frozen=True)
+class Policies:
+    """List the policies with their tags, parameters and sources."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        print(*listing(), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
+class Detectors:
+    """List the detectors of the open loop."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        print(*detector_lines(), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """List the scenarios and their parameters."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        for name, scenario in SCENARIOS.items():
+            print(f"{name:12} {_summary(scenario)}")
+            for field in fields(scenario):
+                print(f"    {field.name}={_rounded(field.default)}{_choices(field)}")
+            print()
+        return 0
+
+
+def _choices(field: Field[Any]) -> str:
+    """What a parameter may be, in brackets; empty where there is nothing to tell."""
+    if field.name == "occluder":
+        return f" (of {', '.join(OCCLUDERS)})"
+    return f" ({allowed(field)})" if allowed(field) else ""
+
+
+def _summary(thing: object) -> str:
+    """The line that the module of a scenario begins with."""
+    module = inspect.getmodule(thing)
+    return (inspect.getdoc(module) or "").partition("\n")[0]
+
+
+def _rounded(value: object) -> str:
+    """A default as a shell takes it; numbers to two decimals."""
+    if isinstance(value, tuple):
+        return ",".join(map(_rounded, value))
+    return str(round(value, 2)) if isinstance(value, float) else repr(value)

@@ -1,0 +1,17 @@
+"""`care-sim parity`: the engine `fast` against Bullet."""
+
+from dataclasses import dataclass
+
+from care_sim.measure.parity.config import ParityConfig
+from care_sim.measure.parity.run import run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parity(ParityConfig):
+    """Compare the engine `fast` with Bullet: rays of random scenes and of every keyframe, pictures,
+    whole episodes.
+    """
+
+    def __call__(self) -> int:
+        """Run it."""
+        return run(self)

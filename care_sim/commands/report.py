@@ -1,0 +1,61 @@
+"""`care-sim report`: the tables and figures of a folder of results again, or one web page."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
+from care_sim.base.errors import report_problems
+from care_sim.base.extras import check_page
+from care_sim.base.text import counted
+from care_sim.commands.shared.running import console
+from care_sim.reports.report import print_report, reported, write_report
+from care_sim.study.executors import CORES, MOST_WORKERS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Print the tables of a folder of results and draw its figures again, or make one web page of
+    it all.
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
+    """The --out of an earlier study."""
+    page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """HTML file for the page, which needs nothing else to be read; the folder is left as it is
+    (extra 'page').
+    """
+    episodes: int = bounded(400, 0, LARGEST_INTEGER)
+    """The most episodes that are played again to be watched in the page, seed by seed; 0 for
+    none."""
+    workers: int = bounded(CORES, 1, MOST_WORKERS)
+    """Processes that play them."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def __call__(self) -> int:
+        """Run it."""
+        return self._print() if self.page is None else self._write(self.page)
+
+    def _print(self) -> int:
+        rows, study, left_out = reported(self.folder)
+        print_report(rows, console(), study, left_out)
+        write_report(rows, self.folder, study, left_out)
+        return 0
+
+    def _write(self, path: Path) -> int:
+        check_page()
+        # Pages are written with Jinja, which the extra 'page' brings.
+        from care_sim.reports.page.build import write_page
+
+        page = write_page(self.folder, path, self.episodes, self.workers)
+        report_problems(page.warnings)
+        print(
+            f"{path}: {path.stat().st_size / 1e6:.1f} MB, {counted(page.watchable, 'episode')} to "
+            "watch"
+        )
+        return 0

@@ -1,0 +1,70 @@
+"""`care-sim run`: one episode, its timeline and its outcome."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from care_sim.commands.shared.options import USUAL, Options
+from care_sim.commands.shared.running import console
+from care_sim.envs.wrappers.export_scans import ExportScans
+from care_sim.envs.wrappers.record_rerun import RecordRerun
+from care_sim.policies.base import Policy
+from care_sim.reports.episodes.brake_photo import Photographer
+from care_sim.reports.episodes.clips import Film
+from care_sim.reports.episodes.timeline import print_timeline
+from care_sim.study.episode_config import grid
+from care_sim.study.episode_play import Environment, trace
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Play one episode and print its timeline and outcome."""
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
+    """dartout, dense or cutin; `care-sim scenarios` lists them."""
+    policy: str = "care"
+    """`care-sim policies` lists them. `full` always runs with budget 1.0."""
+    budget: float = 0.1
+    """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
+    seed: int = 0
+    """Draws scenario, camera faults, noise and floor."""
+    picture: Path | None = None
+    """PNG file for a picture of the first keyframe at which the brake is on."""
+    video: Path | None = None
+    """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its
+    ending.
+    """
+    record: Path | None = None
+    """File (.rrd) for a recording that `care-sim view FILE` plays (extra 'viewer')."""
+    export: Path | None = None
+    """Folder for every scan as a point cloud (PCD), with poses and boxes as JSON (extra
+    'open3d')."""
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
+    """Further conditions."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
+        (config,) = grid(*axes, **self.conditions.arguments())
+        if config.budget != self.budget:
+            print("full fires every cell, whatever the budget", file=sys.stderr)
+        photographer, film = Photographer(self.picture), Film(self.video)
+        print_timeline(
+            config,
+            *trace(config, photographer, film.episode(self.policy), wrap=self._watched),
+            console(),
+        )
+        photographer.report()
+        film.write()
+        return 0
+
+    def _watched(self, env: Environment, policy: Policy) -> Environment:
+        """`env`, recorded and its scans written where that is wanted."""
+        if self.record is not None:
+            env = RecordRerun(env, self.record, policy)
+        if self.export is not None:
+            env = ExportScans(env, self.export, policy)
+        return env

@@ -1,0 +1,35 @@
+"""What commands have in common that play a study of the closed loop."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_sim.commands.shared.options import seeds_of
+from care_sim.commands.shared.running import Running, playable
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
+
+Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
+"""The episodes of a study, from the seeds and the further policies."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeStudy(Running):
+    """A study of the closed loop."""
+
+    seeds: tuple[int, ...] = (5,)
+    """One number: that many seeds, from 0. Several: these seeds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedStudy(EpisodeStudy):
+    """A study whose episodes are fixed, but for the seeds and for policies that join in."""
+
+    also: tuple[str, ...] = ()
+    """Further policies, installed ones too, that are played and shown beside those of the study."""
+
+    def play(self, study: str, configurations: Configurations, out: Path) -> int:
+        """Play the configurations of the seeds, with the policies that join in."""
+        seeds = seeds_of(self.seeds)
+        also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
+        return self.conduct(study, of_seeds(configurations(seeds[:1], also), seeds), out, left_out)

@@ -1,0 +1,54 @@
+"""`care-sim sweep`: every combination of scenarios, policies, budgets, faults and seeds."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.episode_studies import EpisodeStudy
+from care_sim.commands.shared.options import USUAL, Options, seeds_of
+from care_sim.commands.shared.running import in_turn, playable
+from care_sim.commands.shared.selection import expanded
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.episode_config import grid
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep(EpisodeStudy):
+    """Play every combination of scenarios, policies, budgets, faults and seeds."""
+
+    scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
+    """`care-sim scenarios` lists them; `all`."""
+    policies: tuple[str, ...] = ("history", "all-camera", "care", "full")
+    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget
+    1.0."""
+    budgets: tuple[float, ...] = (0.1,)
+    """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
+    false_negative_rates: tuple[float, ...] = ()
+    """Several of --false-negative-rate, in turn."""
+    camera_latencies: tuple[int, ...] = ()
+    """Several of --camera-latency, in turn."""
+    out: Path = Path("runs/sweep")
+    """Folder of the results; an interrupted sweep goes on there."""
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
+    """Further conditions."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        for axis in ("scenarios", "policies", "budgets", "seeds"):
+            if not getattr(self, axis):
+                raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
+        scenarios, common = expanded(self.scenarios, SCENARIOS), self.conditions.arguments()
+        policies, left_out = playable(
+            self.policies, lambda name: grid(scenarios, [name], self.budgets[:1], [0], **common)
+        )
+        if not policies:
+            raise InvalidInput("none of the policies can be played")
+        rates = in_turn(self.false_negative_rates, "false_negative_rate", common)
+        latencies = in_turn(self.camera_latencies, "camera_latency", common)
+        configs = grid(
+            scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common
+        )
+        return self.conduct("sweep", configs, self.out, left_out)
