@@ -1,4 +1,6 @@
-"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration; imported when one is trained."""
+"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration; imported when one
+is trained.
+"""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -12,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def algorithm(name: str) -> Any:
-    """The class of a learner, a `BaseAlgorithm`. Raises MissingExtra for one that is not installed."""
+    """The class of a learner, a `BaseAlgorithm`. Raises MissingExtra for one that is not
+    installed.
+    """
     try:
         if name == "recurrent-ppo":
             from sb3_contrib import RecurrentPPO
@@ -20,7 +24,9 @@ def algorithm(name: str) -> Any:
             return RecurrentPPO
         from stable_baselines3 import PPO, SAC
     except ImportError as error:
-        raise MissingExtra(f"{name} needs the extra 'rl': pip install 'care-sim[rl]' ({error})") from error
+        raise MissingExtra(
+            f"{name} needs the extra 'rl': pip install 'care-sim[rl]' ({error})"
+        ) from error
     return {"ppo": PPO, "sac": SAC}[name]
 
 
@@ -48,7 +54,10 @@ def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
     shape = len(CHANNELS), config.rows, config.columns
     own = {
         "features_extractor_class": Sectored,
-        "features_extractor_kwargs": {"shape": shape, "sectors": (config.elevations, config.azimuths)},
+        "features_extractor_kwargs": {
+            "shape": shape,
+            "sectors": (config.elevations, config.azimuths),
+        },
     }
     if isinstance(config, Ppo):
         kwargs = {"shape": shape, "hidden": config.hidden, "log_std_init": math.log(config.noise)}
@@ -57,8 +66,17 @@ def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
         kwargs = own | {"log_std_init": math.log(config.noise)}
         return "MultiInputLstmPolicy", _on_policy(config) | {"policy_kwargs": kwargs}
     assert isinstance(config, Sac)
-    return "MultiInputPolicy", {"buffer_size": config.memory, "batch_size": config.batch, "policy_kwargs": own}
+    return "MultiInputPolicy", {
+        "buffer_size": config.memory,
+        "batch_size": config.batch,
+        "policy_kwargs": own,
+    }
 
 
 def _on_policy(config: OnPolicy) -> dict[str, Any]:
-    return {"n_steps": config.rollout, "batch_size": config.batch, "n_epochs": config.epochs, "gae_lambda": 0.9}
+    return {
+        "n_steps": config.rollout,
+        "batch_size": config.batch,
+        "n_epochs": config.epochs,
+        "gae_lambda": 0.9,
+    }

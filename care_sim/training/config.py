@@ -21,17 +21,21 @@ HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 
 @dataclass(frozen=True, kw_only=True)
 class AgentConfig:
-    """Fields that all learners share; see `care_sim.training.seeds` for which seeds are trained and tested on."""
+    """Fields that all learners share; see `care_sim.training.seeds` for which seeds are trained and
+    tested on.
+    """
 
     algorithm: ClassVar[str]
 
     env: str = "CARE-Dense-v0"
     """Environment id."""
     budget: tuple[float, ...] = (0.03,)
-    """Share of the cells that may fire at a keyframe. Of several the environments take one each, in turn, and the
-    weights then fit any budget; the first is evaluated."""
+    """Share of the cells that may fire at a keyframe. Of several the environments take one each, in
+    turn, and the weights then fit any budget; the first is evaluated."""
     env_parameters: tuple[str, ...] = ()
-    """Further arguments of the environment as NAME=VALUE, for example vehicles=5 false_negative_rate=0.2."""
+    """Further arguments of the environment as NAME=VALUE, for example vehicles=5
+    false_negative_rate=0.2.
+    """
     action: Literal["SectorReserve", "SectorScores"] = "SectorReserve"
     """What the action scores: sectors for the reserve alone, or for everything."""
     azimuths: int = bounded(32, 1, MOST_COLUMNS)
@@ -72,7 +76,10 @@ class AgentConfig:
     def __post_init__(self) -> None:
         check_fields(self)
         if not 0 < len(self.budget) <= self.environments:
-            raise InvalidInput(f"budget needs one value to {self.environments}, the environments; got {self.budget}")
+            raise InvalidInput(
+                f"budget needs one value to {self.environments}, the environments; got "
+                f"{self.budget}"
+            )
         self.wrapping, self.arguments  # noqa: B018 (refuse what does not fit)
 
     @property
@@ -97,13 +104,21 @@ class AgentConfig:
     @property
     def recipe(self) -> dict[str, Any]:
         """What decides the weights, as plain data: all but where and how long."""
-        return {name: value for name, value in json.loads(self.to_json()).items() if name not in HOW_LONG}
+        return {
+            name: value
+            for name, value in json.loads(self.to_json()).items()
+            if name not in HOW_LONG
+        }
 
     def check_same(self, before: Mapping[str, Any]) -> None:
-        """Raise InvalidInput, with the first difference, unless the run of that configuration can be gone on with."""
+        """Raise InvalidInput, with the first difference, unless the run of that configuration can
+        be gone on with.
+        """
         for name, value in self.recipe.items():
             if before.get(name) != value:
-                raise InvalidInput(f"{self.out}: trained with {name} {before.get(name)!r}, asked is {value!r}")
+                raise InvalidInput(
+                    f"{self.out}: trained with {name} {before.get(name)!r}, asked is {value!r}"
+                )
 
 
 @dataclass(frozen=True, kw_only=True)

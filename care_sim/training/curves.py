@@ -1,4 +1,6 @@
-"""Learning curves of training runs, read from their folders and grouped: runs of a group differ by their seed alone."""
+"""Learning curves of training runs, read from their folders and grouped: runs of a group differ by
+their seed alone.
+"""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence

@@ -13,7 +13,9 @@ from care_sim.training.curves import TrainingRun
 
 
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
-    """A panel per recipe: a line per training seed, their mean where there are several, rules as lines across."""
+    """A panel per recipe: a line per training seed, their mean where there are several, rules as
+    lines across.
+    """
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9), layout="constrained")
     panels = figure.subplots(1, len(groups), squeeze=False)[0]
     for axes, runs in zip(panels, groups, strict=True):
@@ -56,7 +58,8 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
     trained = ", ".join(f"{budget:.3g}" for budget in config["budget"])
     axes.set_xlabel(
         f"environment steps, in thousands\ntrained at budget {trained}\n"
-        f"a point is the mean of {config['episodes']} validation episodes at {config['budget'][0]:.3g}"
+        f"a point is the mean of {config['episodes']} validation episodes at "
+        f"{config['budget'][0]:.3g}"
     )
     axes.xaxis.set_major_formatter(lambda steps, _: f"{steps / 1000:g}")
     axes.spines[["top", "right"]].set_visible(False)

@@ -29,8 +29,12 @@ def bare(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any,
     """
     known = care_sim.envs.IDS
     check_known("environment", config.env, known)
-    reward: dict[str, Any] = {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
-    arguments = {"budget": config.budget[0] if budget is None else budget} | reward | config.arguments
+    reward: dict[str, Any] = (
+        {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
+    )
+    arguments = (
+        {"budget": config.budget[0] if budget is None else budget} | reward | config.arguments
+    )
     return gymnasium.make(f"care_sim:{config.env}", disable_env_checker=True, **arguments)
 
 
@@ -50,8 +54,12 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
 
     budgets = islice(cycle(config.budget), config.environments)
-    makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [partial(training, config, budget) for budget in budgets]
+    makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [
+        partial(training, config, budget) for budget in budgets
+    ]
     if config.processes:
         with starting():
-            return VecMonitor(SubprocVecEnv([partial(following, maker) for maker in makers], start_method="spawn"))
+            return VecMonitor(
+                SubprocVecEnv([partial(following, maker) for maker in makers], start_method="spawn")
+            )
     return VecMonitor(DummyVecEnv(makers))

@@ -4,12 +4,14 @@
 |---|---|
 | `config.json` | the effective configuration |
 | `rules.json` | what rules score on the same validation seeds |
-| `curve.csv` | steps, seconds, return and detection distance at every evaluation, before the first step too |
+| `curve.csv` | steps, seconds, return and detection distance of every evaluation |
 | `checkpoint.zip` | the learner, by Stable-Baselines3; loading it executes code: load your own |
-| `weights.npz` | the weights with the best return on the validation seeds; loading it executes nothing (`ppo` only) |
+| `weights.npz` | `ppo` only: the weights with the best return on the validation seeds |
 
-Every file is written beside and then put in its place: an interruption leaves the one before. The experience that SAC
-learns from is not kept (half a gigabyte): a resumed run gathers its own.
+The first evaluation comes before the first step. Loading `weights.npz` executes nothing.
+
+Every file is written beside and then put in its place: an interruption leaves the one before. The
+experience that SAC learns from is not kept (half a gigabyte): a resumed run gathers its own.
 """
 
 import csv
@@ -38,12 +40,14 @@ COLUMNS = ("steps", "seconds", "return", "distance_m")
 MOST = 1e30
 """What a return or a distance may be and still be drawn."""
 Evaluation = tuple[int, float, float, float | None]
-"""Of `COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open loop)."""
+"""Of `COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open
+loop).
+"""
 
 
 class Folder:
-    """The folder of a configuration. Raises InvalidInput when it holds another run, none to be resumed, or a damaged
-    file.
+    """The folder of a configuration. Raises InvalidInput when it holds another run, none to be
+    resumed, or a damaged file.
     """
 
     def __init__(self, config: AgentConfig):
@@ -52,11 +56,15 @@ class Folder:
         if config.resume:
             self._check_resumable()
         elif (self.path / CONFIG).exists():
-            raise InvalidInput(f"{self.path} holds a run already; add --resume, or give another --out")
+            raise InvalidInput(
+                f"{self.path} holds a run already; add --resume, or give another --out"
+            )
         self._curve = read_curve(self.path / CURVE) if config.resume else []
 
     def begin(self, model: "BaseAlgorithm") -> None:
-        """Write the configuration down, and the learner as it is: from here on the run can be resumed."""
+        """Write the configuration down, and the learner as it is: from here on the run can be
+        resumed.
+        """
         self.path.mkdir(parents=True, exist_ok=True)
         self.save(model)
         write_text(self.path / CONFIG, self.config.to_json())
@@ -65,7 +73,9 @@ class Folder:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
         path = self.path / RULES
         if not path.exists():
-            text = json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
+            text = (
+                json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
+            )
             write_text(path, text)
         return {name: Score(**plain) for name, plain in read_rules(path).items()}
 
@@ -82,7 +92,9 @@ class Folder:
         """Write an evaluation and, when it is the best yet, the weights."""
         if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
-        self._curve.append((model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m))
+        self._curve.append(
+            (model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m)
+        )
         with replacing(self.path / CURVE) as unfinished, unfinished.open("w", newline="") as file:
             csv.writer(file).writerows([COLUMNS, *self._curve])
 
@@ -106,7 +118,11 @@ class Folder:
             wrapper=str(config.wrapping),
             scenario=config.env,
             data="episodes of the environment",
-            seeds={"learner": config.seed, "training_from": TRAINING, "validation": [held_out[0], held_out[-1]]},
+            seeds={
+                "learner": config.seed,
+                "training_from": TRAINING,
+                "validation": [held_out[0], held_out[-1]],
+            },
             steps=model.num_timesteps,
             machine=f"{machine()}, {round(seconds)} s",
             versions=versions("care-sim", "numpy", "stable-baselines3", "torch"),
@@ -121,17 +137,23 @@ class Folder:
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """The configuration of a run. Raises InvalidInput for a damaged file, or one of something else."""
+    """The configuration of a run. Raises InvalidInput for a damaged file, or one of something
+    else.
+    """
     config = _read_map(path)
     kinds: dict[str, Callable[[Any], bool]] = {
         "algorithm": _is_text,
         "env": _is_text,
-        "budget": lambda budgets: isinstance(budgets, list) and bool(budgets) and all(map(_is_finite, budgets)),
+        "budget": lambda budgets: (
+            isinstance(budgets, list) and bool(budgets) and all(map(_is_finite, budgets))
+        ),
         "episodes": _is_finite,
     }
     for name, is_kind in kinds.items():
         if not is_kind(config.get(name)):
-            raise InvalidInput(f"{path} is no configuration of a training run: {name} is {config.get(name)!r:.80}")
+            raise InvalidInput(
+                f"{path} is no configuration of a training run: {name} is {config.get(name)!r:.80}"
+            )
     check_known(f"algorithm in {path}", config["algorithm"], ALGORITHMS)
     return config
 
@@ -142,11 +164,14 @@ def read_rules(path: Path) -> dict[str, dict[str, Any]]:
     for name, score in rules.items():
         if not isinstance(score, dict) or {*score} != {*Score.__dataclass_fields__}:
             raise InvalidInput(
-                f"{path} holds no scores of rules: {name!r:.80} has not {', '.join(Score.__dataclass_fields__)}"
+                f"{path} holds no scores of rules: {name!r:.80} has not "
+                f"{', '.join(Score.__dataclass_fields__)}"
             )
         for column, value in score.items():
             if not (_is_finite(value) or (column == "distance_m" and value is None)):
-                raise InvalidInput(f"{path} holds no scores of rules: {column} of {name!r:.80} is {value!r:.80}")
+                raise InvalidInput(
+                    f"{path} holds no scores of rules: {column} of {name!r:.80} is {value!r:.80}"
+                )
     return rules
 
 

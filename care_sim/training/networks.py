@@ -1,4 +1,6 @@
-"""The network of `care_sim.policies.learned.score_map` in PyTorch, as a policy of Stable-Baselines3."""
+"""The network of `care_sim.policies.learned.score_map` in PyTorch, as a policy of
+Stable-Baselines3.
+"""
 
 from typing import Any
 
@@ -16,7 +18,8 @@ from care_sim.policies.learned.weights import Arrays
 
 
 class Window(nn.Module):
-    """(n, hidden, sectors) from what every sector sees: its blocks, one more on each side, and the car's motion.
+    """(n, hidden, sectors) from what every sector sees: its blocks, one more on each side, and the
+    car's motion.
 
     `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths).
     """
@@ -25,7 +28,9 @@ class Window(nn.Module):
         super().__init__()
         self.shape = shape
         stride = shape[1] // sectors[0], shape[2] // sectors[1]
-        self.window = nn.Conv2d(shape[0], hidden, (stride[0] + 2 * MARGIN, stride[1] + 2 * MARGIN), stride)
+        self.window = nn.Conv2d(
+            shape[0], hidden, (stride[0] + 2 * MARGIN, stride[1] + 2 * MARGIN), stride
+        )
         self.ego = nn.Linear(len(EGO), hidden, bias=False)
         self.hidden = nn.Conv2d(hidden, hidden, 1)
 
@@ -37,7 +42,9 @@ class Window(nn.Module):
 
 
 class Windows(nn.Module):
-    """One window for the actor, another for the critic, whose sectors are pooled into mean and maximum."""
+    """One window for the actor, another for the critic, whose sectors are pooled into mean and
+    maximum.
+    """
 
     def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
         super().__init__()
@@ -80,7 +87,8 @@ class Joined(BaseFeaturesExtractor):
 
     def __init__(self, observation_space: spaces.Dict):
         super().__init__(
-            observation_space, sum(int(np.prod(space.shape or ())) for space in observation_space.values())
+            observation_space,
+            sum(int(np.prod(space.shape or ())) for space in observation_space.values()),
         )
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
@@ -89,9 +97,13 @@ class Joined(BaseFeaturesExtractor):
 
 
 class Sectored(BaseFeaturesExtractor):
-    """(n, 4 + 4 * sectors): four features a sector and the car's motion, for learners with layers of their own."""
+    """(n, 4 + 4 * sectors): four features a sector and the car's motion, for learners with layers
+    of their own.
+    """
 
-    def __init__(self, observation_space: spaces.Dict, shape: tuple[int, int, int], sectors: tuple[int, int]):
+    def __init__(
+        self, observation_space: spaces.Dict, shape: tuple[int, int, int], sectors: tuple[int, int]
+    ):
         super().__init__(observation_space, len(EGO) + 4 * sectors[0] * sectors[1])
         self.window = Window(shape, sectors, 4)
 
@@ -114,7 +126,9 @@ class SectorPolicy(ActorCriticPolicy):
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
         self.action_net: Any = Score(self._hidden, int(np.prod(self._sectors)))
-        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)  # type: ignore[call-arg]
+        self.optimizer = self.optimizer_class(
+            self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs
+        )  # type: ignore[call-arg]
 
     @property
     def _sectors(self) -> tuple[int, int]:

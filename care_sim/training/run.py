@@ -48,9 +48,14 @@ def train(config: AgentConfig) -> int:
 
 
 def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
-    model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(folder.checkpoint, env=envs, device="cpu")
+    model: BaseAlgorithm = algorithms.algorithm(config.algorithm).load(
+        folder.checkpoint, env=envs, device="cpu"
+    )
     if model.num_timesteps >= config.steps and folder.evaluated(model):
-        raise InvalidInput(f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with --steps")
+        raise InvalidInput(
+            f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with "
+            "--steps"
+        )
     envs.seed(config.seed + model.num_timesteps)
     if config.algorithm == "sac":
         model.learning_starts += model.num_timesteps  # type: ignore[attr-defined]
@@ -70,7 +75,11 @@ def _rules(config: AgentConfig) -> dict[str, Score]:
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
     """Evaluate and learn in turn, until the last step is evaluated."""
     clock, begun = Stopwatch(folder.seconds), model.num_timesteps
-    with bar(config.steps, "steps") if sys.stderr.isatty() else nullcontext(Lines(config.steps, "steps")) as show:
+    with (
+        bar(config.steps, "steps")
+        if sys.stderr.isatty()
+        else nullcontext(Lines(config.steps, "steps")) as show
+    ):
         shown = _shower(show, config, clock, begun)
         while True:
             if not folder.evaluated(model):
@@ -82,11 +91,16 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
             with clock:
                 _stretch(model, min(config.evaluate_every, left), shown, folder)
     if learned := model.num_timesteps - begun:
-        _say(f"{learned / clock.here:.0f} environment steps a second inside {config.algorithm}, learning included")
+        _say(
+            f"{learned / clock.here:.0f} environment steps a second inside {config.algorithm}, "
+            "learning included"
+        )
     _say(f"kept in {folder.path}")
 
 
-def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder) -> None:
+def _stretch(
+    model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder
+) -> None:
     from stable_baselines3.common.callbacks import ConvertCallback
 
     def each(local: dict[str, Any], _: dict[str, Any]) -> bool:
@@ -99,7 +113,9 @@ def _stretch(model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], f
         folder.save(model)
 
 
-def _shower(show: Show, config: AgentConfig, clock: "Stopwatch", begun: int) -> Callable[[int], None]:
+def _shower(
+    show: Show, config: AgentConfig, clock: "Stopwatch", begun: int
+) -> Callable[[int], None]:
     def shown(steps: int) -> None:
         rate = (steps - begun) / max(clock.here, 1e-9)
         left = max(config.steps - steps, 0) / rate if rate else 0.0
@@ -137,7 +153,9 @@ def _check_tensorboard(config: AgentConfig) -> None:
         try:
             import tensorboard  # noqa: F401
         except ImportError as error:
-            raise MissingExtra(f"--tensorboard needs it: pip install tensorboard ({error})") from error
+            raise MissingExtra(
+                f"--tensorboard needs it: pip install tensorboard ({error})"
+            ) from error
 
 
 def _say(line: str) -> None:

@@ -1,9 +1,10 @@
 """Train the learned scorer: `care-sim train learned-scorer` makes the shipped weights from nothing.
 
-The paper names no network and no loss. Both are the plainest that do: one hidden layer of rectified units for every
-cell by itself, and the weighted logistic loss of `care_sim.training.scorer_data`, whose best score orders the cells by
-the odds that they find an object. Adam runs a fixed number of steps over shuffled batches, its rate falling to 0 along
-a half cosine. One thread and fixed seeds: the same machine makes the same bytes.
+The paper names no network and no loss. Both are the plainest that do: one hidden layer of rectified
+units for every cell by itself, and the weighted logistic loss of `care_sim.training.scorer_data`,
+whose best score orders the cells by the odds that they find an object. Adam runs a fixed number of
+steps over shuffled batches, its rate falling to 0 along a half cosine. One thread and fixed seeds:
+the same machine makes the same bytes.
 """
 
 import sys
@@ -32,12 +33,16 @@ UNITS = 16
 BATCH = 4096
 RATE = 3e-3
 HELD_OUT = tuple(range(2000, 2004))
-"""Streets that belong neither to the calibration nor to the evaluation: the card tells the loss on them."""
+"""Streets that belong neither to the calibration nor to the evaluation: the card tells the loss on
+them.
+"""
 
 
 @dataclass(frozen=True)
 class TrainScorer:
-    """Train `learned-scorer` on the 20 calibration streets and write its weights; needs the extra `rl`."""
+    """Train `learned-scorer` on the 20 calibration streets and write its weights; needs the extra
+    `rl`.
+    """
 
     out: Path
     """File to write."""
@@ -65,23 +70,30 @@ class TrainScorer:
 _STREETS = {"calibration": CALIBRATION_SEEDS, "held out": HELD_OUT}
 
 
-def train(learned: Examples, held_out: Examples, seed: int, steps: int) -> tuple[Arrays, dict[str, float]]:
+def train(
+    learned: Examples, held_out: Examples, seed: int, steps: int
+) -> tuple[Arrays, dict[str, float]]:
     """The weights, and the loss on both sets of examples (log 2 = 0.69 without any knowledge)."""
     torch = import_torch()
     with _one_thread(torch):
         torch.manual_seed(seed)
         network = torch.nn.Sequential(
-            torch.nn.Linear(learned.inputs.shape[1], UNITS), torch.nn.ReLU(), torch.nn.Linear(UNITS, 1, bias=False)
+            torch.nn.Linear(learned.inputs.shape[1], UNITS),
+            torch.nn.ReLU(),
+            torch.nn.Linear(UNITS, 1, bias=False),
         )
         _descend(torch, network, learned, np.random.default_rng(seed), steps)
         losses = {
-            name: _loss_of(torch, network, data) for name, data in zip(_STREETS, (learned, held_out), strict=True)
+            name: _loss_of(torch, network, data)
+            for name, data in zip(_STREETS, (learned, held_out), strict=True)
         }
     layer, bias, out = (parameter.detach().numpy() for parameter in network.parameters())
     return {"layer": layer.T, "bias": bias, "out": out[0]}, losses
 
 
-def _descend(torch: Any, network: Any, learned: Examples, rng: np.random.Generator, steps: int) -> None:
+def _descend(
+    torch: Any, network: Any, learned: Examples, rng: np.random.Generator, steps: int
+) -> None:
     optimizer = torch.optim.Adam(network.parameters(), lr=RATE)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
     for rows in _batches(rng, len(learned), steps):
@@ -92,7 +104,9 @@ def _descend(torch: Any, network: Any, learned: Examples, rng: np.random.Generat
 
 
 def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArray[np.int64]]:
-    """Rows of so many batches; a pass is in random order, and what does not fill a batch is left out of it."""
+    """Rows of so many batches; a pass is in random order, and what does not fill a batch is left
+    out of it.
+    """
     size, order = min(BATCH, count), np.empty(0, np.int64)
     for _ in range(steps):
         if len(order) < size:
@@ -103,7 +117,9 @@ def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArr
 
 def _loss(torch: Any, network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
     """The weighted logistic loss over some examples."""
-    inputs, positive, weigh = (torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weigh))
+    inputs, positive, weigh = (
+        torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weigh)
+    )
     scores = network(inputs)[:, 0]
     return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weigh)
 
@@ -128,7 +144,8 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
         "learned-scorer",
         AngularGrid(),
         scenario="CARE-Street-v0",
-        data=f"{len(learned)} cells, {positive} of them positive, of generated streets under history at {budgets} of "
+        data=f"{len(learned)} cells, {positive} of them positive, of generated streets "
+        f"under history at {budgets} of "
         f"the cells, with six cameras and with the front one; {OTHERS} others a keyframe",
         seeds={name: list(seeds) for name, seeds in _STREETS.items()} | {"training": made.seed},
         steps=made.steps,

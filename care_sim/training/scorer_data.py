@@ -1,16 +1,19 @@
-"""What the learned scorer learns from: cells of the calibration's streets, with truth at training alone.
+"""What the learned scorer learns from: cells of the calibration's streets, with truth at training
+alone.
 
-The paper says that 20 scenes apart from the evaluation's train it, and no more. The rest was decided before a result
-was seen:
+The paper says that 20 scenes apart from the evaluation's train it, and no more. The rest was
+decided before a result was seen:
 
-- An example is a cell at a keyframe; it is positive if its return of the full scan lies on an object that has no track
-  and that can be detected at all, in MIN_RETURNS cells or more.
-- The scenes are played by `history`, the policy whose reserve is learned, at budgets from the scarcest to the most
-  generous that are studied, so that one file serves them all.
+- An example is a cell at a keyframe. It is positive if its return of the full scan lies on an
+  object that has no track and that can be detected at all, in MIN_RETURNS cells or more.
+- The scenes are played by `history`, the policy whose reserve is learned, at budgets from the
+  scarcest to the most generous that are studied, so that one file serves them all.
 - They are played with all cameras and with the front one alone: the closed loop has no other.
-- First sightings count objects, not cells, so the cells of an object weigh 1 together, however many they are.
-- All positive cells are kept, and of the others, of which there are sixty times as many, about as many at random; they
-  weigh together what the positive ones do, so that neither drowns the other.
+- First sightings count objects, not cells, so the cells of an object weigh 1 together, however many
+  they are.
+- All positive cells are kept. Of the others, of which there are sixty times as many, about as many
+  are kept at random. They weigh together what the positive ones do, so that neither drowns the
+  other.
 """
 
 from collections.abc import Iterable, Iterator
@@ -31,14 +34,18 @@ from care_sim.policies.paper.history import History
 from care_sim.sources.streets.recording import street_film
 
 BUDGETS = (0.03, 0.10, 0.35)
-"""The paper's scarcest closed loop, the budget that both loops share, and its most generous open loop."""
+"""The paper's scarcest closed loop, the budget that both loops share, and its most generous open
+loop.
+"""
 OTHERS = 200
 """Cells of a keyframe that are not positive and are kept."""
 
 
 @dataclass(frozen=True)
 class Examples:
-    """`inputs` (n, CUES + OUTLOOKS) of cells, whether they are `positive` (n,), and what they `weigh` (n,)."""
+    """`inputs` (n, CUES + OUTLOOKS) of cells, whether they are `positive` (n,), and what they
+    `weigh` (n,).
+    """
 
     inputs: Table
     positive: NDArray[np.bool_]
@@ -52,7 +59,9 @@ def examples(seeds: Iterable[int]) -> Iterator[Examples]:
     """Those of the streets of some seeds, a play at a time."""
     for seed in seeds:
         film = street_film(seed)
-        for number, (shown, budget) in enumerate((shown, b) for shown in (film, front_alone(film)) for b in BUDGETS):
+        for number, (shown, budget) in enumerate(
+            (shown, b) for shown in (film, front_alone(film)) for b in BUDGETS
+        ):
             rng = np.random.default_rng([seed, number])
             yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
 
@@ -72,8 +81,8 @@ def front_alone(film: Film) -> Film:
 
 
 def untracked_cells(loop: OpenLoop) -> tuple[Cells, Table]:
-    """Cells (n,) of the coming keyframe's full scan with a return from an object in range that has no track and can be
-    detected, and what each weighs (n,). Truth.
+    """Cells (n,) of the coming keyframe's full scan with a return from an object in range that has
+    no track and can be detected, and what each weighs (n,). Truth.
     """
     cloud, annotations = loop.shot.cloud, loop.shot.annotations
     in_range = np.hypot(annotations.boxes[:, 0], annotations.boxes[:, 1]) <= RANGE_M
@@ -81,7 +90,9 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Table]:
     tracked = (annotations.boxes[:, None] == behind_tracks[None]).all(axis=2).any(axis=1)
     wanted = np.isin(cloud.objects, annotations.objects[in_range & ~tracked])
     cells, first = np.unique(cloud.cells[wanted], return_index=True)
-    _, group, sizes = np.unique(cloud.objects[wanted][first], return_inverse=True, return_counts=True)
+    _, group, sizes = np.unique(
+        cloud.objects[wanted][first], return_inverse=True, return_counts=True
+    )
     enough = sizes[group] >= MIN_RETURNS
     return cells[enough], (1 / sizes[group[enough]]).astype(np.float32)
 
@@ -100,16 +111,32 @@ def _keyframe(loop: OpenLoop, belief: Belief, cues: Cues, rng: np.random.Generat
     cells = np.concatenate([positive, others])
     seen = cues.of(belief, cues.rig.hulls(belief.tracks.boxes))
     weigh = np.concatenate([shares, np.ones(len(others), np.float32)])
-    return Examples(np.hstack([seen.rows(cells), cues.outlooks[cells]]), np.arange(len(cells)) < len(positive), weigh)
+    return Examples(
+        np.hstack([seen.rows(cells), cues.outlooks[cells]]),
+        np.arange(len(cells)) < len(positive),
+        weigh,
+    )
 
 
 def _first_camera(shot: Shot) -> Shot:
     identified = shot.seen
     seen = np.flatnonzero(identified.detections.cameras == 0)
-    columns = {field.name: getattr(identified.detections, field.name)[seen] for field in fields(identified.detections)}
-    front = replace(identified, detections=replace(identified.detections, **columns), objects=identified.objects[seen])
+    columns = {
+        field.name: getattr(identified.detections, field.name)[seen]
+        for field in fields(identified.detections)
+    }
+    front = replace(
+        identified,
+        detections=replace(identified.detections, **columns),
+        objects=identified.objects[seen],
+    )
     return replace(shot, seen=front)
 
 
 def _joined(parts: list[Examples]) -> Examples:
-    return Examples(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Examples)))
+    return Examples(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(Examples)
+        )
+    )

@@ -2,12 +2,13 @@
 
 | seeds | for |
 |---|---|
-| 0 to 1,999 | the benchmark: tables, tests, the streets' evaluation (0 to 149) and calibration (1,000 to 1,019) |
+| 0 to 1,999 | the benchmark; of streets 0 to 149 for evaluation, 1,000 to 1,019 for calibration |
 | 2,000 to 9,999 | validation: the learning curve, and which weights are kept |
 | 10,000 and up | training |
 
-No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a seed below 2,000.
-Where episodes differ by the recording and not by the seed (`CARE-Replay-v0`), hold out recordings.
+No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
+seed below 2,000. Where episodes differ by the recording and not by the seed (`CARE-Replay-v0`),
+hold out recordings.
 """
 
 from typing import Any
@@ -22,9 +23,10 @@ LAST = 2**31 - 1
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Every reset begins an episode of a training seed; the learner's seed and one given to `reset` decide the sequence
-    of them. Stable-Baselines3 counts the latter up from environment to environment: without the former, learners of
-    neighbouring seeds would share most of their episodes.
+    """Every reset begins an episode of a training seed; the learner's seed and one given to `reset`
+    decide the sequence of them. Stable-Baselines3 counts the latter up from environment to
+    environment: without the former, learners of neighbouring seeds would share most of their
+    episodes.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], learner: int = 0):
@@ -32,7 +34,9 @@ class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._learner = learner
         self._rng = np.random.default_rng()
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin the next episode."""
         if seed is not None:
             self._rng = np.random.default_rng((seed, self._learner))
@@ -42,5 +46,8 @@ class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
 def validation_seeds(episodes: int) -> range:
     """The first `episodes` seeds of the validation. Raises InvalidInput for more than there are."""
     if episodes > TRAINING - VALIDATION:
-        raise InvalidInput(f"episodes must be at most {TRAINING - VALIDATION}, the validation seeds, got {episodes}")
+        raise InvalidInput(
+            f"episodes must be at most {TRAINING - VALIDATION}, the validation seeds, got "
+            f"{episodes}"
+        )
     return range(VALIDATION, VALIDATION + episodes)

@@ -17,15 +17,17 @@ Choose = Callable[[Any, bool], NDArray[np.float32]]
 class Learner(Protocol):
     """What acts: of Stable-Baselines3 any algorithm."""
 
-    def predict(self, observation: Any, state: Any, episode_start: Any, deterministic: bool) -> tuple[Any, Any]:
+    def predict(
+        self, observation: Any, state: Any, episode_start: Any, deterministic: bool
+    ) -> tuple[Any, Any]:
         """Action and memory."""
         ...
 
 
 @dataclass(frozen=True)
 class Score:
-    """Means over episodes: the return, and the distance at which the first-sighting actor was detected, metres (0 where
-    it never was; None in the open loop).
+    """Means over episodes: the return, and the distance at which the first-sighting actor was
+    detected, metres (0 where it never was; None in the open loop).
     """
 
     episodes: int
@@ -33,14 +35,22 @@ class Score:
     distance_m: float | None
 
     def __str__(self) -> str:
-        seen = "" if self.distance_m is None else f", first detection at {self.distance_m:.2f} m (0 where never)"
+        seen = (
+            ""
+            if self.distance_m is None
+            else f", first detection at {self.distance_m:.2f} m (0 where never)"
+        )
         return f"return {self.mean_return:.2f}{seen}"
 
 
 def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> Score:
     """Play an episode a seed."""
     played = [_episode(env, choose, seed) for seed in seeds]
-    distances = [outcome["detection_distance_m"] or 0.0 for _, outcome in played if "detection_distance_m" in outcome]
+    distances = [
+        outcome["detection_distance_m"] or 0.0
+        for _, outcome in played
+        if "detection_distance_m" in outcome
+    ]
     returns = float(np.mean([total for total, _ in played]))
     return Score(len(played), returns, float(np.mean(distances)) if distances else None)
 
@@ -52,7 +62,9 @@ def acting(learner: Learner) -> Choose:
     def choose(observation: Any, begins: bool) -> NDArray[np.float32]:
         nonlocal memory
         begin = np.array([begins])
-        action, memory = learner.predict(observation, None if begins else memory, begin, deterministic=True)
+        action, memory = learner.predict(
+            observation, None if begins else memory, begin, deterministic=True
+        )
         return np.asarray(action)
 
     return choose
@@ -70,7 +82,9 @@ def rule(name: str, env: gymnasium.Env[Any, Any]) -> Choose:
     return choose
 
 
-def _episode(env: gymnasium.Env[Any, Any], choose: Choose, seed: int) -> tuple[float, dict[str, Any]]:
+def _episode(
+    env: gymnasium.Env[Any, Any], choose: Choose, seed: int
+) -> tuple[float, dict[str, Any]]:
     observation, _ = env.reset(seed=seed)
     total, begins, over = 0.0, True, False
     while not over:

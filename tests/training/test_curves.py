@@ -19,11 +19,18 @@ def folder(path, config, distances=DISTANCES):
     (path / "config.json").write_text(config.to_json())
     rules = {"random": 6.0, "care": 15.0, "full": 16.0}
     measured = {
-        name: {"episodes": 2, "mean_return": -metres, "distance_m": metres if distances[0] is not None else None}
+        name: {
+            "episodes": 2,
+            "mean_return": -metres,
+            "distance_m": metres if distances[0] is not None else None,
+        }
         for name, metres in rules.items()
     }
     (path / "rules.json").write_text(json.dumps(measured))
-    lines = (f"{100 * n},{n}.5,{n - 9},{'' if metres is None else metres}" for n, metres in enumerate(distances))
+    lines = (
+        f"{100 * n},{n}.5,{n - 9},{'' if metres is None else metres}"
+        for n, metres in enumerate(distances)
+    )
     (path / "curve.csv").write_text("\n".join(["steps,seconds,return,distance_m", *lines]) + "\n")
     return path
 
@@ -47,7 +54,11 @@ def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
     other = folder(tmp_path / "other", Ppo(seed=2), (4.0, 13.0, 16.0))
     figure = curves_figure(together(map(read, [folders[0], other, folders[2]])))
     both, alone = figure.axes
-    assert [line.get_ydata().tolist() for line in learned(both)] == [[4, 10, 16], [4, 13, 16], [4, 11.5, 16]]
+    assert [line.get_ydata().tolist() for line in learned(both)] == [
+        [4, 10, 16],
+        [4, 13, 16],
+        [4, 11.5, 16],
+    ]
     assert [line.get_ydata().tolist() for line in learned(alone)] == [[4, 10, 16]]
     assert learned(alone)[0].get_xdata().tolist() == [0, 100, 200]
     assert both.get_title(loc="left") == "ppo, CARE-Dense-v0, 2 training seeds"
@@ -65,10 +76,21 @@ def test_without_a_distance_the_return_is_drawn(tmp_path):
 
 def test_the_command_draws_both_forms(folders, tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
-        main(["train", "curves", *map(str, folders), "--out", str(tmp_path / "figures" / "curves.png")])
+        main(
+            [
+                "train",
+                "curves",
+                *map(str, folders),
+                "--out",
+                str(tmp_path / "figures" / "curves.png"),
+            ]
+        )
     assert end.value.code == 0
     assert capsys.readouterr().out.strip().endswith("curves.png")
-    assert all((tmp_path / "figures" / f"curves{ending}").stat().st_size > 1000 for ending in (".png", ".svg"))
+    assert all(
+        (tmp_path / "figures" / f"curves{ending}").stat().st_size > 1000
+        for ending in (".png", ".svg")
+    )
 
 
 @pytest.mark.parametrize("name", ["config.json", "rules.json", "curve.csv"])

@@ -8,7 +8,15 @@ from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
 from care_sim.training.scorer import HELD_OUT
-from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples, front_alone, untracked_cells
+from care_sim.training.scorer_data import (
+    BUDGETS,
+    OTHERS,
+    Examples,
+    balanced,
+    examples,
+    front_alone,
+    untracked_cells,
+)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +53,11 @@ def test_what_a_full_scan_found_is_tracked_and_only_what_is_new_is_not(film):
     env.reset(seed=0)
     news = 0
     for _ in range(6):
-        found = {n for n, count in of_objects(env.loop.shot, np.arange(env.rig.grid.size)).items() if count >= 3}
+        found = {
+            n
+            for n, count in of_objects(env.loop.shot, np.arange(env.rig.grid.size)).items()
+            if count >= 3
+        }
         env.step(np.ones(env.rig.grid.shape, np.float32))
         cells, _ = untracked_cells(env.loop)
         new = {number for number, count in of_objects(env.loop.shot, cells).items() if count}

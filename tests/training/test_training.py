@@ -52,7 +52,9 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
     met = []
     for learner, environment in ((0, 1), (1, 0)):
         env = training(Ppo(seed=learner), 0.03)
-        met.append([env.reset(seed=learner + environment if n == 0 else None)[1]["seed"] for n in range(5)])
+        met.append(
+            [env.reset(seed=learner + environment if n == 0 else None)[1]["seed"] for n in range(5)]
+        )
         env.close()
     assert not set(met[0]) & set(met[1])
 
@@ -90,12 +92,20 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     seconds = [float(row["seconds"]) for row in rows]
     assert seconds == sorted(seconds)
 
-    assert list(json.loads((out / "rules.json").read_text())) == ["random", "history", "care", "full"]
+    assert list(json.loads((out / "rules.json").read_text())) == [
+        "random",
+        "history",
+        "care",
+        "full",
+    ]
     weights = load(out / "weights.npz")
     assert "out" not in weights.card.result["config"]
     best = max(float(row["return"]) for row in rows)
     assert weights.card.result["validation"]["mean_return"] == pytest.approx(best)
-    assert (weights.card.budget, weights.card.wrapper) == (492, "SectorReserve 32 x 4, GridObservation 64 x 8")
+    assert (weights.card.budget, weights.card.wrapper) == (
+        492,
+        "SectorReserve 32 x 4, GridObservation 64 x 8",
+    )
     env = bare(Ppo())
     care_sim.make_policy("ppo", env, path=out / "weights.npz")
     env.close()
@@ -103,7 +113,10 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     for changed, message in (
         (["--azimuths", "16"], "trained with azimuths 32, asked is 16"),
         (["--budget", "0.05"], "trained with budget [0.03], asked is [0.05]"),
-        (["--env", "CARE-Dartout-v0"], "trained with env 'CARE-Dense-v0', asked is 'CARE-Dartout-v0'"),
+        (
+            ["--env", "CARE-Dartout-v0"],
+            "trained with env 'CARE-Dense-v0', asked is 'CARE-Dartout-v0'",
+        ),
         (["--steps", "192"], "192 steps are done"),
     ):
         code, _, complaint = care(capsys, *command, "--steps", "256", "--resume", *changed)
@@ -113,14 +126,26 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
 
 @pytest.mark.usefixtures("libraries")
 @pytest.mark.slow
-@pytest.mark.parametrize("moment", ["care_sim.training.run.evaluate", "care_sim.training.run._stretch"])
+@pytest.mark.parametrize(
+    "moment", ["care_sim.training.run.evaluate", "care_sim.training.run._stretch"]
+)
 def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
     """Whether the rules are being measured or the first steps were just learned."""
 
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    command = ["train", "ppo", *TINY, "--out", tmp_path / "run", "--evaluate-every", "64", "--steps", "64"]
+    command = [
+        "train",
+        "ppo",
+        *TINY,
+        "--out",
+        tmp_path / "run",
+        "--evaluate-every",
+        "64",
+        "--steps",
+        "64",
+    ]
     with monkeypatch.context() as patch:
         patch.setattr(moment, interrupt)
         code, _, complaint = care(capsys, *command)

@@ -1,4 +1,6 @@
-"""How long a policy takes to choose with many tracks: the time between an observation and an action."""
+"""How long a policy takes to choose with many tracks: the time between an observation and an
+action.
+"""
 
 import time
 
@@ -25,8 +27,8 @@ FASTEST_MPS = 14.0
 
 
 def choices(config: BenchConfig) -> dict[str, list[float]]:
-    """Milliseconds of a choice in every round: `p50` and `p99` of the whole, and of its parts the medians `demand`
-    and `allocation`.
+    """Milliseconds of a choice in every round: `p50` and `p99` of the whole, and of its parts the
+    medians `demand` and `allocation`.
     """
     with driven(config.episode) as env:
         env.reset(seed=config.seed)
@@ -37,14 +39,18 @@ def choices(config: BenchConfig) -> dict[str, list[float]]:
 
 
 def observation(rig: Rig, seed: int) -> Observation:
-    """What the environments show of `TRACKS` tracked bodies and `UNTRACKED` others around the sensor."""
+    """What the environments show of `TRACKS` tracked bodies and `UNTRACKED` others around the
+    sensor.
+    """
     rng = np.random.default_rng(seed)
     bodies = street(TRACKS + UNTRACKED, seed)
     x, y, heading = bodies.poses.T
     sizes = np.array([kind.size for kind in bodies.kinds])
     boxes = SENSOR.boxes_to_local(np.column_stack([x, y, sizes[:, 2] / 2, sizes, heading]))
     classes = np.arange(len(boxes)) % len(CLASSES)
-    velocities = rng.uniform(0, FASTEST_MPS, len(boxes))[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+    velocities = rng.uniform(0, FASTEST_MPS, len(boxes))[:, None] * np.column_stack(
+        [np.cos(heading), np.sin(heading)]
+    )
     tracked = np.sort(rng.permutation(len(boxes))[:TRACKS])
     tracked = tracked[np.argsort(np.hypot(x[tracked], y[tracked]))]
     counts = np.arange(TRACKS), np.zeros(TRACKS, np.int64), np.full(TRACKS, 5)
@@ -61,7 +67,12 @@ def _seen(camera: PinholeCamera, boxes: Floats, classes: np.ndarray) -> ImageDet
     (rows,) = np.nonzero((pictured[:, 0] < pictured[:, 2]) & (pictured[:, 1] < pictured[:, 3]))
     nothing = np.zeros(len(rows))
     return ImageDetections(
-        classes[rows], nothing + 0.9, pictured[rows], np.zeros(len(rows), np.int64), nothing, nothing
+        classes[rows],
+        nothing + 0.9,
+        pictured[rows],
+        np.zeros(len(rows), np.int64),
+        nothing,
+        nothing,
     )
 
 

@@ -11,7 +11,9 @@ from care_sim.study.episode_config import EpisodeConfig
 
 @dataclass(frozen=True, kw_only=True)
 class BenchConfig:
-    """Measure speed on one core: a keyframe by stage, scans, steps and memory, beside known ones in the same run."""
+    """Measure speed on one core: a keyframe by stage, scans, steps and memory, beside known ones in
+    the same run.
+    """
 
     scenario: str = "dense"
     """Scenario whose keyframe is taken apart and whose speed is held against the targets."""
@@ -26,18 +28,23 @@ class BenchConfig:
     repeats: int = bounded(5, 1, 10_000)
     """Rounds; in each round everything is measured once."""
     samples: int = bounded(200, 1, 1_000_000)
-    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a tenth."""
+    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a
+    tenth."""
     resets: int = bounded(2000, 1, LARGEST_INTEGER)
     """Episodes begun in the worker whose memory is watched."""
     seeds: int = bounded(5, 0, 10_000)
-    """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it out."""
+    """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it
+    out.
+    """
     out: Path | None = None
     """File for the figures as JSON; the growth curves are drawn beside it, as PNG and SVG."""
 
     def __post_init__(self) -> None:
         check_fields(self)
         if self.out is not None and self.out.suffix in (".png", ".svg"):
-            raise InvalidInput(f"out must be a file for JSON, got {self.out}; the figure is drawn beside it")
+            raise InvalidInput(
+                f"out must be a file for JSON, got {self.out}; the figure is drawn beside it"
+            )
 
     @property
     def episode(self) -> EpisodeConfig:

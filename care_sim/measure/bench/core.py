@@ -10,7 +10,9 @@ _THREADS = Path("/proc/self/task")
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep every thread of this process on one core while this lasts; without effect where only Linux could."""
+    """Keep every thread of this process on one core while this lasts; without effect where only
+    Linux could.
+    """
     if not _THREADS.exists():
         yield
         return

@@ -30,12 +30,17 @@ def growth_figure(report: Report) -> Figure:
     panels[0].set_ylabel("a scan, poses included (ms)")
     panels[0].legend(frameon=False, fontsize=8)
     scans, place = report["scans"], report["machine"]
-    title = f"{scans['bodies']} bodies and {scans['rays']} rays unless the axis says otherwise. {place['processor']}"
+    title = (
+        f"{scans['bodies']} bodies and {scans['rays']} rays unless the axis says otherwise. "
+        f"{place['processor']}"
+    )
     figure.suptitle(title, x=0.01, ha="left", fontsize=8)
     return figure
 
 
 def _draw(axes: Axes, values: list[float], curves: dict[str, list[float]]) -> None:
-    for (engine, times), colour, marker in zip(curves.items(), cycle(_COLOURS), cycle(_MARKERS), strict=False):
+    for (engine, times), colour, marker in zip(
+        curves.items(), cycle(_COLOURS), cycle(_MARKERS), strict=False
+    ):
         axes.loglog(values, times, marker=marker, color=colour, label=engine, markersize=4)
     axes.grid(which="major", linewidth=0.4, alpha=0.5)

@@ -23,8 +23,9 @@ Times = dict[str, float]
 
 
 def growth(config: BenchConfig) -> dict[str, Any]:
-    """Of every axis its `values`, `labels` for people and, for every engine, `ms`: the median time of a scan with
-    poses. `budget` in shares of the cells; `bodies` in number; `grid` in cells, the rays fired being the same in all.
+    """Of every axis its `values`, `labels` for people and, for every engine, `ms`: the median time
+    of a scan with poses. `budget` in shares of the cells; `bodies` in number; `grid` in cells, the
+    rays fired being the same in all.
 
     Every round goes through all points, so that what else the machine does falls on all alike.
     """

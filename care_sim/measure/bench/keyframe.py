@@ -18,7 +18,12 @@ from care_sim.world.world import World
 
 POLICY, REST, WHOLE = "policy + allocation", "the rest", "whole keyframe"
 STAGES: dict[str, tuple[tuple[type, str], ...]] = {
-    "camera": ((Bullet, "body_ids"), (Fast, "body_ids"), (Picture, "of"), (CameraDetector, "detect")),
+    "camera": (
+        (Bullet, "body_ids"),
+        (Fast, "body_ids"),
+        (Picture, "of"),
+        (CameraDetector, "detect"),
+    ),
     "cast": ((Lidar, "fire"),),
     "detect": ((ReturnsDetector, "detect"),),
     "track": ((TrackMemory, "update"), (TrackMemory, "predict"), (TrackMemory, "tracks")),
@@ -30,11 +35,16 @@ STAGES: dict[str, tuple[tuple[type, str], ...]] = {
 
 
 def stages(config: EpisodeConfig) -> dict[str, float]:
-    """Mean milliseconds a keyframe of every stage over one episode; `REST` is what no stage holds, `WHOLE` the sum."""
+    """Mean milliseconds a keyframe of every stage over one episode; `REST` is what no stage holds,
+    `WHOLE` the sum.
+    """
     with driven(config) as env, ExitStack() as watches:
         env.reset(seed=config.seed)
         measured = {POLICY: ((type(env.policy), "__call__"),), **STAGES}
-        calls = {name: [watches.enter_context(timed(*part)) for part in parts] for name, parts in measured.items()}
+        calls = {
+            name: [watches.enter_context(timed(*part)) for part in parts]
+            for name, parts in measured.items()
+        }
         whole, keyframes = _to_the_end(env)
     spent = {name: sum(map(sum, parts)) for name, parts in calls.items()}
     spent |= {REST: whole - sum(spent.values()), WHOLE: whole}

@@ -22,10 +22,12 @@ Rounds = dict[str, list[float]]
 
 
 def measure(config: BenchConfig, tell: Callable[[str], None] = lambda _what: None) -> Report:
-    """`config`, `machine`, `versions`, `main` (the environment in question), every measure by the name of its file's
-    figures, `ratios`, `targets`, and `skipped`, what is left out in one line each.
+    """`config`, `machine`, `versions`, `main` (the environment in question), every measure by the
+    name of its file's figures, `ratios`, `targets`, and `skipped`, what is left out in one line
+    each.
 
-    `tell` hears what is measured next. An episode that nobody times comes first: what it compiles costs no figure.
+    `tell` hears what is measured next. An episode that nobody times comes first: what it compiles
+    costs no figure.
     """
     made, skipped = makers(config)
     tell("compiling")

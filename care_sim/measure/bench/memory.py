@@ -10,8 +10,8 @@ Memory = dict[str, float]
 
 
 def worker_memory(config: BenchConfig) -> Memory:
-    """Peak memory in MB of a worker: `begun_mb` when it has begun one, `early_mb` after a tenth of the resets,
-    `peak_mb` after all of them, `resets` in number. A step follows every reset.
+    """Peak memory in MB of a worker: `begun_mb` when it has begun one, `early_mb` after a tenth of
+    the resets, `peak_mb` after all of them, `resets` in number. A step follows every reset.
     """
     with processes(1) as pool:
         return pool.submit(_resets, config.episode, config.resets).result()

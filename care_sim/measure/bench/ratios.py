@@ -1,4 +1,6 @@
-"""What one run says about speed without a clock: ratios of medians within it, larger being better."""
+"""What one run says about speed without a clock: ratios of medians within it, larger being
+better.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +13,10 @@ from care_sim.measure.bench.steps import DRIVING, REACHING
 Report = dict[str, Any]
 FAST = "fast"
 
-OVER_DRIVING, OVER_REACHING = f"steps a CPU second over {DRIVING}", f"steps a CPU second over {REACHING}"
+OVER_DRIVING, OVER_REACHING = (
+    f"steps a CPU second over {DRIVING}",
+    f"steps a CPU second over {REACHING}",
+)
 TWO_OVER_ONE = "steps/s, two processes over one"
 
 
@@ -21,15 +26,21 @@ def over(engine: str, other: str) -> str:
 
 
 def same_on_grid(engine: str) -> str:
-    """Name of the ratio of an engine's scans of the same rays on the smallest and the largest grid."""
+    """Name of the ratio of an engine's scans of the same rays on the smallest and the largest
+    grid.
+    """
     return f"scan of {engine}, time on the smallest grid over the largest"
 
 
 def ratios(report: Report) -> dict[str, float]:
-    """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's does. Steps are
-    those of a second on the core, but for processes side by side.
+    """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's
+    does. Steps are those of a second on the core, but for processes side by side.
     """
-    speed, engines, curves = report["speed"], report["scans"]["engines"], report["growth"]["grid"]["ms"]
+    speed, engines, curves = (
+        report["speed"],
+        report["scans"]["engines"],
+        report["growth"]["grid"]["ms"],
+    )
     steps = {name: middle(figures["steps_per_cpu_s"]) for name, figures in speed.items()}
     scan = {name: middle(figures["scan_ms"]) for name, figures in engines.items()}
     mine = FAST if FAST in engines else REFERENCE
@@ -41,7 +52,11 @@ def ratios(report: Report) -> dict[str, float]:
             if peer in steps
         },
         **{over(mine, other): scan[other] / scan[mine] for other in scan if other != mine},
-        **{same_on_grid(engine): curve[0] / curve[-1] for engine, curve in curves.items() if engine == mine},
+        **{
+            same_on_grid(engine): curve[0] / curve[-1]
+            for engine, curve in curves.items()
+            if engine == mine
+        },
         TWO_OVER_ONE: two / one,
     }
 

@@ -20,21 +20,25 @@ from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import ENVIRONMENTS
 
 DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"
-"""The peers, under random actions: highway-env's driving without sensors, and panda-gym's arm, also over PyBullet."""
+"""The peers, under random actions: highway-env's driving without sensors, and panda-gym's arm, also
+over PyBullet.
+"""
 
 Maker = Callable[[], Environment]
 
 
 def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
-    """Makers of all that is measured, the chosen scenario first and also with every other engine, and in one line
-    each what is left out.
+    """Makers of all that is measured, the chosen scenario first and also with every other engine,
+    and in one line each what is left out.
     """
     chosen = config.episode
     main = ENVIRONMENTS[config.scenario]
     others = [name for name in ENVIRONMENTS if name != config.scenario]
     engines = [name for name in ENGINES if name != DEFAULTS["engine"]]
     made: dict[str, Maker] = {main: partial(driven, chosen)}
-    made |= {f"{main}, engine {name}": partial(driven, replace(chosen, engine=name)) for name in engines}
+    made |= {
+        f"{main}, engine {name}": partial(driven, replace(chosen, engine=name)) for name in engines
+    }
     made |= {ENVIRONMENTS[name]: partial(driven, replace(chosen, scenario=name)) for name in others}
     made[DRIVING] = partial(gymnasium.make, f"highway_env:{DRIVING}", disable_env_checker=True)
     try:
@@ -45,8 +49,9 @@ def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
 
 
 def speed(maker: Maker, config: BenchConfig) -> dict[str, float]:
-    """`steps_per_s`, resets included; `steps_per_cpu_s`, the same for a second of this process on its core, so that
-    others who share the core do not count; and `inits_per_s`, constructions with a reset.
+    """`steps_per_s`, resets included; `steps_per_cpu_s`, the same for a second of this process on
+    its core, so that others who share the core do not count; and `inits_per_s`, constructions with
+    a reset.
     """
     seconds = cast("int", config.seconds)
     with silenced(STANDARD_OUTPUT):

@@ -10,11 +10,17 @@ WORKERS = 2
 
 
 def study(seeds: int) -> dict[str, float]:
-    """`episodes` of that many seeds, and the `seconds` that two workers take. Raises RuntimeError when one fails."""
+    """`episodes` of that many seeds, and the `seconds` that two workers take. Raises RuntimeError
+    when one fails.
+    """
     configs = configurations(range(seeds))
     started = time.perf_counter()
     with processes(WORKERS) as pool:
-        answers = [answer for batch in pool.map(attempt, [[config] for config in configs]) for answer in batch]
+        answers = [
+            answer
+            for batch in pool.map(attempt, [[config] for config in configs])
+            for answer in batch
+        ]
     seconds = time.perf_counter() - started
     for failed in (answer for answer in answers if isinstance(answer, str)):
         raise RuntimeError(failed)

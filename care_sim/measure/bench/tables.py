@@ -17,19 +17,30 @@ def tables(report: Report) -> list[Table]:
     """Machine and speed, vectorised, keyframe, choices, scans, memory, ratios, targets."""
     return [
         _speed(report),
-        _spreads("Steps/s of Gymnasium's AsyncVectorEnv, policies inside", "processes", report["vectorised"]),
+        _spreads(
+            "Steps/s of Gymnasium's AsyncVectorEnv, policies inside",
+            "processes",
+            report["vectorised"],
+        ),
         _stages(report["stages"]),
         _spreads(f"Policy and allocation with {TRACKS} tracks, ms", "figure", report["choices"]),
         _scans(report),
         _memory(report),
-        Table("Ratios within this run", ("ratio", ""), tuple((k, _plain(v)) for k, v in report["ratios"].items())),
+        Table(
+            "Ratios within this run",
+            ("ratio", ""),
+            tuple((k, _plain(v)) for k, v in report["ratios"].items()),
+        ),
         *([_targets(report)] if report["targets"] else []),
     ]
 
 
 def _speed(report: Report) -> Table:
     rows = tuple(
-        (name, *(_spread(figures[key]) for key in ("steps_per_s", "steps_per_cpu_s", "inits_per_s")))
+        (
+            name,
+            *(_spread(figures[key]) for key in ("steps_per_s", "steps_per_cpu_s", "inits_per_s")),
+        )
         for name, figures in report["speed"].items()
     )
     where = report["machine"]
@@ -40,12 +51,18 @@ def _speed(report: Report) -> Table:
     )
     title = f"Speed: {SPREAD} of {report['config']['repeats']}"
     return Table(
-        title, ("environment", "steps/s, resets included", "a CPU second", "constructions with reset/s"), rows, notes
+        title,
+        ("environment", "steps/s, resets included", "a CPU second", "constructions with reset/s"),
+        rows,
+        notes,
     )
 
 
 def _stages(stages: Mapping[str, Sequence[float]]) -> Table:
-    note = f"{REST}: what is between these: the floor's draw, the cells of an action, frames, records, info"
+    note = (
+        f"{REST}: what is between these: the floor's draw, the cells of an action, frames, "
+        "records, info"
+    )
     return replace(_spreads("Where a keyframe's time goes, ms", "stage", stages), notes=(note,))
 
 
@@ -63,10 +80,17 @@ def _scans(report: Report) -> Table:
     )
     columns = ("engine", "poses", "cast", f"both, {SPREAD}", "million rays/s", "same")
     notes = (
-        "same: shares of the rays that meet the body which Bullet's meet, and that end within 1 mm of them",
-        "Bullet and Embree take in bodies that have moved when they cast, so that much of their poses is found there",
+        "same: shares of the rays that meet the body which Bullet's meet, and that end within 1 mm "
+        "of them",
+        "Bullet and Embree take in bodies that have moved when they cast, so that much of their "
+        "poses is found there",
     )
-    return Table(f"A scan of {scans['rays']} rays at {scans['bodies']} moving bodies, ms", columns, rows, notes)
+    return Table(
+        f"A scan of {scans['rays']} rays at {scans['bodies']} moving bodies, ms",
+        columns,
+        rows,
+        notes,
+    )
 
 
 def _memory(report: Report) -> Table:
@@ -86,7 +110,11 @@ def _targets(report: Report) -> Table:
             target["name"],
             _plain(target["figure"]),
             f"{'at most' if target['most'] else 'at least'} {target['bound']:g}",
-            "met" if target["met"] else f"not met; most of it: {target['holder']}" if target["holder"] else "not met",
+            "met"
+            if target["met"]
+            else f"not met; most of it: {target['holder']}"
+            if target["holder"]
+            else "not met",
         )
         for target in report["targets"]
     )
@@ -94,7 +122,9 @@ def _targets(report: Report) -> Table:
 
 
 def _spreads(title: str, column: str, figures: Mapping[str, Sequence[float]]) -> Table:
-    return Table(title, (column, SPREAD), tuple((name, _spread(values)) for name, values in figures.items()))
+    return Table(
+        title, (column, SPREAD), tuple((name, _spread(values)) for name, values in figures.items())
+    )
 
 
 def _spread(values: Sequence[float]) -> str:

@@ -1,4 +1,6 @@
-"""What the benchmark promises, held against the figures of a run; what is missed names the stage that holds it."""
+"""What the benchmark promises, held against the figures of a run; what is missed names the stage
+that holds it.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,8 +24,15 @@ WORKER_MB = 250.0
 EPISODES, STUDY_S = 245, 60.0
 CHOICE_MS = 0.5
 FLAT_MB = 5.0
-"""A worker may grow by this after the first tenth of its resets: over 2,000, 3 kB each would be too much."""
-PEERS = {over(FAST, REFERENCE): 20.0, over(FAST, "Embree (Open3D)"): 3.0, OVER_DRIVING: 30.0, OVER_REACHING: 1.5}
+"""A worker may grow by this after the first tenth of its resets: over 2,000, 3 kB each would be too
+much.
+"""
+PEERS = {
+    over(FAST, REFERENCE): 20.0,
+    over(FAST, "Embree (Open3D)"): 3.0,
+    OVER_DRIVING: 30.0,
+    OVER_REACHING: 1.5,
+}
 TWO_PROCESSES = 1.8
 SAME_RAYS = 0.8
 """Sixteen times the cells may cost a fixed number of rays a quarter more."""
@@ -31,8 +40,8 @@ SAME_RAYS = 0.8
 
 @dataclass(frozen=True)
 class Target:
-    """A figure and its bound, which it must reach, or with `most` not exceed; `holder` is what costs most in it,
-    where that was measured.
+    """A figure and its bound, which it must reach, or with `most` not exceed; `holder` is what
+    costs most in it, where that was measured.
     """
 
     name: str
@@ -48,26 +57,49 @@ class Target:
 
 
 def targets(report: Report) -> list[Target]:
-    """Every promise that this run has figures for; they speak of the default scenario, policy and budget alone."""
-    if any(report["config"][name] != getattr(BenchConfig, name) for name in ("scenario", "policy", "budget")):
+    """Every promise that this run has figures for; they speak of the default scenario, policy and
+    budget alone.
+    """
+    if any(
+        report["config"][name] != getattr(BenchConfig, name)
+        for name in ("scenario", "policy", "budget")
+    ):
         return []
     keyframe, scan, choice = _keyframe_holder(report), _scan_holder(report), _choice_holder(report)
     memory, ratios = report["memory"], report["ratios"]
     holders = {OVER_DRIVING: keyframe, OVER_REACHING: keyframe}
     return [
         Target(
-            f"{report['main']}: steps/s", middle(report["speed"][report["main"]]["steps_per_s"]), STEPS_PER_S, keyframe
+            f"{report['main']}: steps/s",
+            middle(report["speed"][report["main"]]["steps_per_s"]),
+            STEPS_PER_S,
+            keyframe,
         ),
         *(
             Target(name, ratios[name], bound, holders.get(name, scan))
             for name, bound in PEERS.items()
             if name in ratios
         ),
-        *(Target(name, ratios[name], SAME_RAYS, scan) for name in (same_on_grid(FAST),) if name in ratios),
+        *(
+            Target(name, ratios[name], SAME_RAYS, scan)
+            for name in (same_on_grid(FAST),)
+            if name in ratios
+        ),
         Target(TWO_OVER_ONE, ratios[TWO_OVER_ONE], TWO_PROCESSES),
-        Target("policy + allocation, p99 in ms", middle(report["choices"]["p99"]), CHOICE_MS, choice, most=True),
+        Target(
+            "policy + allocation, p99 in ms",
+            middle(report["choices"]["p99"]),
+            CHOICE_MS,
+            choice,
+            most=True,
+        ),
         Target("a worker, MB", memory["peak_mb"], WORKER_MB, _memory_holder(report), most=True),
-        Target("a worker, MB gained by resets", memory["peak_mb"] - memory["early_mb"], FLAT_MB, most=True),
+        Target(
+            "a worker, MB gained by resets",
+            memory["peak_mb"] - memory["early_mb"],
+            FLAT_MB,
+            most=True,
+        ),
         *_study_target(report["study"]),
     ]
 
@@ -93,7 +125,9 @@ def _keyframe_holder(report: Report) -> str:
 def _scan_holder(report: Report) -> str:
     engines = report["scans"]["engines"]
     mine = engines.get(FAST, engines[REFERENCE])
-    return _longest({part: middle(mine[f"{part}_ms"]) for part in ("poses", "cast")}, middle(mine["scan_ms"]))
+    return _longest(
+        {part: middle(mine[f"{part}_ms"]) for part in ("poses", "cast")}, middle(mine["scan_ms"])
+    )
 
 
 def _choice_holder(report: Report) -> str:

@@ -8,7 +8,9 @@ from typing import Any
 
 @contextmanager
 def timed(owner: Any, name: str) -> Iterator[list[float]]:
-    """The durations, in seconds, of the calls of `owner.name` (of a class or a module) while this lasts."""
+    """The durations, in seconds, of the calls of `owner.name` (of a class or a module) while this
+    lasts.
+    """
     durations: list[float] = []
     inherited, original = name not in vars(owner), vars(owner).get(name)
     call = getattr(owner, name)

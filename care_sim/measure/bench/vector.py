@@ -16,7 +16,8 @@ PROCESSES = (1, 2)
 
 
 def vectorised(config: BenchConfig) -> dict[str, list[float]]:
-    """Steps a second, in every round, of one and of two processes that each hold an environment and its policy.
+    """Steps a second, in every round, of one and of two processes that each hold an environment and
+    its policy.
 
     The two are measured in turn; those not measured wait. Not to be called on one core.
     """
@@ -24,7 +25,9 @@ def vectorised(config: BenchConfig) -> dict[str, list[float]]:
     for _ in range(config.repeats):
         for number in PROCESSES:
             with _workers(config, number) as envs:
-                figures[str(number)].append(benchmark_vector_step(envs, cast("int", config.seconds), config.seed))
+                figures[str(number)].append(
+                    benchmark_vector_step(envs, cast("int", config.seconds), config.seed)
+                )
     return figures
 
 

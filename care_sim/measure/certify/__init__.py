@@ -1,1 +1,3 @@
-"""`care-sim certify`: whether this machine plays a published list of episodes as they were played."""
+"""`care-sim certify`: whether this machine plays a published list of episodes as they were
+played.
+"""

@@ -16,8 +16,8 @@ EPISODES, ALL_EPISODES = 1_000, 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class CertifyConfig:
-    """Play a published list of episodes, of every environment, built-in policy and fault, alone and in every kind of
-    vector, and say whether they go as published, or which one does not and where.
+    """Play a published list of episodes, of every environment, built-in policy and fault, alone and
+    in every kind of vector, and say whether they go as published, or which one does not and where.
     """
 
     every: Annotated[bool, tyro.conf.arg(name="all"), tyro.conf.FlagCreatePairsOff] = False
@@ -34,7 +34,9 @@ class CertifyConfig:
         if self.episode is not None:
             check_whole("episode", self.episode, 0, ALL_EPISODES - 1)
             if self.every or self.write:
-                raise InvalidInput("episode plays one alone: it goes neither with all nor with write")
+                raise InvalidInput(
+                    "episode plays one alone: it goes neither with all nor with write"
+                )
         elif self.write and not self.every:
             raise InvalidInput("write publishes the whole list: give all too")
 

@@ -1,8 +1,9 @@
 """The list: what an episode of a number is made of.
 
-Every factor is drawn by itself, so that a thousand episodes hold every pair of an environment, a policy, a fault, a
-setting and a mode that can meet. The open loop detects with the paper's proxy: the detector `cluster` fits the road by
-iteration, which ends a little elsewhere on another processor.
+Every factor is drawn by itself, so that a thousand episodes hold every pair of an environment, a
+policy, a fault, a setting and a mode that can meet. The open loop detects with the paper's proxy:
+the detector `cluster` fits the road by iteration, which ends a little elsewhere on another
+processor.
 """
 
 from dataclasses import dataclass
@@ -40,13 +41,16 @@ POLICIES = (
 """Written out, because one more changes what every episode is made of."""
 
 AS_LISTED: dict[str, dict[str, Any]] = {"seed-finder": {"scenario": "dense"}}
-"""Parameters of policies in the whole list, which was published when `seed-finder` knew the dense street alone."""
+"""Parameters of policies in the whole list, which was published when `seed-finder` knew the dense
+street alone.
+"""
 
 SINGLE, INTERLEAVED, SYNC, ASYNC, SUBPROCESS, HASH_SEED = MODES = (
     "single", "interleaved", "sync", "async", "subprocess", "hash-seed",
 )  # fmt: skip
-"""How an episode is played: alone; in turns with others in one process; in Gymnasium's vectors; in the subprocesses of
-Stable-Baselines3; in an interpreter with another hash seed. None may change it."""
+"""How an episode is played: alone; in turns with others in one process; in Gymnasium's vectors; in
+the subprocesses of Stable-Baselines3; in an interpreter with another hash seed. None may change it.
+"""
 IN_OTHER_PROCESSES = (ASYNC, SUBPROCESS)
 
 BUDGETS = (0.01, 0.03, 0.05, 0.1, 0.2, 0.35)
@@ -84,7 +88,9 @@ CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)
 OPEN_KEYFRAMES = (2, 4, 4, 8, 8, 12, 40)
 """Lengths: mostly short, some whole."""
 STREETS, MORE_STREETS = (3000, 3001), tuple(range(3000, 3012))
-"""Seeds that belong to no list. A street takes seconds to make, so that a thousand episodes share two."""
+"""Seeds that belong to no list. A street takes seconds to make, so that a thousand episodes share
+two.
+"""
 
 
 @dataclass(frozen=True)
@@ -123,17 +129,24 @@ def drawn(number: int) -> Drawn:
         environment,
         tuple(arguments.items()),
         policy,
-        rng.choice(STREETS if number < 1000 else MORE_STREETS) if environment == STREET else rng.randrange(1000),
+        rng.choice(STREETS if number < 1000 else MORE_STREETS)
+        if environment == STREET
+        else rng.randrange(1000),
         rng.choice(CLOSED_KEYFRAMES if closed else OPEN_KEYFRAMES),
         rng.choice(modes(environment, policy)),
     )
 
 
 def modes(environment: str, policy: str) -> list[str]:
-    """How such an episode can be played: truth does not travel between processes, and a street is made once a process.
+    """How such an episode can be played: truth does not travel between processes, and a street is
+    made once a process.
 
     Those that are quick to begin stand several times.
     """
     apart = IN_OTHER_PROCESSES if is_privileged(BUILT_IN[policy]) else ()
     elsewhere = (HASH_SEED,) if environment == STREET else ()
-    return [mode for mode in (SINGLE, SINGLE, SINGLE, INTERLEAVED, *MODES) if mode not in (*apart, *elsewhere)]
+    return [
+        mode
+        for mode in (SINGLE, SINGLE, SINGLE, INTERLEAVED, *MODES)
+        if mode not in (*apart, *elsewhere)
+    ]

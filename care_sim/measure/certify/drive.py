@@ -1,4 +1,6 @@
-"""A recorded drive that needs no download: an Argoverse 2 log of five seconds, written where it is wanted."""
+"""A recorded drive that needs no download: an Argoverse 2 log of five seconds, written where it is
+wanted.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -16,8 +18,8 @@ ACROSS = {"qw": 0.8, "qx": 0.0, "qy": 0.0, "qz": -0.6}
 def write_drive(folder: Path) -> str:
     """Write the log below `folder`; the source of recordings that names it.
 
-    The car drives 5 m/s past a van, parked cars and an oncoming bus; halfway a person steps out from behind the van,
-    and a bicycle comes after.
+    The car drives 5 m/s past a van, parked cars and an oncoming bus; halfway a person steps out
+    from behind the van, and a bicycle comes after.
     """
     log = folder / NAME
     log.mkdir(parents=True)
@@ -37,16 +39,32 @@ def _boxes(sweep: int) -> list[dict[str, Any]]:
     seen = [
         _box(sweep, "BOX_TRUCK", "van", (ahead, -4.0, 0.9), (6.0, 2.2, 2.6)),
         _box(sweep, "REGULAR_VEHICLE", "parked", (ahead + 9.0, -4.2, 0.42), (4.4, 1.9, 1.5)),
-        _box(sweep, "REGULAR_VEHICLE", "parked behind", (ahead + 15.5, -4.1, 0.42), (4.2, 1.8, 1.5)),
+        _box(
+            sweep, "REGULAR_VEHICLE", "parked behind", (ahead + 15.5, -4.1, 0.42), (4.2, 1.8, 1.5)
+        ),
         _box(sweep, "BUS", "oncoming", (ahead + 25.0 - 0.6 * sweep, 3.7, 1.2), (11.0, 2.6, 3.2)),
     ]
     if sweep >= 20:
         seen.append(
-            _box(sweep, "PEDESTRIAN", "person", (ahead + 5.0, -4.0 + 0.13 * (sweep - 20), 0.6), (0.6, 0.7, 1.8), ACROSS)
+            _box(
+                sweep,
+                "PEDESTRIAN",
+                "person",
+                (ahead + 5.0, -4.0 + 0.13 * (sweep - 20), 0.6),
+                (0.6, 0.7, 1.8),
+                ACROSS,
+            )
         )
     if sweep >= 30:
         seen.append(
-            _box(sweep, "BICYCLE", "bicycle", (ahead + 12.0, 6.0 - 0.3 * (sweep - 30), 0.4), (1.8, 0.6, 1.4), ACROSS)
+            _box(
+                sweep,
+                "BICYCLE",
+                "bicycle",
+                (ahead + 12.0, 6.0 - 0.3 * (sweep - 30), 0.4),
+                (1.8, 0.6, 1.4),
+                ACROSS,
+            )
         )
     return seen
 
@@ -59,8 +77,19 @@ def _box(
     size: tuple[float, ...],
     turn: dict[str, float] = AHEAD,
 ) -> dict[str, Any]:
-    numbers = dict(zip(("tx_m", "ty_m", "tz_m", "length_m", "width_m", "height_m"), (*place, *size), strict=True))
-    named = {"timestamp_ns": _stamp(sweep), "track_uuid": track, "category": category, "num_interior_pts": 10}
+    numbers = dict(
+        zip(
+            ("tx_m", "ty_m", "tz_m", "length_m", "width_m", "height_m"),
+            (*place, *size),
+            strict=True,
+        )
+    )
+    named = {
+        "timestamp_ns": _stamp(sweep),
+        "track_uuid": track,
+        "category": category,
+        "num_interior_pts": 10,
+    }
     return named | numbers | turn
 
 

@@ -1,4 +1,6 @@
-"""How episodes of the list are played: alone, in turns, in vectors, in an interpreter with another hash seed."""
+"""How episodes of the list are played: alone, in turns, in vectors, in an interpreter with another
+hash seed.
+"""
 
 import json
 import os
@@ -69,11 +71,15 @@ def in_turns(episodes: Sequence[Drawn], source: str) -> list[Left]:
 
 
 def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None) -> list[Left]:
-    """In a vector of Gymnasium: of this process, or of processes of a `context` of multiprocessing."""
+    """In a vector of Gymnasium: of this process, or of processes of a `context` of
+    multiprocessing.
+    """
     makers = [partial(make, episode, source) for episode in episodes]
     with ExitStack() as stack:
         twins = _twins(stack, episodes, source) if context else []
-        vector = stack.enter_context(closing(SyncVectorEnv(makers) if context is None else _forked(makers, context)))
+        vector = stack.enter_context(
+            closing(SyncVectorEnv(makers) if context is None else _forked(makers, context))
+        )
         envs = vector.envs if isinstance(vector, SyncVectorEnv) else twins
         return _stepped(episodes, envs, vector, vector.reset()[0])
 
@@ -99,13 +105,27 @@ def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Left]:
     """In an interpreter whose hash seed is another than this one's."""
     seed = next(seed for seed in HASH_SEEDS if seed != os.environ.get("PYTHONHASHSEED"))
     asked = json.dumps([os.getpid(), [episode.number for episode in episodes], source])
-    command = [sys.executable, "-c", "from care_sim.measure.certify.modes import answer_parent; answer_parent()"]
+    command = [
+        sys.executable,
+        "-c",
+        "from care_sim.measure.certify.modes import answer_parent; answer_parent()",
+    ]
     done = subprocess.run(
-        command, env=os.environ | {"PYTHONHASHSEED": seed}, input=asked, capture_output=True, text=True, check=False
+        command,
+        env=os.environ | {"PYTHONHASHSEED": seed},
+        input=asked,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if done.returncode:
-        raise RuntimeError(f"the interpreter of another hash seed ended: {done.stderr.strip().splitlines()[-1:]}")
-    return [bytes.fromhex(left) if isinstance(left, str) else left[0] for left in json.loads(done.stdout)]
+        raise RuntimeError(
+            f"the interpreter of another hash seed ended: {done.stderr.strip().splitlines()[-1:]}"
+        )
+    return [
+        bytes.fromhex(left) if isinstance(left, str) else left[0]
+        for left in json.loads(done.stdout)
+    ]
 
 
 def answer_parent() -> None:
@@ -120,7 +140,10 @@ def make(episode: Drawn, source: str) -> Trail:
     """The environment of an episode, which leaves its trail."""
     recorded = {"source": source} if episode.environment == REPLAY else {}
     arguments = dict(episode.arguments) | recorded
-    return Trail(gymnasium.make(f"care_sim:{episode.environment}", disable_env_checker=True, **arguments), episode)
+    return Trail(
+        gymnasium.make(f"care_sim:{episode.environment}", disable_env_checker=True, **arguments),
+        episode,
+    )
 
 
 def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Trail]:
@@ -139,9 +162,11 @@ def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:
     return policy
 
 
-def _stepped(episodes: Sequence[Drawn], envs: Sequence[Any], vector: Any, observations: Any) -> list[Left]:
-    """Play a vector until the longest episode is over; the policies choose here. Where one is over its last action is
-    given on: truth ends with it.
+def _stepped(
+    episodes: Sequence[Drawn], envs: Sequence[Any], vector: Any, observations: Any
+) -> list[Left]:
+    """Play a vector until the longest episode is over; the policies choose here. Where one is over
+    its last action is given on: truth ends with it.
     """
     policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
     actions: list[Any] = [None] * len(episodes)

@@ -24,7 +24,9 @@ NEEDS: tuple[tuple[Callable[[Drawn], bool], Callable[[], object]], ...] = (
 
 
 def playable(episodes: Sequence[Drawn]) -> tuple[list[Drawn], list[str]]:
-    """The episodes that can be played with what is installed, and a line for each thing that others lack."""
+    """The episodes that can be played with what is installed, and a line for each thing that others
+    lack.
+    """
     left, lines = list(episodes), []
     for needed, load in NEEDS:
         lacking = [episode for episode in left if needed(episode)]

@@ -38,7 +38,10 @@ def played(
                 try:
                     found |= future.result()
                 except BrokenExecutor:
-                    found |= {episode.number: "the process that played it died" for episode in futures[future]}
+                    found |= {
+                        episode.number: "the process that played it died"
+                        for episode in futures[future]
+                    }
                 show(len(found))
         except KeyboardInterrupt:
             if isinstance(executor, Processes):
@@ -50,22 +53,34 @@ def played(
 
 
 def batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
-    """Episodes that are played one after the other: those of a street together, since it takes seconds to make; the
-    others by mode. The longest to begin come first.
+    """Episodes that are played one after the other: those of a street together, since it takes
+    seconds to make; the others by mode. The longest to begin come first.
     """
     ordered = sorted(episodes, key=lambda episode: (*_world(episode), episode.mode, episode.number))
     made: list[list[Drawn]] = []
-    for (world, mode), group in groupby(ordered, lambda one: (_world(one), one.mode * (one.environment != STREET))):
-        most = len(episodes) if world[0] == STREET else A_LONG_BATCH if mode in (HASH_SEED, SUBPROCESS) else A_BATCH
+    for (world, mode), group in groupby(
+        ordered, lambda one: (_world(one), one.mode * (one.environment != STREET))
+    ):
+        most = (
+            len(episodes)
+            if world[0] == STREET
+            else A_LONG_BATCH
+            if mode in (HASH_SEED, SUBPROCESS)
+            else A_BATCH
+        )
         made += [list(batch) for batch in together(list(group), most)]
     return sorted(
-        made, key=lambda batch: (batch[0].environment != STREET, batch[0].mode not in (HASH_SEED, SUBPROCESS))
+        made,
+        key=lambda batch: (
+            batch[0].environment != STREET,
+            batch[0].mode not in (HASH_SEED, SUBPROCESS),
+        ),
     )
 
 
 def attempt(batch: Sequence[Drawn], source: str) -> Played:
-    """What a worker does: play a batch. Where one of several that are played together fails, each is played alone, so
-    that the others have their trails.
+    """What a worker does: play a batch. Where one of several that are played together fails, each
+    is played alone, so that the others have their trails.
     """
     found: Played = {}
     for group in _alike(batch):

@@ -16,7 +16,11 @@ def read(path: Path = FILE) -> list[bytes]:
     if not path.exists():
         raise InvalidInput("the list of certify is missing: install the package again")
     rows = read_rows(path)
-    trails = [trail for row in rows if isinstance(trail := row.get("trail"), bytes) and len(trail) > DIGEST_BYTES]
+    trails = [
+        trail
+        for row in rows
+        if isinstance(trail := row.get("trail"), bytes) and len(trail) > DIGEST_BYTES
+    ]
     if len(trails) < len(rows):
         raise InvalidInput(f"{path} holds no trails: install the package again")
     return trails

@@ -15,7 +15,8 @@ from care_sim.study.progress import Lines, bar
 
 
 def run(config: CertifyConfig) -> int:
-    """Play the list and tell; 0 where every episode that can be played here goes as published, else 1.
+    """Play the list and tell; 0 where every episode that can be played here goes as published, else
+    1.
 
     Raises MissingExtra where none can be played, or not all that are to be published.
     """
@@ -36,7 +37,11 @@ def run(config: CertifyConfig) -> int:
 
 def _played(numbers: Sequence[int], workers: int) -> Played:
     total = len(numbers)
-    with bar(total, "episodes") if sys.stderr.isatty() else nullcontext(Lines(total, "episodes")) as show:
+    with (
+        bar(total, "episodes")
+        if sys.stderr.isatty()
+        else nullcontext(Lines(total, "episodes")) as show
+    ):
         return played(numbers, workers, lambda done: show(done, ""))
 
 
@@ -44,7 +49,9 @@ def _published(found: Played) -> int:
     """Publish what was played, unless some of it was not."""
     trails = [trail for _, trail in sorted(found.items()) if isinstance(trail, bytes)]
     if len(trails) < len(found):
-        number, reason = next((n, trail) for n, trail in sorted(found.items()) if isinstance(trail, str))
+        number, reason = next(
+            (n, trail) for n, trail in sorted(found.items()) if isinstance(trail, str)
+        )
         print(f"nothing is written: episode {number} was not played: {reason}")
         return 1
     write(trails)

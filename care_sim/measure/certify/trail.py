@@ -1,5 +1,5 @@
-"""The trail that an episode leaves: a byte of a running hash after every stage, so that the first stage at which two
-episodes part can be told.
+"""The trail that an episode leaves: a byte of a running hash after every stage, so that the first
+stage at which two episodes part can be told.
 """
 
 import hashlib
@@ -18,15 +18,26 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.measure.certify.design import Drawn
 
 CONFIGURATION, OUTCOME = "configuration", "outcome"
-STAGES = ("scenario and poses", "camera detections", "tracks", "cells chosen", "returns", "detections")
-"""Of every keyframe, in order. The configuration comes before the first, the outcome after the last."""
+STAGES = (
+    "scenario and poses",
+    "camera detections",
+    "tracks",
+    "cells chosen",
+    "returns",
+    "detections",
+)
+"""Of every keyframe, in order. The configuration comes before the first, the outcome after the
+last.
+"""
 DIGEST_BYTES = 8
 
 
 class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Plays one episode of the list, whatever `reset` is told, and keeps its trail; what follows leaves no trace.
+    """Plays one episode of the list, whatever `reset` is told, and keeps its trail; what follows
+    leaves no trace.
 
-    An exception ends the episode and is kept: in the process of a vector it would leave the others waiting.
+    An exception ends the episode and is kept: in the process of a vector it would leave the others
+    waiting.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], episode: Drawn):
@@ -42,12 +53,16 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     @property
     def left(self) -> bytes | str:
-        """The trail: `DIGEST_BYTES` of the hash over all, then a byte a stage; or in one line why there is none."""
+        """The trail: `DIGEST_BYTES` of the hash over all, then a byte a stage; or in one line why
+        there is none.
+        """
         if not self.over:
             return "it did not come to its end"
         return self._failure or self._content.digest()[:DIGEST_BYTES] + bytes(self._stages)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin the episode."""
         if not self._stages:
             self._observation, _ = super().reset(seed=self._episode.seed)
@@ -56,12 +71,17 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._observation, {}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Play a keyframe, or none after the end. `info` is empty: vectors cannot stack arrays of different budgets."""
+        """Play a keyframe, or none after the end. `info` is empty: vectors cannot stack arrays of
+        different budgets.
+        """
         if not self.over:
             try:
                 self._play(action)
             except Exception as error:
-                self._failure, self.over = " ".join(f"{type(error).__name__}: {error}".split()), True
+                self._failure, self.over = (
+                    " ".join(f"{type(error).__name__}: {error}".split()),
+                    True,
+                )
         return self._observation, 0.0, False, False, {}
 
     def _play(self, action: Any) -> None:
@@ -77,7 +97,9 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def _look(self, observation: Any) -> None:
         loop = self.env.unwrapped.loop  # type: ignore[attr-defined]
-        self._note(*(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)), observation["ego"])
+        self._note(
+            *(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)), observation["ego"]
+        )
         self._note(observation["detections"])
         self._note(observation["tracks"])
 
@@ -100,11 +122,18 @@ class Gained:
     def add(self, reward: Any, info: Mapping[str, Any]) -> None:
         """Count a keyframe."""
         self._reward += float(reward)
-        self._objects, self._found = self._objects + info.get("objects", 0), self._found + info.get("found", 0)
+        self._objects, self._found = (
+            self._objects + info.get("objects", 0),
+            self._found + info.get("found", 0),
+        )
 
     def outcome(self, env: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
         """The outcome so far; of the open loop, which knows it at the end alone, what was found."""
-        sums = asdict(outcome(env.keyframes)) if isinstance(env, ClosedLoopEnv) else info.get("outcome", {})
+        sums = (
+            asdict(outcome(env.keyframes))
+            if isinstance(env, ClosedLoopEnv)
+            else info.get("outcome", {})
+        )
         values = tuple((name, math.nan if value is None else value) for name, value in sums.items())
         return self._reward, self._objects, self._found, values
 
@@ -116,7 +145,9 @@ def stage(trail: bytes, other: bytes) -> tuple[str, int | None]:
     """
     one, two = trail[DIGEST_BYTES:], other[DIGEST_BYTES:]
     last = min(len(one), len(two)) - 1
-    place = next((n for n, pair in enumerate(zip(one, two, strict=False)) if pair[0] != pair[1]), last)
+    place = next(
+        (n for n, pair in enumerate(zip(one, two, strict=False)) if pair[0] != pair[1]), last
+    )
     if place <= 0:
         return CONFIGURATION, None
     if place == last:
@@ -134,7 +165,14 @@ def _moving(loop: ClosedLoop) -> tuple[Any, ...]:
 def _filmed(loop: Any) -> tuple[Any, ...]:
     shot = loop.shot
     seen = shot.annotations
-    return shot.time_s, astuple(shot.sensor), astuple(shot.ego), seen.objects, seen.classes, seen.boxes
+    return (
+        shot.time_s,
+        astuple(shot.sensor),
+        astuple(shot.ego),
+        seen.objects,
+        seen.classes,
+        seen.boxes,
+    )
 
 
 def _detected(env: Any) -> tuple[Any, ...]:

@@ -14,8 +14,8 @@ NOT_PLAYED = "not played"
 
 @dataclass(frozen=True)
 class Verdict:
-    """The hash of the `episodes` that were played of those that were `asked` for, None with holes; and of the episodes
-    that differ, by number, at which stage and keyframe, or why they failed.
+    """The hash of the `episodes` that were played of those that were `asked` for, None with holes;
+    and of the episodes that differ, by number, at which stage and keyframe, or why they failed.
     """
 
     episodes: int
@@ -46,20 +46,29 @@ class Verdict:
         first = min(self.differing)
         name, keyframe = self.differing[first]
         moment = "" if keyframe is None else f", keyframe {keyframe}"
-        yield f"the first is episode {first}, {self.failures.get(first) or f'which differs first in {name}{moment}'}"
+        reason = self.failures.get(first) or f"which differs first in {name}{moment}"
+        yield f"the first is episode {first}, {reason}"
         yield _made_of(first)
         if self.only is None:
             yield f"  care-sim certify --episode {first}"
 
 
 def compare(found: Played, published: Sequence[bytes], asked: int = 0) -> Verdict:
-    """Hold trails against the published ones of the same numbers; `asked`, where more were asked for than played."""
+    """Hold trails against the published ones of the same numbers; `asked`, where more were asked
+    for than played.
+    """
     failures = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, str)}
     trails = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, bytes)}
-    parted = {number: stage(published[number], trail) for number, trail in trails.items() if trail != published[number]}
+    parted = {
+        number: stage(published[number], trail)
+        for number, trail in trails.items()
+        if trail != published[number]
+    }
     differing = parted | dict.fromkeys(failures, (NOT_PLAYED, None))
     asked, hash_ = asked or len(found), None if failures else combined([*trails.values()])
-    return Verdict(len(found), asked, hash_, differing, failures, next(iter(found)) if asked == 1 else None)
+    return Verdict(
+        len(found), asked, hash_, differing, failures, next(iter(found)) if asked == 1 else None
+    )
 
 
 def _made_of(number: int) -> str:

@@ -1,7 +1,8 @@
 """What engines answer to the same rays, and whether an answer hangs on a micrometre.
 
-Bullet finds surfaces by iteration and stops within 1 mm, whatever the unit: it widens round parts and edges by as much,
-and moves surfaces that a ray grazes by more. Told every length in millimetres it stops within a micrometre.
+Bullet finds surfaces by iteration and stops within 1 mm, whatever the unit: it widens round parts
+and edges by as much, and moves surfaces that a ray grazes by more. Told every length in millimetres
+it stops within a micrometre.
 """
 
 from collections.abc import Sequence
@@ -28,12 +29,18 @@ GRAZE_M = 1e-6
 MM = 1000.0
 
 _SIDES = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
-_NUDGES = GRAZE_M * Rotation.from_rotvec((0.3, 0.5, 0.7)).apply(_SIDES / np.linalg.norm(_SIDES, axis=1, keepdims=True))
-"""(26, 3) none of them along an axis: an error in one place alone, as where a body is exactly overhead, is no edge."""
+_NUDGES = GRAZE_M * Rotation.from_rotvec((0.3, 0.5, 0.7)).apply(
+    _SIDES / np.linalg.norm(_SIDES, axis=1, keepdims=True)
+)
+"""(26, 3) none of them along an axis: an error in one place alone, as where a body is exactly
+overhead, is no edge.
+"""
 
 
 class Millimetres:
-    """Bullet asked more exactly: a world of its own with the same bodies, ids from 1, in millimetres."""
+    """Bullet asked more exactly: a world of its own with the same bodies, ids from 1, in
+    millimetres.
+    """
 
     def __init__(self, kinds: Sequence[BodyKind], grid: AngularGrid):
         self._world = BulletWorld()
@@ -57,15 +64,22 @@ class Millimetres:
 
 def same(one: Answers, other: Answers) -> NDArray[np.bool_]:
     """(n,) which rays meet the same body, ranges within `SAME_M`."""
-    alike: NDArray[np.bool_] = (one[1] == other[1]) & np.isclose(one[0], other[0], rtol=0.0, atol=SAME_M)
+    alike: NDArray[np.bool_] = (one[1] == other[1]) & np.isclose(
+        one[0], other[0], rtol=0.0, atol=SAME_M
+    )
     return alike
 
 
 def aside(engine: RayEngine, sensor: Frame, cell: int, answer: Answers) -> bool:
-    """Whether `engine` gives `answer`, of one ray, to any of 26 rays `GRAZE_M` around that of `cell`."""
+    """Whether `engine` gives `answer`, of one ray, to any of 26 rays `GRAZE_M` around that of
+    `cell`.
+    """
     cells = np.array([cell])
     places = (sensor.origin + _NUDGES).tolist()
-    return any(same(engine.cast(replace(sensor, x=x, y=y, z=z), cells), answer).item() for x, y, z in places)
+    return any(
+        same(engine.cast(replace(sensor, x=x, y=y, z=z), cells), answer).item()
+        for x, y, z in places
+    )
 
 
 def _far(frame: Frame) -> Frame:
@@ -73,7 +87,9 @@ def _far(frame: Frame) -> Frame:
 
 
 def _enlarged(kind: BodyKind) -> BodyKind:
-    parts = tuple(replace(part, size=_longer(part.size), centre=_longer(part.centre)) for part in kind.parts)
+    parts = tuple(
+        replace(part, size=_longer(part.size), centre=_longer(part.centre)) for part in kind.parts
+    )
     return replace(kind, size=_longer(kind.size), parts=parts)
 
 

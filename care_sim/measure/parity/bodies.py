@@ -1,4 +1,6 @@
-"""Bodies for random scenes: those of the catalogue, the same in other sizes, and single primitives."""
+"""Bodies for random scenes: those of the catalogue, the same in other sizes, and single
+primitives.
+"""
 
 import numpy as np
 

@@ -18,11 +18,18 @@ from care_sim.world.body_tables import SHAPES, Primitives
 from care_sim.world.bullet import BulletWorld
 
 NAME = "bullet in millimetres"
-_UNSEEN = BodyKind("unseen", None, (1.0, 1.0, 1.0), (Part("box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), (0.5, 0.5, 0.5)),))
+_UNSEEN = BodyKind(
+    "unseen",
+    None,
+    (1.0, 1.0, 1.0),
+    (Part("box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), (0.5, 0.5, 0.5)),),
+)
 
 
 class Exact(Bullet):
-    """Rays of the bodies of a world, wherever they are, asked in millimetres; pictures as Bullet draws them."""
+    """Rays of the bodies of a world, wherever they are, asked in millimetres; pictures as Bullet
+    draws them.
+    """
 
     def __init__(self, world: BulletWorld, grid: AngularGrid):
         super().__init__(world, grid)
@@ -35,7 +42,9 @@ class Exact(Bullet):
             self.close()
             self._bodies, self._exact = len(known.poses), Millimetres(_kinds(known), self._grid)
         hit = set(known.owners.tolist())
-        self._exact.place([_frame(known.poses[body]) if body in hit else AWAY for body in range(1, self._bodies)])
+        self._exact.place(
+            [_frame(known.poses[body]) if body in hit else AWAY for body in range(1, self._bodies)]
+        )
         return self._exact.cast(sensor, cells)
 
     def close(self) -> None:
@@ -63,12 +72,19 @@ def exactly() -> Iterator[str]:
 
 def _kinds(known: Primitives) -> list[BodyKind]:
     """The bodies from id 1 on, of those that rays can meet the primitives."""
-    return [_kind(known, np.flatnonzero(known.owners == body)) for body in range(1, len(known.poses))]
+    return [
+        _kind(known, np.flatnonzero(known.owners == body)) for body in range(1, len(known.poses))
+    ]
 
 
 def _kind(known: Primitives, rows: Cells) -> BodyKind:
     parts = tuple(
-        Part(SHAPES[known.shapes[row]], tuple(2 * known.halves[row]), tuple(known.offsets[row]), (0.5, 0.5, 0.5))
+        Part(
+            SHAPES[known.shapes[row]],
+            tuple(2 * known.halves[row]),
+            tuple(known.offsets[row]),
+            (0.5, 0.5, 0.5),
+        )
         for row in rows.tolist()
     )
     return BodyKind("body", None, (1.0, 1.0, 1.0), parts) if parts else _UNSEEN

@@ -47,7 +47,9 @@ def compare_episode(config: EpisodeConfig, compared: Compared) -> None:
             bullet, grid = loop.world.bullet, loop.rig.grid
             fast, reference = ENGINES["fast"](bullet, grid), ENGINES["bullet"](bullet, grid)
             while True:
-                _compare_scans(loop, Engines(fast, reference, exact), exact, config.seed, compared.rays)
+                _compare_scans(
+                    loop, Engines(fast, reference, exact), exact, config.seed, compared.rays
+                )
                 compared.pictures.compare(fast, reference, loop.rig.cameras, loop.sensor)
                 if ended:
                     break
@@ -61,7 +63,9 @@ def _exact(loop: ClosedLoop) -> Millimetres:
     return Millimetres([world.ego_kind, *(actor.kind for actor in world.actors)], loop.rig.grid)
 
 
-def _compare_scans(loop: ClosedLoop, engines: Engines, exact: Millimetres, seed: int, tally: AgreementCounts) -> None:
+def _compare_scans(
+    loop: ClosedLoop, engines: Engines, exact: Millimetres, seed: int, tally: AgreementCounts
+) -> None:
     world = loop.world
     poses = (actor.pose_at(world.time) for actor in world.actors)
     frames = [AWAY, *(Frame(x, y, 0.0, yaw) for x, y, yaw in poses)]

@@ -1,4 +1,6 @@
-"""Engines compared in whole episodes: the cells a policy fires, what is detected, how the car drives, how it ends."""
+"""Engines compared in whole episodes: the cells a policy fires, what is detected, how the car
+drives, how it ends.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -17,8 +19,8 @@ COMPARED = ("fast", "bullet")
 
 
 class Outcomes:
-    """Episodes played under both engines, and those that differ, in the outcome or at any keyframe. What ends otherwise
-    is played under Bullet in millimetres too.
+    """Episodes played under both engines, and those that differ, in the outcome or at any keyframe.
+    What ends otherwise is played under Bullet in millimetres too.
     """
 
     def __init__(self) -> None:

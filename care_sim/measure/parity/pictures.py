@@ -20,11 +20,15 @@ class Pictures:
         self.boxes = self.other_boxes = self.in_one_only = 0
         self.widest_px = 0.0
 
-    def compare(self, engine: Engine, reference: Engine, cameras: Sequence[PinholeCamera], sensor: Frame) -> None:
+    def compare(
+        self, engine: Engine, reference: Engine, cameras: Sequence[PinholeCamera], sensor: Frame
+    ) -> None:
         """Take in the pictures of a rig in the frame `sensor`."""
         for camera in cameras:
             window = (0, 0, camera.width, camera.height)
-            drawn, expected = (which.body_ids(camera, sensor, window) for which in (engine, reference))
+            drawn, expected = (
+                which.body_ids(camera, sensor, window) for which in (engine, reference)
+            )
             self.pictures += 1
             self.pixels += int(np.count_nonzero(expected != NO_BODY))
             self.other_pixels += int(np.count_nonzero(drawn != expected))

@@ -14,7 +14,9 @@ from care_sim.world.bullet import BulletWorld
 
 
 def random_scenes(seed: int, number: int, done: Callable[[int], None]) -> AgreementCounts:
-    """Verdicts on the rays of the first `number` scenes of a seed; `done` hears how many are compared."""
+    """Verdicts on the rays of the first `number` scenes of a seed; `done` hears how many are
+    compared.
+    """
     tally = AgreementCounts()
     for first in range(0, number, SCENES_A_CAST):
         some = range(first, min(first + SCENES_A_CAST, number))

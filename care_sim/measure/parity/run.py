@@ -37,19 +37,22 @@ def run(config: ParityConfig) -> int:
 
 
 def agree(report: dict[str, Any]) -> bool:
-    """Whether every difference from Bullet in millimetres has an explanation, visible boxes end within a pixel, and
-    episodes end as under Bullet.
+    """Whether every difference from Bullet in millimetres has an explanation, visible boxes end
+    within a pixel, and episodes end as under Bullet.
     """
     boxes = max((figures["widest_px"] for figures in report["pictures"].values()), default=0.0)
     return not unexplained(report) and boxes <= 1 and not report["outcomes"]["other_outcomes"]
 
 
 def measure(config: ParityConfig) -> dict[str, Any]:
-    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario, `pictures`: those
-    of every scenario, and `outcomes`: those of whole episodes.
+    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario,
+    `pictures`: those of every scenario, and `outcomes`: those of whole episodes.
     """
     random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
-    played = {name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name)) for name in SCENARIOS}
+    played = {
+        name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name))
+        for name in SCENARIOS
+    }
     ended = _shown("seeds of the paper's study", config.episodes, outcomes)
     scans = {"random scenes": random, **{name: compared.rays for name, compared in played.items()}}
     pictures = {name: compared.pictures for name, compared in played.items()}
@@ -69,6 +72,8 @@ def unexplained(report: dict[str, Any]) -> int:
     return sum(counts["unexplained"] for groups in met for counts in groups)
 
 
-def _shown(unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Compared]) -> Compared:
+def _shown(
+    unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Compared]
+) -> Compared:
     with bar(total, unit) if sys.stderr.isatty() else nullcontext(Lines(total, unit)) as show:
         return compare(total, lambda done: show(done, ""))

@@ -1,4 +1,6 @@
-"""Random scenes: bodies in any pose around a sensor in any pose, and rays aimed mostly at the bodies."""
+"""Random scenes: bodies in any pose around a sensor in any pose, and rays aimed mostly at the
+bodies.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +15,11 @@ from care_sim.world.bodies import BodyKind, Part
 BODIES = 8
 SCENES_A_CAST = 100
 """Scenes in which the same bodies stand otherwise: a world of Bullet is not made in a moment."""
-GRIDS = (AngularGrid(), AngularGrid(columns=180, rows=24), AngularGrid(columns=2048, rows=128, range_m=30.0))
+GRIDS = (
+    AngularGrid(),
+    AngularGrid(columns=180, rows=24),
+    AngularGrid(columns=2048, rows=128, range_m=30.0),
+)
 AIMED, STRAY = 24, 8
 """Rays of a scene towards points in and just around parts, and anywhere."""
 AROUND = 1.05
@@ -39,7 +45,9 @@ def draw_bodies(seed: int, cast: int) -> tuple[BodyKind, ...]:
 
 
 def draw_scene(seed: int, number: int, kinds: tuple[BodyKind, ...], grid: AngularGrid) -> Scene:
-    """The scene of a number: some of the bodies anywhere, the first of them in a place that asks for care."""
+    """The scene of a number: some of the bodies anywhere, the first of them in a place that asks
+    for care.
+    """
     rng = np.random.default_rng((seed, 1, number))
     while _is_unclear(scene := _draw_scene(rng, kinds, grid), kinds):
         pass
@@ -131,7 +139,14 @@ def _inside(rng: np.random.Generator, part: Part, grid: AngularGrid) -> tuple[Fl
     return _within(rng, part, 1.0), np.zeros(3)
 
 
-SITUATIONS: tuple[Situation, ...] = (_anywhere, _overhead, _behind, _at_the_reach, _touching, _inside)
+SITUATIONS: tuple[Situation, ...] = (
+    _anywhere,
+    _overhead,
+    _behind,
+    _at_the_reach,
+    _touching,
+    _inside,
+)
 
 
 def _within(rng: np.random.Generator, part: Part, share: float) -> Floats:
@@ -146,13 +161,19 @@ def _surface(rng: np.random.Generator, part: Part, gap: float) -> Floats:
 
 
 def _aim(
-    rng: np.random.Generator, kinds: tuple[BodyKind, ...], frames: list[Frame], sensor: Frame, grid: AngularGrid
+    rng: np.random.Generator,
+    kinds: tuple[BodyKind, ...],
+    frames: list[Frame],
+    sensor: Frame,
+    grid: AngularGrid,
 ) -> Cells:
     """Ascending cells."""
     points = []
     for body in rng.integers(len(kinds), size=AIMED):
         part = kinds[body].parts[rng.integers(len(kinds[body].parts))]
-        points.append(frames[body].origin + frames[body].vectors_to_world(_within(rng, part, AROUND)))
+        points.append(
+            frames[body].origin + frames[body].vectors_to_world(_within(rng, part, AROUND))
+        )
     cells = grid.cells_of(sensor.vectors_to_local(np.array(points) - sensor.origin))
     stray = rng.integers(grid.size, size=STRAY)
     return np.unique(np.concatenate([cells[cells >= 0], stray]))

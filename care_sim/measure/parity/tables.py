@@ -8,8 +8,10 @@ from care_sim.reports.table import Table
 
 COLUMNS = ("against", "rays", "other body", "over 1 mm off", *VERDICTS[1:], "widest gap, m")
 NOTES = (
-    "of rays 1 um aside, grazing: `fast` gives some the other's answer; lost: the other gives some that of `fast`;"
-    " tolerance: Bullet in millimetres sides with `fast`; widest gap: between ranges to the same body",
+    "of rays 1 um aside, grazing: `fast` gives some the other's answer; lost: the other gives some "
+    "that of `fast`;"
+    " tolerance: Bullet in millimetres sides with `fast`; widest gap: between ranges to the same "
+    "body",
 )
 PICTURES = {
     "pictures": "pictures",
@@ -23,25 +25,36 @@ PICTURES = {
 
 
 def tables(report: dict[str, Any]) -> list[Table]:
-    """One for random scenes and for each scenario, the notes below the last of them, one of the pictures and one of
-    the outcomes.
+    """One for random scenes and for each scenario, the notes below the last of them, one of the
+    pictures and one of the outcomes.
     """
     made = [_table(title, figures) for title, figures in report["scans"].items()]
     scans = [*made[:-1], *(replace(last, notes=NOTES) for last in made[-1:])]
     seen = [_pictures(report["pictures"])] if report["pictures"] else []
-    return [*scans, *seen, *([_outcomes(report["outcomes"])] if report["outcomes"]["episodes"] else [])]
+    return [
+        *scans,
+        *seen,
+        *([_outcomes(report["outcomes"])] if report["outcomes"]["episodes"] else []),
+    ]
 
 
 def _pictures(pictures: dict[str, Any]) -> Table:
-    rows = ((name, *(f"{figures[key]:.0f}" for key in PICTURES)) for name, figures in pictures.items())
-    return Table("Pictures of the camera against Bullet", ("scenario", *PICTURES.values()), tuple(rows))
+    rows = (
+        (name, *(f"{figures[key]:.0f}" for key in PICTURES)) for name, figures in pictures.items()
+    )
+    return Table(
+        "Pictures of the camera against Bullet", ("scenario", *PICTURES.values()), tuple(rows)
+    )
 
 
 def _table(title: str, figures: dict[str, Any]) -> Table:
     """One reference after the other, what the rays meet line by line."""
     rows: list[tuple[str, ...]] = []
     for reference, met in figures["references"].items():
-        rows += [(reference,), *(_row(group, counts) for group, counts in met.items() if counts["rays"])]
+        rows += [
+            (reference,),
+            *(_row(group, counts) for group, counts in met.items() if counts["rays"]),
+        ]
     return Table(f"{title}: {figures['scans']} scans", COLUMNS, tuple(rows))
 
 
@@ -51,9 +64,17 @@ def _row(group: str, counts: dict[str, float]) -> tuple[str, ...]:
 
 
 def _outcomes(outcomes: dict[str, Any]) -> Table:
-    columns = ("episodes", "another outcome", "also than in millimetres", "another keyframe", "keyframes")
+    columns = (
+        "episodes",
+        "another outcome",
+        "also than in millimetres",
+        "another keyframe",
+        "keyframes",
+    )
     keys = ("episodes", "other_outcomes", "other_than_exact", "other_keyframes", "keyframes")
     counts = (outcomes[key] for key in keys)
     row = tuple(str(count if isinstance(count, int) else len(count)) for count in counts)
     differing = dict.fromkeys([*outcomes["other_outcomes"], *outcomes["other_keyframes"]])
-    return Table("Episodes of the paper's study under both engines", columns, (row,), tuple(differing))
+    return Table(
+        "Episodes of the paper's study under both engines", columns, (row,), tuple(differing)
+    )

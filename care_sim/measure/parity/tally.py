@@ -11,16 +11,30 @@ from care_sim.measure.parity.verdicts import LOST, UNEXPLAINED, VERDICTS, Compar
 from care_sim.world.bodies import BodyKind
 
 FAMILIES = ("boxes", "round parts", "both")
-GROUPS = ("road or nothing", *(f"{family}, {stance}" for family in FAMILIES for stance in ("upright", "tilted")))
+GROUPS = (
+    "road or nothing",
+    *(f"{family}, {stance}" for family in FAMILIES for stance in ("upright", "tilted")),
+)
 REFERENCES = ("Bullet", "Bullet in millimetres")
 LISTED_AT_MOST = 200
 """Rays that are listed one by one."""
 
 
 def groups(kinds: Sequence[BodyKind], frames: Sequence[Frame]) -> Integers:
-    """(n + 2,) places in GROUPS of body ids -1 (nothing), 0 (the road), and 1 to n (`kinds` at `frames`)."""
+    """(n + 2,) places in GROUPS of body ids -1 (nothing), 0 (the road), and 1 to n (`kinds` at
+    `frames`).
+    """
     pairs = zip(kinds, frames, strict=True)
-    return np.array([0, 0, *(1 + 2 * _family(kind) + (frame.roll != 0 or frame.pitch != 0) for kind, frame in pairs)])
+    return np.array(
+        [
+            0,
+            0,
+            *(
+                1 + 2 * _family(kind) + (frame.roll != 0 or frame.pitch != 0)
+                for kind, frame in pairs
+            ),
+        ]
+    )
 
 
 def _family(kind: BodyKind) -> int:
@@ -43,11 +57,17 @@ class AgreementCounts:
         """Take in the rays of one scan; `name` finds it again, `groups` are those of `groups()`."""
         self.scans += 1
         ranges, ids = compared.fast
-        pairs = zip((compared.bullet, compared.exact), (compared.on_bullet, compared.on_exact), strict=True)
+        pairs = zip(
+            (compared.bullet, compared.exact), (compared.on_bullet, compared.on_exact), strict=True
+        )
         for reference, ((expected, hit), verdicts) in enumerate(pairs):
             met = groups[np.where(ids > 0, ids, hit) + 1]
             differ = ids != hit
-            gaps = np.where(differ | np.isinf(ranges), 0.0, np.abs(ranges - np.where(np.isinf(ranges), 0.0, expected)))
+            gaps = np.where(
+                differ | np.isinf(ranges),
+                0.0,
+                np.abs(ranges - np.where(np.isinf(ranges), 0.0, expected)),
+            )
             np.add.at(self.verdicts[reference], (met, verdicts), 1)
             np.add.at(self.other_ids[reference], met, differ)
             np.add.at(self.other_ranges[reference], met, gaps > SAME_M)
@@ -55,14 +75,18 @@ class AgreementCounts:
         self._list(compared, groups, name)
 
     def _list(self, compared: Compared, groups: Integers, name: dict[str, Any]) -> None:
-        strange = np.isin(compared.on_exact, (LOST, UNEXPLAINED)) | (compared.on_bullet == UNEXPLAINED)
+        strange = np.isin(compared.on_exact, (LOST, UNEXPLAINED)) | (
+            compared.on_bullet == UNEXPLAINED
+        )
         for n in np.flatnonzero(strange)[: LISTED_AT_MOST - len(self.listed)].tolist():
             self.listed.append(
                 {
                     **name,
                     "ray": n,
                     "meets": GROUPS[groups[max(compared.fast[1][n], compared.exact[1][n]) + 1]],
-                    **{key: _told(getattr(compared, key), n) for key in ("fast", "bullet", "exact")},
+                    **{
+                        key: _told(getattr(compared, key), n) for key in ("fast", "bullet", "exact")
+                    },
                     "on_bullet": VERDICTS[compared.on_bullet[n]],
                     "on_exact": VERDICTS[compared.on_exact[n]],
                 }

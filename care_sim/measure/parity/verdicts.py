@@ -10,8 +10,9 @@ from care_sim.measure.parity.answers import Answers, aside, same
 from care_sim.sensors.engines import RayEngine
 
 VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
-"""Grazing: of rays a micrometre aside `fast` gives some the reference's answer, some its own. Lost: it does not, but
-the reference gives some the answer of `fast`. Tolerance: not grazing, but Bullet in millimetres sides with `fast`.
+"""Grazing: of rays a micrometre aside `fast` gives some the reference's answer, some its own. Lost:
+it does not, but the reference gives some the answer of `fast`. Tolerance: not grazing, but Bullet
+in millimetres sides with `fast`.
 """
 SAME, GRAZING, LOST, TOLERANCE, UNEXPLAINED = range(5)
 
@@ -38,17 +39,32 @@ class Compared:
 
 def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
     """Cast ascending `cells` with all engines and judge every difference."""
-    fast, bullet, exact = (engine.cast(sensor, cells) for engine in (engines.fast, engines.bullet, engines.exact))
+    fast, bullet, exact = (
+        engine.cast(sensor, cells) for engine in (engines.fast, engines.bullet, engines.exact)
+    )
     on_exact, on_bullet = np.full(len(cells), SAME), np.full(len(cells), SAME)
     for n in np.flatnonzero(~same(fast, exact)).tolist():
-        on_exact[n] = _judge(engines.fast, engines.exact, sensor, cells[n], _only(fast, n), _only(exact, n))
+        on_exact[n] = _judge(
+            engines.fast, engines.exact, sensor, cells[n], _only(fast, n), _only(exact, n)
+        )
     for n in np.flatnonzero(~same(fast, bullet)).tolist():
-        verdict = _judge(engines.fast, engines.bullet, sensor, cells[n], _only(fast, n), _only(bullet, n))
-        on_bullet[n] = TOLERANCE if verdict != GRAZING and on_exact[n] in (SAME, GRAZING) else verdict
+        verdict = _judge(
+            engines.fast, engines.bullet, sensor, cells[n], _only(fast, n), _only(bullet, n)
+        )
+        on_bullet[n] = (
+            TOLERANCE if verdict != GRAZING and on_exact[n] in (SAME, GRAZING) else verdict
+        )
     return Compared(fast, bullet, exact, on_bullet, on_exact)
 
 
-def _judge(fast: RayEngine, reference: RayEngine, sensor: Frame, cell: int, answer: Answers, expected: Answers) -> int:
+def _judge(
+    fast: RayEngine,
+    reference: RayEngine,
+    sensor: Frame,
+    cell: int,
+    answer: Answers,
+    expected: Answers,
+) -> int:
     if aside(fast, sensor, cell, expected) and aside(fast, sensor, cell, answer):
         return GRAZING
     return LOST if aside(reference, sensor, cell, answer) else UNEXPLAINED

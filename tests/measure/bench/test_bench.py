@@ -1,4 +1,6 @@
-"""The whole measure: every figure is there and adds up; how large it is, is the machine's business."""
+"""The whole measure: every figure is there and adds up; how large it is, is the machine's
+business.
+"""
 
 import json
 import sys
@@ -51,14 +53,21 @@ def test_a_peer_without_its_library_is_left_out_in_one_line(monkeypatch):
     assert next(iter(made)) == "CARE-Dense-v0"
     assert {*CLOSED_LOOP, DRIVING} <= set(made)
     assert len(made) == len(CLOSED_LOOP) + len(ENGINES)
-    assert skipped.startswith(f"{REACHING}: panda-gym needs the extra 'bench': pip install 'care-sim[bench]'")
+    assert skipped.startswith(
+        f"{REACHING}: panda-gym needs the extra 'bench': pip install 'care-sim[bench]'"
+    )
 
 
 @pytest.mark.slow
 def test_everything_is_measured_in_every_round(measured):
     left_out = {line.partition(":")[0] for line in measured["skipped"]}
     assert {*CLOSED_LOOP, DRIVING, REACHING} <= {*measured["speed"], *left_out}
-    for figures in (*measured["speed"].values(), measured["vectorised"], measured["stages"], measured["choices"]):
+    for figures in (
+        *measured["speed"].values(),
+        measured["vectorised"],
+        measured["stages"],
+        measured["choices"],
+    ):
         assert all(len(values) == 2 and min(values) > 0 for values in figures.values())
     for figures in measured["speed"].values():
         for wall, core in zip(figures["steps_per_s"], figures["steps_per_cpu_s"], strict=True):
@@ -106,11 +115,16 @@ def test_bad_input_is_named(wrong, named):
 
 @pytest.mark.speed
 def test_no_ratio_has_fallen_behind_the_published_ones():
-    """Ratios of medians within one run, so that the machine's speed does not matter; a third is what sharing it with
-    others may cost one side. Two processes need two free cores, which a test does not have.
+    """Ratios of medians within one run, so that the machine's speed does not matter; a third is
+    what sharing it with others may cost one side. Two processes need two free cores, which a test
+    does not have.
     """
     published = json.loads(PUBLISHED.read_text())["ratios"]
     ratios = measure(BenchConfig(seconds=0.5, repeats=3, samples=100, resets=3, seeds=0))["ratios"]
     compared = set(ratios) & set(published) - {TWO_OVER_ONE}
     assert compared
-    assert {name: (ratios[name], published[name]) for name in compared if ratios[name] < published[name] * 2 / 3} == {}
+    assert {
+        name: (ratios[name], published[name])
+        for name in compared
+        if ratios[name] < published[name] * 2 / 3
+    } == {}

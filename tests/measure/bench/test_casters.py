@@ -42,7 +42,9 @@ def test_every_engine_sees_the_bodies_where_they_were_put_last(grid, opened):
         horizontal = np.hypot(*grid.directions[cells][:, :2].T) * np.cos(grid.column_width / 2)
         assert bodies.tolist() == [-1, 1, 2]
         assert ranges[0] == np.inf
-        assert ranges[1:] * horizontal[1:] == pytest.approx([30 - length / 2, 20 - width / 2], abs=1e-4)
+        assert ranges[1:] * horizontal[1:] == pytest.approx(
+            [30 - length / 2, 20 - width / 2], abs=1e-4
+        )
         ranges, bodies = caster.cast(SENSOR, down)
         assert bodies.tolist() == [0]
         assert ranges == pytest.approx([-SENSOR.z / grid.directions[down[0], 2]], abs=1e-4)
@@ -85,8 +87,12 @@ def test_a_peer_without_its_library_is_left_out_in_one_line(monkeypatch):
     figures, skipped = scans(BenchConfig(samples=2, repeats=1))
     assert set(figures["engines"]) == set(ENGINES)
     embree, mujoco = skipped
-    assert embree.startswith("Embree (Open3D): Open3D needs the extra 'open3d': pip install 'care-sim[open3d]'")
-    assert mujoco.startswith("MuJoCo: MuJoCo needs the extra 'bench': pip install 'care-sim[bench]'")
+    assert embree.startswith(
+        "Embree (Open3D): Open3D needs the extra 'open3d': pip install 'care-sim[open3d]'"
+    )
+    assert mujoco.startswith(
+        "MuJoCo: MuJoCo needs the extra 'bench': pip install 'care-sim[bench]'"
+    )
 
 
 def test_the_figures_of_a_scan_hold_together():

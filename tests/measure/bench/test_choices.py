@@ -35,5 +35,7 @@ def test_the_parts_lie_within_the_whole_and_the_policy_is_left_as_it_was():
     figures = choices(BenchConfig(samples=30, repeats=2))
     assert Care.demand is kept
     assert all(len(values) == 2 for values in figures.values())
-    for p50, p99, demand, allocation in zip(*(figures[k] for k in ("p50", "p99", "demand", "allocation")), strict=True):
+    for p50, p99, demand, allocation in zip(
+        *(figures[k] for k in ("p50", "p99", "demand", "allocation")), strict=True
+    ):
         assert 0 < max(demand, allocation) < p50 <= p99

@@ -7,7 +7,9 @@ import pytest
 from care_sim.measure.bench.core import one_core
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux keeps threads on a core")
+@pytest.mark.skipif(
+    not Path("/proc/self/task").exists(), reason="only Linux keeps threads on a core"
+)
 def test_all_threads_run_on_one_core_and_then_on_all_again():
     allowed, wait, held = os.sched_getaffinity(0), threading.Event(), []
 

@@ -2,7 +2,14 @@
 
 import pytest
 
-from care_sim.measure.bench.ratios import OVER_DRIVING, OVER_REACHING, TWO_OVER_ONE, over, ratios, same_on_grid
+from care_sim.measure.bench.ratios import (
+    OVER_DRIVING,
+    OVER_REACHING,
+    TWO_OVER_ONE,
+    over,
+    ratios,
+    same_on_grid,
+)
 from care_sim.measure.bench.targets import targets
 
 
@@ -17,14 +24,23 @@ def report():
         "config": {"scenario": "dense", "policy": "care", "budget": 0.1},
         "study": {"episodes": 49.0, "seconds": 10.0},
         "speed": {
-            "CARE-Dense-v0": {"steps_per_s": [250.0, 400.0, 900.0], "steps_per_cpu_s": [500.0, 600.0, 900.0]},
+            "CARE-Dense-v0": {
+                "steps_per_s": [250.0, 400.0, 900.0],
+                "steps_per_cpu_s": [500.0, 600.0, 900.0],
+            },
             "highway-fast-v0": {"steps_per_s": [20.0], "steps_per_cpu_s": [30.0]},
             "PandaReach-v3": {"steps_per_s": [250.0], "steps_per_cpu_s": [300.0]},
         },
         "stages": {"cast": [0.2], "camera": [1.2], "the rest": [0.6], "whole keyframe": [2.0]},
         "vectorised": {"1": [500.0], "2": [950.0]},
         "choices": {"p50": [0.3], "p99": [0.6], "demand": [0.1], "allocation": [0.15]},
-        "scans": {"engines": {"bullet": engine(2.0), "fast": engine(0.1, 0.06), "Embree (Open3D)": engine(0.25)}},
+        "scans": {
+            "engines": {
+                "bullet": engine(2.0),
+                "fast": engine(0.1, 0.06),
+                "Embree (Open3D)": engine(0.25),
+            }
+        },
         "growth": {"grid": {"ms": {"bullet": [2.0, 2.0, 2.0], "fast": [0.1, 0.1, 0.2]}}},
         "memory": {"resets": 2000, "begun_mb": 180.0, "early_mb": 230.0, "peak_mb": 260.0},
     }
@@ -60,7 +76,11 @@ def test_what_is_missed_names_what_holds_it(report):
 
 
 def test_without_engine_and_peer_nothing_is_said_of_them(report):
-    del report["scans"]["engines"]["fast"], report["growth"]["grid"]["ms"]["fast"], report["speed"]["PandaReach-v3"]
+    del (
+        report["scans"]["engines"]["fast"],
+        report["growth"]["grid"]["ms"]["fast"],
+        report["speed"]["PandaReach-v3"],
+    )
     report["ratios"] = ratios(report)
     assert set(report["ratios"]) == {
         OVER_DRIVING,

@@ -10,7 +10,8 @@ from care_sim.measure.bench.memory import worker_memory
 from care_sim.study.episode_play import peak_rss_mb
 
 COUNTED_LATE_MB = 1.0
-"""Linux counts pages in batches a core, so that a peak may read a little less than the one before."""
+"""Linux counts pages in batches a core, so that a peak may read a little less than the one
+before."""
 
 
 def test_what_the_parent_holds_is_not_counted():

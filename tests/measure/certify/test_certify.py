@@ -1,4 +1,6 @@
-"""The certificate: the list holds all that can meet, no mode changes an episode, and a break is named where it is."""
+"""The certificate: the list holds all that can meet, no mode changes an episode, and a break is
+named where it is.
+"""
 
 import sys
 from dataclasses import fields, replace
@@ -14,7 +16,17 @@ from care_sim.driving.braking import BrakingController
 from care_sim.envs import sensing
 from care_sim.measure.certify import design, needs, published, run
 from care_sim.measure.certify.config import EPISODES, CertifyConfig
-from care_sim.measure.certify.design import CLOSED, FAULTS, MODES, POLICIES, REPLAY, SETTINGS, STREET, drawn, modes
+from care_sim.measure.certify.design import (
+    CLOSED,
+    FAULTS,
+    MODES,
+    POLICIES,
+    REPLAY,
+    SETTINGS,
+    STREET,
+    drawn,
+    modes,
+)
 from care_sim.measure.certify.drive import write_drive
 from care_sim.measure.certify.modes import in_turns, play
 from care_sim.measure.certify.needs import FARTHEST, playable
@@ -50,7 +62,9 @@ def alone(episode, source=""):
 def test_a_thousand_episodes_hold_every_pair_that_can_meet():
     met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
     assert {(e, p) for e, p, _, _ in met} == set(product({*CLOSED, STREET, REPLAY}, POLICIES))
-    possible = {(e, m) for e, p in product({*CLOSED, STREET, REPLAY}, POLICIES) for m in modes(e, p)}
+    possible = {
+        (e, m) for e, p in product({*CLOSED, STREET, REPLAY}, POLICIES) for m in modes(e, p)
+    }
     assert {(e, m) for e, _, m, _ in met} == possible
     names = {name for one in (*FAULTS.values(), *SETTINGS.values()) for name in one}
     assert {(p, n) for _, p, _, given in met for n in given} >= set(product(POLICIES, names))
@@ -61,7 +75,9 @@ def test_a_thousand_episodes_hold_every_pair_that_can_meet():
 
 
 def test_every_fault_of_the_conditions_is_in_the_list():
-    faults = {field.name for kind in (CameraFaults, LidarFaults) for field in fields(kind)} | {"ego_speed_sigma"}
+    faults = {field.name for kind in (CameraFaults, LidarFaults) for field in fields(kind)} | {
+        "ego_speed_sigma"
+    }
     assert {name for one in FAULTS.values() for name in one} == faults
 
 
@@ -87,7 +103,9 @@ def test_recordings_and_privileged_policies_play_in_vectors_too(source):
     assert play("async", recorded, source) == play("sync", recorded, source) == trails
     beyond = replace(recorded[0], policy="history-oracle", keyframes=40)
     assert play("sync", [beyond], source) == [alone(beyond, source)]
-    privileged = of([e for e in LIST if e.policy == "history-oracle" and e.environment in CLOSED], 3)
+    privileged = of(
+        [e for e in LIST if e.policy == "history-oracle" and e.environment in CLOSED], 3
+    )
     assert play("sync", privileged, source) == [alone(episode) for episode in privileged]
 
 
@@ -113,7 +131,9 @@ def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch
 
 
 @pytest.mark.parametrize(("module", "extra"), [("open3d", "open3d"), ("stable_baselines3", "rl")])
-def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(module, extra, monkeypatch, capsys):
+def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
+    module, extra, monkeypatch, capsys
+):
     able, lines = playable(LIST)
     assert (able, lines) == (LIST, [])
     monkeypatch.setitem(sys.modules, module, None)
@@ -123,7 +143,9 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(module, extra,
     assert line.startswith(f"{missing} of 1,000 not played: ")
     assert f"extra '{extra}'" in line
     trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(1000)]
-    monkeypatch.setattr(run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers})
+    monkeypatch.setattr(
+        run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers}
+    )
     monkeypatch.setattr(run, "read", lambda: trails)
     assert run.run(CertifyConfig(workers=1)) == 0
     told = capsys.readouterr()
@@ -231,7 +253,9 @@ def another_outcome(monkeypatch):
     from care_sim.measure.certify import trail
 
     judge = trail.outcome
-    monkeypatch.setattr(trail, "outcome", lambda keyframes: replace(judge(keyframes), clearance_m=12.3))
+    monkeypatch.setattr(
+        trail, "outcome", lambda keyframes: replace(judge(keyframes), clearance_m=12.3)
+    )
 
 
 @pytest.mark.parametrize(
@@ -301,7 +325,9 @@ def test_the_combined_hash_is_over_the_order_of_the_numbers():
 
 def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     file = tmp_path / "list.parquet"
-    with pytest.raises(InvalidInput, match=r"^the list of certify is missing: install the package again$"):
+    with pytest.raises(
+        InvalidInput, match=r"^the list of certify is missing: install the package again$"
+    ):
         published.read(file)
     published.write([b"12345678" + b"x"], file)
     assert published.read(file) == [b"12345678x"]
@@ -312,7 +338,9 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
 
 def test_some_of_the_list_goes_as_published():
     """A short form of the certificate; `care-sim certify` is the whole."""
-    short = [episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12]
+    short = [
+        episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12
+    ]
     chosen = [one.number for mode in MODES for one in [e for e in short if e.mode == mode][:5]]
     verdict = compare(played(chosen, 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
@@ -334,4 +362,7 @@ def test_an_episode_of_a_street_goes_as_published():
 
 def test_the_readme_tells_the_hash_of_the_list():
     readme = ROOT / "README.md"
-    assert f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}" in readme.read_text()
+    assert (
+        f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}"
+        in readme.read_text()
+    )

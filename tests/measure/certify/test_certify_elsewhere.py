@@ -14,10 +14,13 @@ from care_sim.measure.certify.trail import stage
 from tests.helpers.places import ROOT
 from tests.helpers.processor_features import reduced
 
-NUMBERS = [n for n in range(150) if drawn(n).environment != STREET and drawn(n).keyframes <= 16][:60]
+NUMBERS = [n for n in range(150) if drawn(n).environment != STREET and drawn(n).keyframes <= 16][
+    :60
+]
 ALIKE = 0.95
-"""The share of episodes that nothing of a processor changes, at the least: a last bit still decides where the edge of a
-picture lies on a border between columns, and Bullet's rays against round bodies differ by more than last bits."""
+"""The share of episodes that nothing of a processor changes, at the least: a last bit still decides
+where the edge of a picture lies on a border between columns, and Bullet's rays against round bodies
+differ by more than last bits."""
 
 
 def played(folder):
@@ -29,7 +32,8 @@ def played(folder):
 def test_a_processor_of_fewer_features_plays_most_episodes_as_this_one(tmp_path):
     line = (
         "import json; from tests.measure.certify import test_certify_elsewhere as t; "
-        f"print(json.dumps({{n: trail.hex() for n, trail in t.played({str(tmp_path / 'there')!r}).items()}}))"
+        f"trails = t.played({str(tmp_path / 'there')!r}); "
+        "print(json.dumps({n: trail.hex() for n, trail in trails.items()}))"
     )
     child = subprocess.run(
         [sys.executable, "-c", line],
@@ -39,7 +43,12 @@ def test_a_processor_of_fewer_features_plays_most_episodes_as_this_one(tmp_path)
         text=True,
         check=True,
     )
-    theirs = {int(n): bytes.fromhex(trail) for n, trail in json.loads(child.stdout.splitlines()[-1]).items()}
+    theirs = {
+        int(n): bytes.fromhex(trail)
+        for n, trail in json.loads(child.stdout.splitlines()[-1]).items()
+    }
     ours = played(tmp_path / "here")
-    apart = {n: (drawn(n).text, *stage(ours[n], theirs[n])) for n in NUMBERS if ours[n] != theirs[n]}
+    apart = {
+        n: (drawn(n).text, *stage(ours[n], theirs[n])) for n in NUMBERS if ours[n] != theirs[n]
+    }
     assert len(apart) <= (1 - ALIKE) * len(NUMBERS), apart

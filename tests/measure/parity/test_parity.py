@@ -84,7 +84,11 @@ def test_rays_count_where_they_end(street):
     frames = [Frame(20.0, 0.0, 0.0, 0.0)]
     tally.add(compared, groups([CATALOGUE["bus"]], frames), {"scene": 3})
     counts = tally.figures()["references"]["Bullet in millimetres"]
-    assert counts["boxes, upright"]["rays"] == counts["boxes, upright"]["same"] == np.sum(compared.fast[1] == 1)
+    assert (
+        counts["boxes, upright"]["rays"]
+        == counts["boxes, upright"]["same"]
+        == np.sum(compared.fast[1] == 1)
+    )
     assert sum(count["rays"] for count in counts.values()) == GRID.size
     assert tally.listed == []
 
@@ -94,7 +98,12 @@ def test_a_difference_is_listed_with_its_scene(street):
     askew = compare(replace(street, fast=Askew(street.fast)), SENSOR, np.array([6 * 180 + 90]))
     tally.add(askew, groups([CATALOGUE["bus"]], [Frame(20.0, 0.0, 0.0, 0.0)]), {"scene": 3})
     (line,) = tally.listed
-    assert (line["scene"], line["ray"], line["meets"], line["on_exact"]) == (3, 0, "boxes, upright", "unexplained")
+    assert (line["scene"], line["ray"], line["meets"], line["on_exact"]) == (
+        3,
+        0,
+        "boxes, upright",
+        "unexplained",
+    )
     assert line["exact"]["m"] - line["fast"]["m"] == pytest.approx(0.01, abs=1e-3)
     assert unexplained({"scans": {"one": tally.figures()}}) == 1
 
@@ -117,7 +126,9 @@ def test_a_scene_is_drawn_again_from_its_number():
 
 def test_every_keyframe_of_an_episode_is_scanned_in_full():
     compared = Compared()
-    compare_episode(EpisodeConfig("dense", "care", 0.1, 0, scenario_parameters=(("duration_s", 0.2),)), compared)
+    compare_episode(
+        EpisodeConfig("dense", "care", 0.1, 0, scenario_parameters=(("duration_s", 0.2),)), compared
+    )
     tally = compared.rays
     assert tally.scans == compared.pictures.pictures == 3
     assert compared.pictures.boxes > 10
@@ -163,7 +174,14 @@ def test_pictures_that_agree_and_that_do_not(bullet):
     seen = Pictures()
     seen.compare(fast, reference, [FRONT_CAMERA, PinholeCamera(100, 80)], SENSOR)
     assert body == 1
-    counts = {"pictures": 2, "boxes": 2, "other_boxes": 0, "other_pixels": 0, "in_one_only": 0, "widest_px": 0}
+    counts = {
+        "pictures": 2,
+        "boxes": 2,
+        "other_boxes": 0,
+        "other_pixels": 0,
+        "in_one_only": 0,
+        "widest_px": 0,
+    }
     assert {name: seen.figures()[name] for name in counts} == counts
     seen.compare(Shifted(fast), reference, [FRONT_CAMERA], SENSOR)
     assert (seen.figures()["other_boxes"], seen.figures()["widest_px"]) == (1, 2)
@@ -171,7 +189,9 @@ def test_pictures_that_agree_and_that_do_not(bullet):
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-@pytest.mark.parametrize("changes", [{}, {"camera_latency": 1, "camera_rotation_sigma_deg": 1.0, "lidar_dropout": 0.1}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"camera_latency": 1, "camera_rotation_sigma_deg": 1.0, "lidar_dropout": 0.1}]
+)
 def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
     outcomes = Outcomes()
     outcomes.compare(EpisodeConfig(scenario, "care", 0.05, 7, **changes))
@@ -184,7 +204,9 @@ def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
 
 def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
     monkeypatch.setattr(parity_outcomes, "COMPARED", ("fast", "nearsighted"))
-    monkeypatch.setitem(ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid)))
+    monkeypatch.setitem(
+        ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid))
+    )
     config, outcomes = EpisodeConfig("dense", "care", 0.1, 0), Outcomes()
     outcomes.compare(config)
     label = config.changed(engine="fast").label
@@ -193,7 +215,9 @@ def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
 
 
 def test_a_ray_that_bullet_alone_widens_is_decided_in_millimetres():
-    """The third ray that meets the person at keyframe 39 passes her head by less than Bullet's tolerance."""
+    """The third ray that meets the person at keyframe 39 passes her head by less than Bullet's
+    tolerance.
+    """
     outcomes = Outcomes()
     outcomes.compare(EpisodeConfig("dense", "all-camera", 0.03, 25))
     assert len(outcomes.other_outcomes) == 1
@@ -214,7 +238,11 @@ class Nearsighted:
 def report_of(rays=0, box_px=1.0, outcomes=()):
     counts = {"references": {"Bullet in millimetres": {"boxes, upright": {"unexplained": rays}}}}
     ended = {"other_outcomes": list(outcomes), "other_keyframes": ["a"], "other_than_exact": []}
-    return {"scans": {"one": counts}, "pictures": {"dense": {"widest_px": box_px}}, "outcomes": ended}
+    return {
+        "scans": {"one": counts},
+        "pictures": {"dense": {"widest_px": box_px}},
+        "outcomes": ended,
+    }
 
 
 def test_engines_agree_when_nothing_is_left_to_explain():

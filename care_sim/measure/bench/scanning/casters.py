@@ -17,7 +17,9 @@ from care_sim.world.bullet import BulletWorld
 
 
 class Caster(Protocol):
-    """Casts the rays of a grid at bodies of its own: the ground is 0, the others count from 1 in the order given."""
+    """Casts the rays of a grid at bodies of its own: the ground is 0, the others count from 1 in
+    the order given.
+    """
 
     def place(self, poses: Floats) -> None:
         """Move all bodies: (n, 3) x, y, heading."""
@@ -28,7 +30,10 @@ class Caster(Protocol):
         ...
 
 
-PEERS: dict[str, Callable[[Sequence[BodyKind], AngularGrid], Caster]] = {"Embree (Open3D)": Embree, "MuJoCo": MuJoCo}
+PEERS: dict[str, Callable[[Sequence[BodyKind], AngularGrid], Caster]] = {
+    "Embree (Open3D)": Embree,
+    "MuJoCo": MuJoCo,
+}
 
 
 class OverWorld:
@@ -48,8 +53,12 @@ class OverWorld:
         return self._engine.cast(sensor, cells)
 
 
-def casters(kinds: Sequence[BodyKind], grid: AngularGrid, opened: ExitStack) -> tuple[dict[str, Caster], list[str]]:
-    """Every engine over bodies of these kinds, and in one line each what is left out; `opened` frees them."""
+def casters(
+    kinds: Sequence[BodyKind], grid: AngularGrid, opened: ExitStack
+) -> tuple[dict[str, Caster], list[str]]:
+    """Every engine over bodies of these kinds, and in one line each what is left out; `opened`
+    frees them.
+    """
     made: dict[str, Caster] = {}
     for name in ENGINES:
         caster = OverWorld(name, kinds, grid)

@@ -12,8 +12,8 @@ from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.bullet import NO_BODY
 
 ROUND = 8
-"""Sides of a cylinder. More would hold Embree up, which builds its tree anew every scan, and move a ray on the leg
-of a person by 6 mm at most.
+"""Sides of a cylinder. More would hold Embree up, which builds its tree anew every scan, and move a
+ray on the leg of a person by 6 mm at most.
 """
 GROUND_M = 200.0
 
@@ -28,7 +28,9 @@ class Embree:
         owners = [0, *(body for body, kind in enumerate(kinds, 1) for _ in kind.parts)]
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])[:-1]
         self._vertices = np.concatenate([vertices for vertices, _ in meshes])
-        triangles = np.concatenate([t + start for (_, t), start in zip(meshes, starts, strict=True)])
+        triangles = np.concatenate(
+            [t + start for (_, t), start in zip(meshes, starts, strict=True)]
+        )
         self._triangles = self._open3d.core.Tensor(triangles.astype(np.uint32))
         self._vertex_owner = np.repeat(owners, [len(vertices) for vertices, _ in meshes])
         self._triangle_owner = np.repeat(owners, [len(triangles) for _, triangles in meshes])
@@ -40,12 +42,17 @@ class Embree:
         placed[:, 0] += x
         placed[:, 1] += y
         self._scene = self._open3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(self._open3d.core.Tensor(placed.astype(np.float32)), self._triangles)
+        self._scene.add_triangles(
+            self._open3d.core.Tensor(placed.astype(np.float32)), self._triangles
+        )
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges (n,) in metres, inf without a hit, and body ids (n,), -1 there."""
         rays = np.empty((len(cells), 6), np.float32)
-        rays[:, :3], rays[:, 3:] = sensor.origin, sensor.vectors_to_world(self._grid.directions[cells])
+        rays[:, :3], rays[:, 3:] = (
+            sensor.origin,
+            sensor.vectors_to_world(self._grid.directions[cells]),
+        )
         hits = self._scene.cast_rays(self._open3d.core.Tensor(rays), nthreads=1)
         ranges = hits["t_hit"].numpy().astype(np.float64)
         met = ranges <= self._grid.range_m
@@ -69,5 +76,7 @@ class Embree:
 
 
 def _ground() -> tuple[Floats, Integers]:
-    corners = GROUND_M * np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+    corners = GROUND_M * np.array(
+        [[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]]
+    )
     return corners, np.array([[0, 1, 2], [0, 2, 3]])

@@ -17,7 +17,10 @@ class MuJoCo:
     def __init__(self, kinds: Sequence[BodyKind], grid: AngularGrid):
         self._grid = grid
         self._mujoco = mujoco = import_mujoco()
-        shapes = {name: getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}") for name in ("box", "cylinder", "sphere")}
+        shapes = {
+            name: getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")
+            for name in ("box", "cylinder", "sphere")
+        }
         specification = mujoco.MjSpec()
         specification.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
         for kind in kinds:
@@ -42,7 +45,18 @@ class MuJoCo:
         n, reach = len(cells), self._grid.range_m
         geoms, ranges = np.empty(n, np.int32), np.empty(n)
         self._mujoco.mj_multiRay(
-            self._model, self._data, sensor.origin, directions, None, True, -1, geoms, ranges, None, n, reach
+            self._model,
+            self._data,
+            sensor.origin,
+            directions,
+            None,
+            True,
+            -1,
+            geoms,
+            ranges,
+            None,
+            n,
+            reach,
         )
         met = (geoms >= 0) & (ranges <= reach)
         return np.where(met, ranges, np.inf), np.where(met, self._model.geom_bodyid[geoms], NO_BODY)

@@ -22,9 +22,9 @@ SAME_M = 0.001
 
 
 def scans(config: BenchConfig) -> tuple[dict[str, Any], list[str]]:
-    """Of every engine the medians of every round, in ms: `poses_ms` to move all bodies, `cast_ms` to answer the rays,
-    `scan_ms` for both; `rays_per_s` of the scan; `same_body` and `same_range`, shares of the rays answered as Bullet
-    answers them. And what is left out, in one line each.
+    """Of every engine the medians of every round, in ms: `poses_ms` to move all bodies, `cast_ms`
+    to answer the rays, `scan_ms` for both; `rays_per_s` of the scan; `same_body` and `same_range`,
+    shares of the rays answered as Bullet answers them. And what is left out, in one line each.
     """
     grid, bodies = AngularGrid(), street(BODIES, config.seed)
     cells = drawn_cells(grid, budget_cells(config.budget, grid.size), config.seed)
@@ -33,7 +33,8 @@ def scans(config: BenchConfig) -> tuple[dict[str, Any], list[str]]:
         answers = agreement(made, bodies, cells)
         rounds = [laps(made, bodies, cells, config.samples) for _ in range(config.repeats)]
     figures = {
-        name: _figures(np.median([times[name] for times in rounds], axis=1), len(cells)) | answers[name]
+        name: _figures(np.median([times[name] for times in rounds], axis=1), len(cells))
+        | answers[name]
         for name in made
     }
     return {"rays": len(cells), "bodies": BODIES, "engines": figures}, skipped
@@ -44,8 +45,12 @@ def drawn_cells(grid: AngularGrid, number: int, seed: int) -> Cells:
     return np.sort(np.random.default_rng(seed).permutation(grid.size)[:number])
 
 
-def agreement(made: Mapping[str, Caster], bodies: Street, cells: Cells) -> dict[str, dict[str, float]]:
-    """How far every engine answers as Bullet does, over bodies that have moved; it also warms every engine up."""
+def agreement(
+    made: Mapping[str, Caster], bodies: Street, cells: Cells
+) -> dict[str, dict[str, float]]:
+    """How far every engine answers as Bullet does, over bodies that have moved; it also warms every
+    engine up.
+    """
     answers = {}
     for name, caster in made.items():
         for number in range(2):
@@ -61,8 +66,12 @@ def agreement(made: Mapping[str, Caster], bodies: Street, cells: Cells) -> dict[
     }
 
 
-def laps(made: Mapping[str, Caster], bodies: Street, cells: Cells, samples: int) -> dict[str, Floats]:
-    """(samples, 3) seconds of poses, cast and both, of every engine; the engines take turns, scan by scan."""
+def laps(
+    made: Mapping[str, Caster], bodies: Street, cells: Cells, samples: int
+) -> dict[str, Floats]:
+    """(samples, 3) seconds of poses, cast and both, of every engine; the engines take turns, scan
+    by scan.
+    """
     times = {name: np.empty((samples, 3)) for name in made}
     for number in range(samples):
         poses = bodies.at(number)
@@ -79,4 +88,9 @@ def laps(made: Mapping[str, Caster], bodies: Street, cells: Cells, samples: int)
 def _figures(seconds: Floats, rays: int) -> dict[str, Any]:
     """Figures of an engine from its medians (rounds, 3)."""
     poses, cast, both = (1e3 * seconds.T).tolist()
-    return {"poses_ms": poses, "cast_ms": cast, "scan_ms": both, "rays_per_s": (rays / seconds[:, 2]).tolist()}
+    return {
+        "poses_ms": poses,
+        "cast_ms": cast,
+        "scan_ms": both,
+        "rays_per_s": (rays / seconds[:, 2]).tolist(),
+    }

@@ -19,7 +19,9 @@ SENSOR = Frame(0.0, 0.0, LIDAR_POSITION[2], 0.0)
 
 @dataclass(frozen=True)
 class Street:
-    """`kinds` of the n bodies and where they stand on average: `poses` (n, 3) as x, y and heading."""
+    """`kinds` of the n bodies and where they stand on average: `poses` (n, 3) as x, y and
+    heading.
+    """
 
     kinds: tuple[BodyKind, ...]
     poses: Floats
@@ -39,4 +41,6 @@ def street(bodies: int, seed: int) -> Street:
     distance = np.sqrt(rng.uniform(NEAREST_M**2, FARTHEST_M**2, bodies))
     bearing, heading = rng.uniform(-np.pi, np.pi, (2, bodies))
     kinds = tuple(CATALOGUE[CLASSES[number % len(CLASSES)]] for number in range(bodies))
-    return Street(kinds, np.column_stack([distance * np.cos(bearing), distance * np.sin(bearing), heading]))
+    return Street(
+        kinds, np.column_stack([distance * np.cos(bearing), distance * np.sin(bearing), heading])
+    )
