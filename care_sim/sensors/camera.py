@@ -14,7 +14,7 @@ from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
-from care_sim.sensors.engines.picture_kernels import tally
+from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool, FalseBoxes
 from care_sim.world.bullet import PixelWindow
 
@@ -49,7 +49,7 @@ class Picture:
         """Read the box of every body off a picture of ids (height, width), all of it or that of a
         window.
         """
-        table = tally(ids)
+        table = visible_boxes(ids)
         left, top = window[:2] if window is not None else (0, 0)
         return cls(
             table[:, 0], table[:, 1:5] + np.array([left, top, left, top], float), table[:, 5]
@@ -95,7 +95,7 @@ class CameraDetector:
         cameras: Sequence[PinholeCamera],
         pool: BoxPool = EMPTY_POOL,
     ):
-        # Every fault has a random stream of its own: switching one on leaves the others as they are.
+        # Every fault has a random stream of its own: one switched on leaves the others as they are.
         false_boxes, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
         self._objects = np.asarray(objects, np.int64)
         self._sensing = sensing

@@ -8,53 +8,109 @@ and row j at v = j + 1, outlines included, and so does this.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.world.bullet import NO_BODY
+from care_sim.core.frames import Floats, Integers
+from care_sim.sensors.engines.geometry_kernels import body_axes, dot
+from care_sim.world.bullet import NO_BODY, PixelWindow
+
+
+class PlacedCamera(NamedTuple):
+    """A camera in the world: its `place` (3,) and its `axes` (3, 3), rows forward, left and up."""
+
+    place: Floats
+    axes: Floats
+
+
+class Lens(NamedTuple):
+    """Focal length and principal point, `across` from the left and `down` from the top, pixels."""
+
+    focal: float
+    across: float
+    down: float
+
+
+class Meshes(NamedTuple):
+    """The polyhedra of parts one after the other, in the frames of their bodies, as in
+    `care_sim.world.polyhedra.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
+    and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
+    within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
+    (k,) body ids.
+    """
+
+    corners: Floats
+    faces: Floats
+    edges: Integers
+    starts: Integers
+    owners: Integers
+
+
+class BodyInCamera(NamedTuple):
+    """From the frame of a body to that of a camera: first `turn` (3, 3), then `shift` (3,)."""
+
+    turn: Floats
+    shift: Floats
 
 
 @compiled(error_model="numpy")
-def paint(camera, lens, window, reach, meshes, poses):  # type: ignore[no-untyped-def]
+def draw_bodies(
+    camera: tuple[Floats, Floats],
+    lens: tuple[float, float, float],
+    window: PixelWindow,
+    depths: tuple[float, float],
+    meshes: tuple[Floats, Floats, Integers, Integers, Integers],
+    poses: Floats,
+) -> Integers:
     """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NO_BODY where
     none is.
 
-    `camera` is its place in the world (3,) and its axes forward, left and up (3, 3); `lens` its
-    focal length and principal point in pixels; `reach` the least and the greatest depth drawn in
-    metres; `meshes` the tables of `care_sim.world.polyhedra.Polyhedra`; `poses` (m, 7) of
+    `camera` holds the fields of `PlacedCamera`, `lens` those of `Lens`, `meshes` those of `Meshes`;
+    `depths` are the least and the greatest depth drawn in metres; `poses` (m, 7) are those of
     bodies by id.
     """
+    # Fields get their names here: numba takes microseconds to type each named tuple of Python, and
+    # next to none for plain ones.
+    eye, optics, table = PlacedCamera(*camera), Lens(*lens), Meshes(*meshes)
     left, top, right, bottom = window
-    corners, faces, edges, starts, owners = meshes
+    nearest, farthest = depths
     ids = np.full((bottom - top, right - left), NO_BODY)
-    inverse_depths = np.full(ids.shape, 1.0 / reach[1])
-    for part, owner in enumerate(owners):
-        begin, end = starts[part], starts[part + 1]
-        turn, shift = _seen_from(camera, poses[owner])
-        upper, lower = _rows(corners[begin[0] : end[0]], turn, shift, lens, reach[0])
+    inverse_depths = np.full(ids.shape, 1.0 / farthest)
+
+    for part, owner in enumerate(table.owners):
+        begin, end = table.starts[part], table.starts[part + 1]
+        body = _seen_from(eye, poses[owner])
+        upper, lower = _rows(table.corners[begin[0] : end[0]], body, optics, nearest)
         upper, lower = max(upper, top), min(lower, bottom)
-        if upper < lower:
-            planes = _planes(faces[begin[1] : end[1]], turn, shift, lens)
-            towards, outline = _outline(planes, edges[begin[2] : end[2]])
-            for row in range(upper, lower):
-                first, last = _span(outline, row + 1.0, left, right)
-                for column in range(first, last):
-                    inverse = _surface(towards, column, row + 1.0)
-                    if inverse_depths[row - top, column - left] <= inverse <= 1.0 / reach[0]:
-                        inverse_depths[row - top, column - left] = inverse
-                        ids[row - top, column - left] = owner
+        if upper >= lower:
+            continue
+
+        # The depth test: what is nearer than all before it, at an inverse depth within the bounds,
+        # takes the pixel. Of equal depths the later part does.
+        planes = _planes(table.faces[begin[1] : end[1]], body, optics)
+        towards, outline = _outline(planes, table.edges[begin[2] : end[2]])
+        for row in range(upper, lower):
+            first, last = _span(outline, row + 1.0, left, right)
+            for column in range(first, last):
+                inverse = _surface(towards, column, row + 1.0)
+                if inverse_depths[row - top, column - left] <= inverse <= 1.0 / nearest:
+                    inverse_depths[row - top, column - left] = inverse
+                    ids[row - top, column - left] = owner
     return ids
 
 
 @compiled()
-def tally(ids):  # type: ignore[no-untyped-def]
-    """(n, 6) the bodies in a picture of ids in ascending order: id, left, top, right, bottom of the
-    box that holds all its pixels, and their number.
+def visible_boxes(ids: Integers) -> Integers:
+    """(n, 6) the bodies in a picture of ids (height, width) in ascending order: id; left, top,
+    right, bottom of the box that holds all its pixels; their number.
     """
     highest = -1
     for body in ids.flat:
-        highest = max(highest, body)
+        highest = max(highest, int(body))
+
+    # One row per possible id: ids are small, and a table is faster than a search.
     found = np.zeros((highest + 1, 6), np.int64)
     for row, line in enumerate(ids):
         for column, body in enumerate(line):
@@ -62,78 +118,73 @@ def tally(ids):  # type: ignore[no-untyped-def]
                 one = found[body]
                 if one[5] == 0:
                     one[:5] = body, column, row, column, row
+                # Rows come in order, so the top stays as it began, and the bottom is this row's.
                 one[1], one[3], one[4] = min(one[1], column), max(one[3], column + 1), row + 1
                 one[5] += 1
     return found[found[:, 5] > 0]
 
 
 @compiled()
-def _seen_from(camera, pose):  # type: ignore[no-untyped-def]
-    """Turn (3, 3) and shift (3,) from the frame of a body at `pose` to that of the camera."""
-    place, axes = camera
-    body, turn, shift = _turn(pose[3], pose[4], pose[5], pose[6]), np.empty((3, 3)), np.empty(3)
+def _seen_from(camera: PlacedCamera, pose: Floats) -> BodyInCamera:
+    """A body at `pose` (7,) as the camera sees it."""
+    place, axes = camera.place, camera.axes
+    body = body_axes(pose[3], pose[4], pose[5], pose[6])
+    turn, shift = np.empty((3, 3)), np.empty(3)
     for i in range(3):
-        shift[i] = _dot(axes[i], (pose[0] - place[0], pose[1] - place[1], pose[2] - place[2]))
+        shift[i] = dot(axes[i], (pose[0] - place[0], pose[1] - place[1], pose[2] - place[2]))
         for j in range(3):
-            turn[i, j] = _dot(axes[i], body[j])
-    return turn, shift
+            turn[i, j] = dot(axes[i], body[j])
+    return BodyInCamera(turn, shift)
 
 
 @compiled()
-def _turn(x, y, z, w):  # type: ignore[no-untyped-def]
-    """The axes that the unit quaternion (x, y, z, w) gives a body, in the world."""
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
-        (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
-        (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
-
-
-@compiled()
-def _rows(corners, turn, shift, lens, nearest):  # type: ignore[no-untyped-def]
+def _rows(corners: Floats, body: BodyInCamera, lens: Lens, nearest: float) -> tuple[int, int]:
     """First row of a polyhedron and the one after its last; all rows when it reaches through the
-    image plane.
+    plane at the depth `nearest`.
     """
-    focal, _, middle = lens
+    turn, shift = body.turn, body.shift
     high, low, behind = math.inf, -math.inf, 0
     for corner in corners:
-        depth = shift[0] + _dot(turn[0], corner)
+        depth = shift[0] + dot(turn[0], corner)
         if depth < nearest:
             behind += 1
         else:
-            v = middle - focal * (shift[2] + _dot(turn[2], corner)) / depth
+            v = lens.down - lens.focal * (shift[2] + dot(turn[2], corner)) / depth
             high, low = min(high, v), max(low, v)
+
+    # The picture is as high as twice the principal point is down. Row j is sampled at v = j + 1.
     if behind == len(corners):
         return 0, 0
     if behind > 0:
-        return 0, math.ceil(2 * middle)
-    return math.floor(min(max(high, 0.0), 2 * middle)) - 1, math.ceil(
-        max(min(low, 2 * middle), 0.0)
-    )
+        return 0, math.ceil(2 * lens.down)
+    first = math.floor(min(max(high, 0.0), 2 * lens.down)) - 1
+    return first, math.ceil(max(min(low, 2 * lens.down), 0.0))
 
 
 @compiled(error_model="numpy")
-def _planes(faces, turn, shift, lens):  # type: ignore[no-untyped-def]
-    """(f, 4) what is added a column and a row to the inverse depth of each face, what that is at
-    pixel (0, 0), and the distance of the face before the camera, negative where it is turned
+def _planes(faces: Floats, body: BodyInCamera, lens: Lens) -> Floats:
+    """(f, 4) what is added per column and per row to the inverse depth of each face, what that is
+    at pixel (0, 0), and the distance of the face before the camera, negative where it is turned
     towards it.
     """
-    focal, across, down = lens
+    turn, shift = body.turn, body.shift
     planes = np.empty((len(faces), 4))
     for n, face in enumerate(faces):
-        ahead, left, up = _dot(turn[0], face), _dot(turn[1], face), _dot(turn[2], face)
+        ahead, left, up = dot(turn[0], face), dot(turn[1], face), dot(turn[2], face)
         offset = face[3] + ahead * shift[0] + left * shift[1] + up * shift[2]
-        planes[n, 0], planes[n, 1] = -left / focal / offset, -up / focal / offset
-        planes[n, 2] = (ahead + (left * across + up * down) / focal) / offset
+        planes[n, 0], planes[n, 1] = -left / lens.focal / offset, -up / lens.focal / offset
+        planes[n, 2] = (ahead + (left * lens.across + up * lens.down) / lens.focal) / offset
         planes[n, 3] = offset
     return planes
 
 
 @compiled()
-def _outline(planes, edges):  # type: ignore[no-untyped-def]
+def _outline(planes: Floats, edges: Integers) -> tuple[Floats, Floats]:
     """The planes that are turned towards the camera, and the outline: lines (m, 3) that are
     positive inside.
     """
+    # Along an edge its two faces have one inverse depth, so their difference is 0 there, and inside
+    # the face towards the camera has the smaller one.
     lines, count = np.empty((len(edges), 3)), 0
     for one, other in edges:
         if planes[one, 3] < 0.0 <= planes[other, 3]:
@@ -144,7 +195,7 @@ def _outline(planes, edges):  # type: ignore[no-untyped-def]
 
 
 @compiled(error_model="numpy")
-def _span(outline, v, left, right):  # type: ignore[no-untyped-def]
+def _span(outline: Floats, v: float, left: int, right: int) -> tuple[int, int]:
     """The first column inside an outline in the row at `v` and the one after the last."""
     first, last = float(left), right - 1.0
     for slope, rise, start in outline:
@@ -159,14 +210,9 @@ def _span(outline, v, left, right):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _surface(towards, u, v):  # type: ignore[no-untyped-def]
+def _surface(towards: Floats, u: float, v: float) -> float:
     """The inverse depth of a polyhedron at a pixel inside its outline."""
     inverse = math.inf
     for n in range(len(towards)):
         inverse = min(inverse, towards[n, 2] + towards[n, 0] * u + towards[n, 1] * v)
     return inverse
-
-
-@compiled()
-def _dot(one, other):  # type: ignore[no-untyped-def]
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

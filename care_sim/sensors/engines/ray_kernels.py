@@ -1,65 +1,124 @@
-"""Rays of a scan against the road and the parts of bodies, boxes, cylinders and spheres, compiled.
+"""Rays of a scan against the road and the parts of bodies: boxes, cylinders and spheres, compiled.
 
 A box is cut out by three slabs (Kay and Kajiya 1986), a cylinder by a tube and a slab. A ray that
 starts inside a solid does not enter it: Bullet's rays answer the same.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from care_sim.base.compiled import compiled
+from care_sim.core.frames import Floats, Integers
+from care_sim.core.grid import Cells
+from care_sim.core.grid_kernels import GridSpacing
+from care_sim.sensors.engines.geometry_kernels import Axes, Vector, dot
+from care_sim.sensors.engines.window_kernels import Parts, SensorPose, place_parts
 from care_sim.world.bullet import NO_BODY
 
 BOX, CYLINDER, SPHERE = range(3)
 """Places in `care_sim.world.body_tables.SHAPES`."""
 
+Stretch = tuple[float, float]
+"""Where a ray enters and leaves, as distances along it; the first is the larger where it misses."""
+
+
+class Fan(NamedTuple):
+    """Cosine and sine of the azimuth of every column `across` (columns, 2), and of the elevation of
+    every row `down` (rows, 2). They are fewer than the directions of all cells, and so nearer at
+    hand in the processor's cache.
+    """
+
+    across: Floats
+    down: Floats
+
+
+class Road(NamedTuple):
+    """The plane z = 0 of the world: the world's `up` (3,) in the frame of the sensor, the `height`
+    of the sensor in metres, and the `body` id of the ground, NO_BODY without one.
+    """
+
+    up: Floats
+    height: float
+    body: int
+
+
+class Solid(NamedTuple):
+    """A part as rays meet it: its `axes` in the frame of the sensor, its half extents `half`, and
+    the sensor in the frame of the part, `start`.
+    """
+
+    shape: int
+    axes: Axes
+    half: Vector
+    start: Vector
+
 
 @compiled(error_model="numpy")
-def scan(cells, fan, reach, road, parts, stances, windows):  # type: ignore[no-untyped-def]
-    """Ranges (n,) of ascending `cells`, inf beyond `reach`, and body ids (n,), NO_BODY there.
+def cast_rays(
+    cells: Cells,
+    reach: float,
+    fan: tuple[Floats, Floats],
+    spacing: tuple[int, int, float, float, float],
+    sensor: Floats,
+    parts: tuple[Integers, Floats, Floats, Integers],
+    poses: Floats,
+    ground: int,
+) -> tuple[Floats, Integers]:
+    """Ranges (n,) of ascending `cells` in metres, inf beyond `reach`, and body ids (n,), NO_BODY
+    there.
 
-    `fan` is the grid's (smaller than its directions, and so nearer at hand); `road` is the world's
-    up (3,) in the frame of the sensor, its height and the body id of the plane z = 0 (NO_BODY
-    without). `parts` are their shapes, half extents and body ids, `stances` their centres and axes,
-    `windows` their windows, both of `care_sim.sensors.engines.windows`.
+    `fan` holds the fields of `Fan`, `spacing` those of `GridSpacing`, `sensor` (6,) those of
+    `SensorPose`, `parts` those of `Parts`. `poses` (m, 7) are those of bodies by id, and `ground`
+    is the body id of the road, NO_BODY without one.
     """
-    shapes, halves, owners = parts
-    centres, turns = stances
-    columns = len(fan[0])
-    starts = _row_starts(cells, len(fan[1]), columns)
-    ranges, ids = _road(cells, starts, fan, reach, road)
-    for part, (first, last, upper, lower) in enumerate(windows):
-        turn = _triple(turns[part, 0]), _triple(turns[part, 1]), _triple(turns[part, 2])
-        solid = shapes[part], turn, _triple(halves[part]), _start(turn, _triple(centres[part]))
+    # Fields get their names here: numba takes microseconds to type each named tuple of Python,
+    # which is much of the time of a scan, and next to none for plain ones.
+    x, y, z, yaw, roll, pitch = sensor
+    rays, solids = Fan(*fan), Parts(*parts)
+    pose = SensorPose(x, y, z, yaw, roll, pitch)
+    placed = place_parts(pose, solids, poses, GridSpacing(*spacing))
+    columns = len(rays.across)
+    starts = _row_starts(cells, len(rays.down), columns)
+    ranges, ids = _road_hits(cells, starts, rays, reach, Road(placed.up, z, ground))
+
+    for part, (first, last, upper, lower) in enumerate(placed.windows):
+        solid = _solid(part, solids, placed.centres, placed.axes)
         for row in range(upper, lower + 1):
+            # The fired cells of this row that lie in the window. A window that runs over the seam
+            # has two stretches of columns: from the row's begin, and from its first column on.
             begin, low, high = row * columns, starts[row], starts[row + 1]
             ahead = _first_from(cells, begin + first, low, high)
             for place, end in ((low, begin + last - columns), (ahead, begin + last)):
                 while place < high and cells[place] <= end:
-                    distance = _entry(solid, _ray(fan, row, cells[place] - begin))
+                    distance = _entry(solid, _ray(rays, row, cells[place] - begin))
                     if distance < ranges[place] and distance <= reach:
-                        ranges[place], ids[place] = distance, owners[part]
+                        ranges[place], ids[place] = distance, solids.owners[part]
                     place += 1
     return ranges, ids
 
 
 @compiled(error_model="numpy")
-def _road(cells, starts, fan, reach, road):  # type: ignore[no-untyped-def]
-    """What the rays meet in a world of road alone."""
-    up, height, ground = road
+def _road_hits(
+    cells: Cells, starts: Integers, fan: Fan, reach: float, road: Road
+) -> tuple[Floats, Integers]:
+    """Ranges and body ids in a world of road alone."""
     ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NO_BODY)
-    if ground != NO_BODY:
+    if road.body != NO_BODY:
         for row in range(len(starts) - 1):
             for n in range(starts[row], starts[row + 1]):
-                distance = -height / _dot(up, _ray(fan, row, cells[n] - row * len(fan[0])))
+                # A ray falls by -up . ray per metre. Above the horizon the distance is negative,
+                # and along it infinite.
+                ray = _ray(fan, row, cells[n] - row * len(fan.across))
+                distance = -road.height / dot(road.up, ray)
                 if 0.0 <= distance <= reach:
-                    ranges[n], ids[n] = distance, ground
+                    ranges[n], ids[n] = distance, road.body
     return ranges, ids
 
 
 @compiled()
-def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
+def _row_starts(cells: Cells, rows: int, columns: int) -> Integers:
     """(rows + 1,) where each row begins among ascending `cells`."""
     starts = np.zeros(rows + 1, np.int64)
     for row in range(1, rows + 1):
@@ -68,7 +127,7 @@ def _row_starts(cells, rows, columns):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
+def _first_from(cells: Cells, cell: int, low: int, high: int) -> int:
     """The first place in low..high of ascending `cells` that holds `cell` or a later one, else
     `high`.
     """
@@ -82,47 +141,54 @@ def _first_from(cells, cell, low, high):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _ray(fan, row, column):  # type: ignore[no-untyped-def]
-    """The direction of a cell."""
-    across, down = fan
+def _ray(fan: Fan, row: int, column: int) -> Vector:
+    """The direction of a cell, a unit vector in the frame of the sensor."""
+    across, down = fan.across, fan.down
     return down[row, 0] * across[column, 0], down[row, 0] * across[column, 1], down[row, 1]
 
 
 @compiled()
-def _triple(row):  # type: ignore[no-untyped-def]
-    """The numbers of an array (3,): passing views on would count references, ray by ray."""
-    return row[0], row[1], row[2]
+def _solid(part: int, parts: Parts, centres: Floats, axes: Floats) -> Solid:
+    """A part with its numbers at hand: views on arrays would count references, ray by ray."""
+    turn = _triple(axes[part, 0]), _triple(axes[part, 1]), _triple(axes[part, 2])
+    centre = _triple(centres[part])
+    start = -dot(turn[0], centre), -dot(turn[1], centre), -dot(turn[2], centre)
+    return Solid(parts.shapes[part], turn, _triple(parts.halves[part]), start)
 
 
 @compiled()
-def _start(turn, centre):  # type: ignore[no-untyped-def]
-    """The sensor in the frame of a part."""
-    return -_dot(turn[0], centre), -_dot(turn[1], centre), -_dot(turn[2], centre)
+def _triple(row: Floats) -> Vector:
+    """The numbers of an array (3,)."""
+    return row[0], row[1], row[2]
 
 
 @compiled(error_model="numpy")
-def _entry(solid, ray):  # type: ignore[no-untyped-def]
+def _entry(solid: Solid, ray: Vector) -> float:
     """Distance along a unit ray of the sensor's frame to a solid, inf without an entry."""
-    shape, turn, half, (u, v, w) = solid
-    x, y, z = _dot(turn[0], ray), _dot(turn[1], ray), _dot(turn[2], ray)
-    if shape == BOX:
-        near, far = _common(
-            _common(_slab(u, x, half[0]), _slab(v, y, half[1])), _slab(w, z, half[2])
-        )
-    elif shape == CYLINDER:
+    # The ray in the frame of the part: from (u, v, w) along (x, y, z).
+    u, v, w = solid.start
+    x, y, z = dot(solid.axes[0], ray), dot(solid.axes[1], ray), dot(solid.axes[2], ray)
+    half = solid.half
+    if solid.shape == BOX:
+        sides = _common(_slab(u, x, half[0]), _slab(v, y, half[1]))
+        near, far = _common(sides, _slab(w, z, half[2]))
+    elif solid.shape == CYLINDER:
         near, far = _common(_tube(u, v, x, y, half[0]), _slab(w, z, half[2]))
     else:
         near, far = _ball(u, v, w, x, y, z, half[0])
+
+    # Negative where the ray starts inside or beyond: neither is an entry.
     return near if 0.0 <= near <= far else math.inf
 
 
 @compiled()
-def _common(one, other):  # type: ignore[no-untyped-def]
+def _common(one: Stretch, other: Stretch) -> Stretch:
+    """The stretch that two have in common."""
     return max(one[0], other[0]), min(one[1], other[1])
 
 
 @compiled(error_model="numpy")
-def _slab(start, along, half):  # type: ignore[no-untyped-def]
+def _slab(start: float, along: float, half: float) -> Stretch:
     """The stretch of a ray between the planes at -half and half."""
     if along == 0.0:
         return _all_or_nothing(abs(start) <= half)
@@ -131,10 +197,12 @@ def _slab(start, along, half):  # type: ignore[no-untyped-def]
 
 
 @compiled(error_model="numpy")
-def _tube(u, v, x, y, radius):  # type: ignore[no-untyped-def]
+def _tube(u: float, v: float, x: float, y: float, radius: float) -> Stretch:
     """The stretch of a ray within `radius` of the z axis, from (u, v) along (x, y) in the plane
     across it.
     """
+    # The distance t solves |(u, v) + t (x, y)|^2 = radius^2. Its discriminant is written with the
+    # cross product, which keeps digits that u * u + v * v of a far start would lose.
     speed, cross = x * x + y * y, u * y - v * x
     inside = radius * radius * speed - cross * cross
     if speed == 0.0 or inside < 0.0:
@@ -144,8 +212,9 @@ def _tube(u, v, x, y, radius):  # type: ignore[no-untyped-def]
 
 
 @compiled(error_model="numpy")
-def _ball(u, v, w, x, y, z, radius):  # type: ignore[no-untyped-def]
+def _ball(u: float, v: float, w: float, x: float, y: float, z: float, radius: float) -> Stretch:
     """The stretch of a ray from (u, v, w) along (x, y, z) within `radius` of the origin."""
+    # (a, b, c) is the point of the ray that is nearest to the origin.
     middle = -(u * x + v * y + w * z)
     a, b, c = u + middle * x, v + middle * y, w + middle * z
     inside = radius * radius - (a * a + b * b + c * c)
@@ -155,10 +224,6 @@ def _ball(u, v, w, x, y, z, radius):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _all_or_nothing(everything):  # type: ignore[no-untyped-def]
+def _all_or_nothing(everything: bool) -> Stretch:
+    """The whole ray, or a stretch that is empty."""
     return (-math.inf, math.inf) if everything else (math.inf, -math.inf)
-
-
-@compiled()
-def _dot(one, other):  # type: ignore[no-untyped-def]
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

@@ -1,0 +1,200 @@
+"""Where the parts of bodies are around a sensor, and which cells each can cover, compiled.
+
+A ray is asked only about the parts whose window holds its cell. A window may hold too many cells,
+but never too few: a ray that meets nothing in a window is merely tried in vain.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from care_sim.base.compiled import compiled
+from care_sim.core.frames import Floats, Integers
+from care_sim.core.grid_kernels import GridSpacing
+from care_sim.sensors.engines.geometry_kernels import Axes, body_axes, dot
+
+WINDOW_MARGIN = 1
+"""Cells around a window, against rounding."""
+
+
+class SensorPose(NamedTuple):
+    """Where a sensor is in the world, as a `care_sim.core.frames.Frame`: metres and radians."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    roll: float
+    pitch: float
+
+
+class Parts(NamedTuple):
+    """The parts of the bodies that rays can hit, as in `care_sim.world.body_tables`: `shapes` (k,)
+    places in SHAPES; half extents `halves` (k, 3) and centres `offsets` (k, 3) in the frame of the
+    body, metres; `owners` (k,) body ids.
+    """
+
+    shapes: Integers
+    halves: Floats
+    offsets: Floats
+    owners: Integers
+
+
+class PlacedParts(NamedTuple):
+    """Parts in the frame of a sensor: `centres` (k, 3) in metres; `axes` (k, 3, 3), row i the
+    part's axis i; `windows` (k, 4), the first and last column and the first and last row of the
+    angular rectangle of the box that holds each part.
+
+    The first column lies on the grid, the last up to a turn beyond it. The first row lies below the
+    last where a part covers none. `up` (3,) is the world's up.
+    """
+
+    centres: Floats
+    axes: Floats
+    windows: Integers
+    up: Floats
+
+
+@compiled()
+def place_parts(sensor: SensorPose, parts: Parts, poses: Floats, grid: GridSpacing) -> PlacedParts:
+    """The parts of bodies at `poses` (m, 7: x, y, z, quaternion x, y, z, w), by body id."""
+    centres, axes = np.empty((len(parts.owners), 3)), np.empty((len(parts.owners), 3, 3))
+    sensor_axes = _sensor_axes(sensor.yaw, sensor.roll, sensor.pitch)
+    for part, owner in enumerate(parts.owners):
+        pose = poses[owner]
+        body = body_axes(pose[3], pose[4], pose[5], pose[6])
+        away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+        # Into the frame of the sensor: the origin of the body first, then the part's offset along
+        # the axes of the body.
+        for j, axis in enumerate(sensor_axes):
+            centres[part, j] = dot(axis, away)
+            for i in range(3):
+                axes[part, i, j] = dot(axis, body[i])
+                centres[part, j] += parts.offsets[part, i] * axes[part, i, j]
+
+    up = np.array((sensor_axes[0][2], sensor_axes[1][2], sensor_axes[2][2]))
+    return PlacedParts(centres, axes, _windows(centres, axes, parts.halves, grid), up)
+
+
+@compiled()
+def _windows(centres: Floats, axes: Floats, halves: Floats, grid: GridSpacing) -> Integers:
+    """(k, 4) see `PlacedParts.windows`."""
+    windows, corners = np.empty((len(centres), 4), np.int64), np.empty((8, 3))
+    for part, centre in enumerate(centres):
+        _lay_corners(centre, axes[part], halves[part], corners)
+        heading, right, left = _spread(centre, corners)
+
+        # Corners that spread over half a turn leave the sensor no side to look from: the part is
+        # around, above or below it, and may cover every column.
+        surrounds = left - right >= math.pi or (centre[0] == 0.0 and centre[1] == 0.0)
+        if surrounds:
+            heading, right, left = 0.0, -math.pi, math.pi
+        windows[part, 0], windows[part, 1] = _columns(heading + right, heading + left, grid)
+        windows[part, 2], windows[part, 3] = _rows(corners, surrounds, grid)
+    return windows
+
+
+@compiled()
+def _sensor_axes(yaw: float, roll: float, pitch: float) -> Axes:
+    """Forward, left and up of a frame with these angles, in the world."""
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cr, sr = math.cos(roll), math.sin(roll)
+    return (
+        (cy * cp, sy * cp, -sp),
+        (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
+        (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
+    )
+
+
+@compiled()
+def _lay_corners(centre: Floats, axes: Floats, half: Floats, corners: Floats) -> None:
+    """Fill `corners` (8, 3). Bit i of a corner's number says on which side of axis i it lies."""
+    for n in range(8):
+        for j in range(3):
+            corners[n, j] = centre[j]
+            for i in range(3):
+                corners[n, j] += (half[i] if n >> i & 1 else -half[i]) * axes[i, j]
+
+
+@compiled()
+def _spread(centre: Floats, corners: Floats) -> tuple[float, float, float]:
+    """Azimuth of a centre, and how far its corners reach to the right (negative) and left of it,
+    radians.
+    """
+    rightmost, leftmost = (1.0, 0.0), (1.0, 0.0)
+    least, most = 0.0, 0.0
+    for x, y, _ in corners:
+        # The corner in the plane turned so that the centre lies straight ahead. Angles are compared
+        # by a measure that is cheap, and only the two extreme ones are computed.
+        along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
+        order = _angle_order(along, across)
+        if order < least:
+            rightmost, least = (along, across), order
+        if order > most:
+            leftmost, most = (along, across), order
+    right, left = math.atan2(rightmost[1], rightmost[0]), math.atan2(leftmost[1], leftmost[0])
+    return math.atan2(centre[1], centre[0]), right, left
+
+
+@compiled()
+def _angle_order(along: float, across: float) -> float:
+    """Grows from -2 to 2 as the direction of (along, across) turns from -pi to pi, at less cost
+    than the angle.
+    """
+    size = abs(along) + abs(across)
+    share = across / size if size > 0.0 else 0.0
+    return share if along >= 0.0 else math.copysign(2.0, across) - share
+
+
+@compiled()
+def _columns(right: float, left: float, grid: GridSpacing) -> tuple[int, int]:
+    """First column, on the grid, and last, up to a turn beyond it, between two azimuths."""
+    first = math.floor((right + math.pi) / grid.column_width) - WINDOW_MARGIN
+    last = math.floor((left + math.pi) / grid.column_width) + WINDOW_MARGIN
+    return first % grid.columns, first % grid.columns + min(last - first, grid.columns - 1)
+
+
+@compiled()
+def _rows(corners: Floats, surrounds: bool, grid: GridSpacing) -> tuple[int, int]:
+    """First and last row of the box with these corners."""
+    near = 0.0 if surrounds else _nearest(corners)
+    far = 0.0
+    lowest, highest = math.inf, -math.inf
+    for x, y, z in corners:
+        far = max(far, x * x + y * y)
+        lowest, highest = min(lowest, z), max(highest, z)
+    far = math.sqrt(far)
+
+    # A top above the sensor appears highest where it is nearest, one below it where it is farthest;
+    # a bottom the other way round.
+    upper = (grid.top - math.atan2(highest, near if highest > 0.0 else far)) / grid.row_height
+    lower = (grid.top - math.atan2(lowest, near if lowest < 0.0 else far)) / grid.row_height
+    first = max(0, math.ceil(upper) - WINDOW_MARGIN)
+    return first, min(grid.rows - 1, math.floor(lower) + WINDOW_MARGIN)
+
+
+@compiled()
+def _nearest(corners: Floats) -> float:
+    """Distance in the x, y plane from the origin to a box that does not surround it: that to the
+    nearest of its edges.
+    """
+    least = math.inf
+    for n in range(8):
+        for i in range(3):
+            # An edge joins two corners that differ in one bit.
+            if not n >> i & 1:
+                least = min(least, _to_edge(corners[n], corners[n | 1 << i]))
+    return math.sqrt(least)
+
+
+@compiled()
+def _to_edge(one: Floats, other: Floats) -> float:
+    """Squared distance in the x, y plane from the origin to the stretch between two corners."""
+    x, y = one[0], one[1]
+    along, across = other[0] - x, other[1] - y
+    length = along * along + across * across
+    share = min(1.0, max(0.0, -(x * along + y * across) / length)) if length > 0.0 else 0.0
+    squared: float = (x + share * along) ** 2 + (y + share * across) ** 2
+    return squared
