@@ -16,8 +16,8 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import JSON, replacing
 from care_sim.commands.shared.play_options import PlayOptions
-from care_sim.sources.nuscenes.results_form import MODALITIES, boxes
-from care_sim.sources.nuscenes.tables import Row
+from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
+from care_sim.sources.nuscenes.tables import JsonRow
 from care_sim.sources.recordings import NuScenes
 from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.scene_play import play
@@ -45,7 +45,11 @@ class Export(PlayOptions):
             shown = track(
                 configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty()
             )
-            results = {token: boxes for config in shown for token, boxes in found(config).items()}
+            results = {
+                token: boxes
+                for config in shown
+                for token, boxes in found(config).items()
+            }
             unfinished.write_text(
                 json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
             )
@@ -75,10 +79,11 @@ class Export(PlayOptions):
         return MODALITIES | {"care_sim": own}
 
 
-def found(config: PlayConfig) -> dict[str, list[Row]]:
+def found(config: PlayConfig) -> dict[str, list[JsonRow]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
     film = config.source.film(config.scene)
     moments = zip(film.shots, play(config, film).keyframes, strict=True)
     return {
-        shot.token: boxes(shot, record.detections, record.velocities) for shot, record in moments
+        shot.token: result_boxes(shot, record.detections, record.velocities)
+        for shot, record in moments
     }

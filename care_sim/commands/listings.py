@@ -6,7 +6,7 @@ from typing import Any
 
 from care_sim.base.bounds import allowed
 from care_sim.perception.detectors import detector_lines
-from care_sim.policies.listing import listing
+from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import SCENARIOS
 from care_sim.scenarios.crossing import OCCLUDERS
 
@@ -17,7 +17,7 @@ class Policies:
 
     def __call__(self) -> int:
         """Run it."""
-        print(*listing(), sep="\n")
+        print(*policy_paragraphs(), sep="\n")
         return 0
 
 

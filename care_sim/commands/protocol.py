@@ -7,7 +7,7 @@ from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.play_options import PlayOptions
 from care_sim.commands.shared.running import Running, in_turn, playable
-from care_sim.sources.scenes import chosen
+from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.play_config import play_grid
 
 PAPERS = (
@@ -55,7 +55,7 @@ class Protocol(Running, PlayOptions):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis} needs at least one value")
         source, common = self.scene_source(), self.common() | {"presence": self.presence}
-        scenes = chosen(source.scenes(), self.scenes)
+        scenes = chosen_scenes(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)
         first = common.pop("floor_seed")
         policies, left_out = playable(

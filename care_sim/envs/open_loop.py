@@ -26,7 +26,7 @@ from care_sim.perception.detectors import PROXY, check_detector, make_detector
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.recordings import film_of, recordings
-from care_sim.sources.streets.draft import KEYFRAME_S
+from care_sim.sources.streets.draft import STREET_KEYFRAME_S
 from care_sim.sources.streets.recording import street_film
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
@@ -218,7 +218,7 @@ class StreetEnv(OpenLoopEnv):
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
 
     def __init__(self, **parameters: Any):
-        super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], KEYFRAME_S, **parameters)
+        super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], STREET_KEYFRAME_S, **parameters)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -12,7 +12,7 @@ from care_sim.loops.records import Keyframe
 KEEP_CLEAR_M = 2.0
 """Clearance below which it costs: the standstill distance s_0 of the controller."""
 
-WEIGHTS: dict[str, float] = {
+REWARD_WEIGHTS: dict[str, float] = {
     "delay": 1.0,
     "clearance": 1.0,
     "collision": 10.0,
@@ -34,9 +34,9 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
     if not isinstance(changes, Mapping):
         raise InvalidInput(f"reward_weights must map terms to numbers, got {shown(changes)}")
     for name, value in changes.items():
-        check_known("reward term", name, WEIGHTS)
+        check_known("reward term", name, REWARD_WEIGHTS)
         check_number(f"reward weight {name}", value, -HEAVIEST, HEAVIEST)
-    return {**WEIGHTS, **{name: float(value) for name, value in changes.items()}}
+    return {**REWARD_WEIGHTS, **{name: float(value) for name, value in changes.items()}}
 
 
 def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> dict[str, float]:

@@ -11,7 +11,7 @@ from care_sim.policies.base import Policy
 from care_sim.policies.controls.seed_finder import SeedFinder
 from care_sim.policies.installed import ENTRY_POINTS, entries, load
 from care_sim.policies.learned.learned_scorer import LearnedScorer
-from care_sim.policies.learned.ppo import Ppo, PpoDartout
+from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
 from care_sim.policies.paper.all_camera import AllCamera
 from care_sim.policies.paper.beam_reduce import BeamReduce
 from care_sim.policies.paper.care import Care
@@ -25,7 +25,7 @@ from care_sim.policies.paper.history_uniform import HistoryUniform
 from care_sim.policies.paper.random import Random
 from care_sim.policies.paper.random_points import RandomPoints
 from care_sim.policies.paper.uncertainty import Uncertainty
-from care_sim.policies.parameters import Maker, check_parameters, is_privileged
+from care_sim.policies.parameters import PolicyMaker, check_parameters, is_privileged
 
 __all__ = [
     "BUILT_IN",
@@ -37,7 +37,7 @@ __all__ = [
     "tags_of",
 ]
 
-BUILT_IN: dict[str, Maker] = {
+BUILT_IN: dict[str, PolicyMaker] = {
     policy.name: policy
     for policy in (
         Full,
@@ -54,8 +54,8 @@ BUILT_IN: dict[str, Maker] = {
         RandomPoints,
         FarthestPoints,
         LearnedScorer,
-        Ppo,
-        PpoDartout,
+        PpoPolicy,
+        PpoDartoutPolicy,
         SeedFinder,
     )
 }
@@ -122,7 +122,7 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
     return policy
 
 
-def maker(name: str) -> Maker:
+def maker(name: str) -> PolicyMaker:
     """What makes the policy. Raises InvalidInput with the reason for one that cannot be loaded."""
     if name in BUILT_IN:
         return BUILT_IN[name]

@@ -11,7 +11,7 @@ from typing import Any
 
 from care_sim.base.errors import InvalidInput
 from care_sim.policies.base import TAGS, Policy
-from care_sim.policies.parameters import Maker
+from care_sim.policies.parameters import PolicyMaker
 
 ENTRY_POINTS = "care_sim.policies"
 
@@ -26,7 +26,7 @@ def entries() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in reversed(all_entries())}
 
 
-def load(entry: EntryPoint) -> Maker:
+def load(entry: EntryPoint) -> PolicyMaker:
     """What makes the policy. Raises InvalidInput with the reason when there is no using it."""
     try:
         made = entry.load()
@@ -34,7 +34,7 @@ def load(entry: EntryPoint) -> Maker:
         raise InvalidInput(f"{type(error).__name__}: {' '.join(str(error).split())}") from error
     for fault in _faults(made):
         raise InvalidInput(f"{entry.value} {fault}")
-    make: Maker = made
+    make: PolicyMaker = made
     return make
 
 

@@ -9,12 +9,12 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.text import one_line
 from care_sim.policies import BUILT_IN, maker, policy_names, tags_of
 from care_sim.policies.installed import all_entries, entries, package_of
-from care_sim.policies.parameters import Maker, settable
+from care_sim.policies.parameters import PolicyMaker, settable
 
-WIDTH = 80
+TEXT_WIDTH = 80
 
 
-def listing() -> Iterator[str]:
+def policy_paragraphs() -> Iterator[str]:
     """One paragraph per policy, then the entries that another policy of the same name hides."""
     for name in policy_names():
         yield _paragraph(name)
@@ -27,7 +27,7 @@ def listing() -> Iterator[str]:
             yield _hidden(entry, f"that of {package_of(first)}")
 
 
-def parameters_of(make: Maker) -> list[str]:
+def parameters_of(make: PolicyMaker) -> list[str]:
     """The parameters as NAME=DEFAULT; a bare name must be given."""
     return [
         parameter.name
@@ -51,7 +51,7 @@ def _paragraph(name: str) -> str:
     )
 
 
-def _summary(name: str, make: Maker) -> str:
+def _summary(name: str, make: PolicyMaker) -> str:
     """The line that the module of a built-in policy begins with; of another its own, and its
     package.
     """
@@ -72,6 +72,6 @@ def _lines(title: str, *texts: str) -> str:
     indented = (
         line
         for text in said
-        for line in wrap(text, WIDTH, initial_indent="    ", subsequent_indent="    ")
+        for line in wrap(text, TEXT_WIDTH, initial_indent="    ", subsequent_indent="    ")
     )
     return "\n".join([one_line(title), *indented])

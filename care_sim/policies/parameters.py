@@ -9,21 +9,21 @@ from care_sim.base.errors import InvalidInput
 from care_sim.policies.base import Policy
 from care_sim.policies.privileged import PrivilegedPolicy
 
-Maker: TypeAlias = Callable[..., Policy]
+PolicyMaker: TypeAlias = Callable[..., Policy]
 """A policy class, or another callable that takes a rig and parameters."""
 
 
-def is_privileged(make: Maker) -> bool:
+def is_privileged(make: PolicyMaker) -> bool:
     """Whether truth is handed to it, after the rig."""
     return inspect.isclass(make) and issubclass(make, PrivilegedPolicy)
 
 
-def settable(make: Maker) -> list[inspect.Parameter]:
+def settable(make: PolicyMaker) -> list[inspect.Parameter]:
     """The parameters that follow the rig (and the truth)."""
     return list(inspect.signature(make).parameters.values())[_given(make) :]
 
 
-def check_parameters(name: str, make: Maker, parameters: Mapping[str, object]) -> None:
+def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, object]) -> None:
     """Raise InvalidInput for a parameter that the policy does not have or that is not the user's to
     set.
     """
@@ -40,5 +40,5 @@ def check_parameters(name: str, make: Maker, parameters: Mapping[str, object]) -
         check_known(f"parameter of policy {name}", parameter, known)
 
 
-def _given(make: Maker) -> int:
+def _given(make: PolicyMaker) -> int:
     return 2 if is_privileged(make) else 1

@@ -43,7 +43,7 @@ class Prop:
         return self.frame.holding(np.array([0.0, 0.0, -self.size[2] / 2]))
 
 
-def shoot(
+def sense(
     props: Sequence[Prop], sensor: Frame, height_m: float, grid: AngularGrid
 ) -> tuple[Annotations, IdentifiedDetections, Cloud]:
     """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell

@@ -11,23 +11,23 @@ import numpy as np
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 
-Range = tuple[float, float]
+Interval = tuple[float, float]
 
-SIZES_M: Range = (0.01, 200.0)
+SIZES_M: Interval = (0.01, 200.0)
 """Length, width and height of an annotated box: a tenth of the smallest, and twice the longest
 train in a street.
 """
-AWAY_M: Range = (-1e4, 1e4)
+AWAY_M: Interval = (-1e4, 1e4)
 """x, y and z of an annotated box from the car: forty times as far as boxes are annotated."""
-MAP_M: Range = (-1e8, 1e8)
+MAP_M: Interval = (-1e8, 1e8)
 """x, y and z in a map: more than twice round the Earth, and yet a float tells a micrometre."""
-MOUNT_M: Range = (-100.0, 100.0)
+MOUNT_M: Interval = (-100.0, 100.0)
 """x, y and z of a sensor in its car, which may be a road train."""
-STAMPS_NS: Range = (0, 2**62)
+STAMPS_NS: Interval = (0, 2**62)
 """Nanoseconds since 1970, until 2116: differences stay within 64 bits."""
 LONGEST_S = 86_400
 """A drive lasts a day."""
-STEEPEST = np.radians(80)
+MOST_PITCH = np.radians(80)
 """Radians that a car or a box may be pitched: what points straight up has no heading."""
 UNIT = (0.9, 1.1)
 """The length of a quaternion that was rounded."""
@@ -41,17 +41,17 @@ def check_span(path: Path, seconds: float) -> None:
         )
 
 
-def turn_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str] | None:
+def quaternion_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str] | None:
     """The first of quaternions (n, 4: x, y, z, w) that turns nothing, or leaves no heading where
     there must be one: its row, and what is wrong with it.
     """
     lengths = np.linalg.norm(np.clip(turns, -2, 2), axis=1)  # squares of larger ones overflow
     unit = (lengths >= UNIT[0]) & (lengths <= UNIT[1])
     x, y, z, w = np.where(unit[:, None], turns, 0.0).T
-    steep = np.abs(w * y - x * z) * 2 > np.sin(STEEPEST) * np.where(unit, lengths, 1.0) ** 2
+    steep = np.abs(w * y - x * z) * 2 > np.sin(MOST_PITCH) * np.where(unit, lengths, 1.0) ** 2
     for wrong, reason in (
         (~unit, "a quaternion that is not of length 1"),
-        (steep & has_heading, f"a pitch beyond {np.degrees(STEEPEST):.0f} degrees"),
+        (steep & has_heading, f"a pitch beyond {np.degrees(MOST_PITCH):.0f} degrees"),
     ):
         if wrong.any():
             return int(wrong.argmax()), reason

@@ -17,7 +17,7 @@ from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.argoverse2.tables import ANNOTATION_FILES, POSE_FILE
 from care_sim.sources.nuscenes import films, splits
 from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.tables import FIELDS, Database, Row
+from care_sim.sources.nuscenes.tables import FIELDS, Database, JsonRow
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ class Argoverse2(Recordings):
         return [log.name for log in argoverse2.logs(self.folder)]
 
     def film(self, scene: str) -> Film:
-        """See `care_sim.sources.argoverse2.films.film`."""
+        """See `care_sim.sources.argoverse2.films.argoverse2_film`."""
         logs = {log.name: log for log in argoverse2.logs(self.folder)}
         check_known(f"log in {self.folder}", scene, logs)
-        return argoverse2.film(logs[scene])
+        return argoverse2.argoverse2_film(logs[scene])
 
     def files(self, scene: str) -> list[Path]:
         """Poses and annotations."""
@@ -84,24 +84,26 @@ class NuScenes(Recordings):
         return list(self._rows())
 
     def film(self, scene: str) -> Film:
-        """See `care_sim.sources.nuscenes.films.film`."""
+        """See `care_sim.sources.nuscenes.films.nuscenes_film`."""
         rows = self._rows()
         check_known(f"scene of the split {self.split} in {self.folder}", scene, rows)
         detections = _detections(self.camera_detections) if self.camera_detections else None
-        return films.film(_database(self.folder, self.version), rows[scene], detections=detections)
+        return films.nuscenes_film(
+            _database(self.folder, self.version), rows[scene], detections=detections
+        )
 
     def files(self, scene: str) -> list[Path]:
         """All tables that are read."""
         return [_database(self.folder, self.version).path(table) for table in FIELDS]
 
-    def _rows(self) -> dict[str, Row]:
+    def _rows(self) -> dict[str, JsonRow]:
         return {
             row["name"]: row
             for row in splits.scenes(_database(self.folder, self.version), self.split)
         }
 
 
-KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
+RECORDING_KINDS: dict[str, type[Recordings]] = {made.kind: made for made in (Argoverse2, NuScenes)}
 
 
 def recordings(text: str, options: Mapping[str, object] | None = None) -> Recordings:
@@ -110,15 +112,15 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
     that the kind does not have.
     """
     kind, colon, folder = text.partition(":") if isinstance(text, str) else ("", "", "")
-    if not (colon and folder) or kind not in KINDS:
-        known = " or ".join(f"{name}:FOLDER" for name in KINDS)
+    if not (colon and folder) or kind not in RECORDING_KINDS:
+        known = " or ".join(f"{name}:FOLDER" for name in RECORDING_KINDS)
         raise InvalidInput(f"source must be {known}, got {shown(text)}")
     check_path("source", folder)
     if not Path(folder).is_dir():
         raise InvalidInput(f"source {text}: {folder} is no folder")
     given = {name: value for name, value in (options or {}).items() if value is not None}
     for name in given:
-        if name not in {field.name for field in fields(KINDS[kind])}:
+        if name not in {field.name for field in fields(RECORDING_KINDS[kind])}:
             raise InvalidInput(f"{name} says nothing to {kind} recordings")
     if "camera_detections" in given:
         check_path("camera_detections", given["camera_detections"])
@@ -126,7 +128,7 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
     for name in {"split", "version"} & set(given):
         if not isinstance(given[name], str):
             raise InvalidInput(f"{name} must be a name, got {shown(given[name])}")
-    return KINDS[kind](Path(folder), **given)
+    return RECORDING_KINDS[kind](Path(folder), **given)
 
 
 @lru_cache(maxsize=1)

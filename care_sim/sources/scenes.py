@@ -8,7 +8,7 @@ from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput
 from care_sim.base.text import shortened
 from care_sim.loops.film import Film
-from care_sim.sources.recordings import KINDS, NuScenes, Recordings, recordings
+from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import (
     CALIBRATION_SEEDS,
@@ -116,8 +116,8 @@ def source_of(text: str, **options: object) -> Source:
     have.
     """
     if text != "streets":
-        if text.partition(":")[0] not in KINDS:
-            known = ", ".join(["streets", *(f"{kind}:FOLDER" for kind in KINDS)])
+        if text.partition(":")[0] not in RECORDING_KINDS:
+            known = ", ".join(["streets", *(f"{kind}:FOLDER" for kind in RECORDING_KINDS)])
             raise InvalidInput(f"unknown source {text!r}; known: {known}")
         return Recorded(recordings(text, options))
     given = {name: value for name, value in options.items() if value is not None}
@@ -128,7 +128,7 @@ def source_of(text: str, **options: object) -> Source:
     return Streets(split)
 
 
-def chosen(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
+def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     """The scenes that are asked for: one whole number means that many, from the first; else scenes
     by name; all of them without. Raises InvalidInput for a name or a number that there is not.
     """

@@ -11,7 +11,7 @@ from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.envs.reward import HEAVIEST
-from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.study.parameters import parameters
 from care_sim.training.seeds import TRAINING, VALIDATION
 

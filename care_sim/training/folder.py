@@ -26,7 +26,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
 from care_sim.base.json_text import check_file_size, json_content
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.weights import Card, save
+from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.training.card_provenance import machine, versions
 from care_sim.training.config import ALGORITHMS, AgentConfig
 from care_sim.training.seeds import TRAINING, validation_seeds
@@ -107,7 +107,9 @@ class Folder:
         from care_sim.training.networks import SectorPolicy
 
         if isinstance(model.policy, SectorPolicy):
-            save(self.weights, model.policy.arrays(), self._card(model, score, seconds, rig))
+            save_weights(
+                self.weights, model.policy.arrays(), self._card(model, score, seconds, rig)
+            )
 
     def _card(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> Card:
         config, held_out = self.config, validation_seeds(score.episodes)

@@ -12,8 +12,8 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 from torch.nn.functional import pad
 
-from care_sim.policies.learned.grid_features import EGO
-from care_sim.policies.learned.score_map import MARGIN
+from care_sim.policies.learned.grid_features import EGO_INPUTS
+from care_sim.policies.learned.score_map import BLOCK_MARGIN
 from care_sim.policies.learned.weights import Arrays
 
 
@@ -29,15 +29,20 @@ class Window(nn.Module):
         self.shape = shape
         stride = shape[1] // sectors[0], shape[2] // sectors[1]
         self.window = nn.Conv2d(
-            shape[0], hidden, (stride[0] + 2 * MARGIN, stride[1] + 2 * MARGIN), stride
+            shape[0], hidden, (stride[0] + 2 * BLOCK_MARGIN, stride[1] + 2 * BLOCK_MARGIN), stride
         )
-        self.ego = nn.Linear(len(EGO), hidden, bias=False)
+        self.ego = nn.Linear(len(EGO_INPUTS), hidden, bias=False)
         self.hidden = nn.Conv2d(hidden, hidden, 1)
 
     def forward(self, ego: Tensor, grid: Tensor) -> Tensor:
         """From ego (n, 4) and grid (n, channels * rows * columns)."""
-        wrapped = pad(grid.view(-1, *self.shape), (MARGIN, MARGIN, 0, 0), mode="circular")
-        seen = self.window(pad(wrapped, (0, 0, MARGIN, MARGIN))) + self.ego(ego)[:, :, None, None]
+        wrapped = pad(
+            grid.view(-1, *self.shape), (BLOCK_MARGIN, BLOCK_MARGIN, 0, 0), mode="circular"
+        )
+        seen = (
+            self.window(pad(wrapped, (0, 0, BLOCK_MARGIN, BLOCK_MARGIN)))
+            + self.ego(ego)[:, :, None, None]
+        )
         return torch.relu(self.hidden(torch.relu(seen))).flatten(2)
 
 
@@ -49,7 +54,7 @@ class Windows(nn.Module):
     def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
         super().__init__()
         self.actor, self.critic = Window(shape, sectors, hidden), Window(shape, sectors, hidden)
-        self.valued = nn.Sequential(nn.Linear(2 * hidden + len(EGO), 2 * hidden), nn.ReLU())
+        self.valued = nn.Sequential(nn.Linear(2 * hidden + len(EGO_INPUTS), 2 * hidden), nn.ReLU())
         self.latent_dim_pi, self.latent_dim_vf = hidden, 2 * hidden
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
@@ -104,7 +109,7 @@ class Sectored(BaseFeaturesExtractor):
     def __init__(
         self, observation_space: spaces.Dict, shape: tuple[int, int, int], sectors: tuple[int, int]
     ):
-        super().__init__(observation_space, len(EGO) + 4 * sectors[0] * sectors[1])
+        super().__init__(observation_space, len(EGO_INPUTS) + 4 * sectors[0] * sectors[1])
         self.window = Window(shape, sectors, 4)
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
@@ -147,4 +152,4 @@ class SectorPolicy(ActorCriticPolicy):
 
 
 def _parts(features: Tensor) -> tuple[Tensor, Tensor]:
-    return features[:, : len(EGO)], features[:, len(EGO) :]
+    return features[:, : len(EGO_INPUTS)], features[:, len(EGO_INPUTS) :]

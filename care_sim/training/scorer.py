@@ -23,7 +23,7 @@ from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.core.grid import AngularGrid
-from care_sim.policies.learned.weights import Arrays, Card, save
+from care_sim.policies.learned.weights import Arrays, Card, save_weights
 from care_sim.sources.streets.street import CALIBRATION_SEEDS
 from care_sim.training.card_provenance import machine, versions
 from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples
@@ -61,7 +61,7 @@ class TrainScorer:
         started = time.perf_counter()
         learned, held_out = (_gathered(name, seeds) for name, seeds in _STREETS.items())
         arrays, losses = train(learned, held_out, self.seed, self.steps)
-        save(self.out, arrays, _card(self, learned, losses))
+        save_weights(self.out, arrays, _card(self, learned, losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
         print(f"{self.out}: loss {told}; {time.perf_counter() - started:.0f} s")
         return 0

@@ -29,7 +29,7 @@ from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
-from care_sim.policies.learned.cell_inputs import Cues, Table
+from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
 from care_sim.policies.paper.history import History
 from care_sim.sources.streets.recording import street_film
 
@@ -47,9 +47,9 @@ class Examples:
     `weigh` (n,).
     """
 
-    inputs: Table
+    inputs: Float32s
     positive: NDArray[np.bool_]
-    weigh: Table
+    weigh: Float32s
 
     def __len__(self) -> int:
         return len(self.positive)
@@ -80,7 +80,7 @@ def front_alone(film: Film) -> Film:
     return replace(film, cameras=film.cameras[:1], shots=tuple(map(_first_camera, film.shots)))
 
 
-def untracked_cells(loop: OpenLoop) -> tuple[Cells, Table]:
+def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     """Cells (n,) of the coming keyframe's full scan with a return from an object in range that has
     no track and can be detected, and what each weighs (n,). Truth.
     """
@@ -98,14 +98,16 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Table]:
 
 
 def _play(env: FilmEnv, seed: int, rng: np.random.Generator) -> Iterator[Examples]:
-    policy, cues = History(env.rig), Cues(env.rig)
+    policy, cues = History(env.rig), CellInputs(env.rig)
     observation, _ = env.reset(seed=seed)
     while not env.loop.over:
         yield _keyframe(env.loop, Belief.from_observation(observation), cues, rng)
         observation, *_ = env.step(policy(observation))
 
 
-def _keyframe(loop: OpenLoop, belief: Belief, cues: Cues, rng: np.random.Generator) -> Examples:
+def _keyframe(
+    loop: OpenLoop, belief: Belief, cues: CellInputs, rng: np.random.Generator
+) -> Examples:
     positive, shares = untracked_cells(loop)
     others = np.setdiff1d(rng.choice(cues.rig.grid.size, OTHERS, replace=False), positive)
     cells = np.concatenate([positive, others])

@@ -52,7 +52,7 @@ def scans(path):
 
 
 def arrays(path):
-    weights.save(path, {"layer": RNG.random(10_000)}, weights.Card("ppo", AngularGrid()))
+    weights.save_weights(path, {"layer": RNG.random(10_000)}, weights.Card("ppo", AngularGrid()))
 
 
 def rows(path):

@@ -9,7 +9,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import MOST_BYTES, MOST_LEVELS, json_content, parsed
-from care_sim.policies.learned.weights import load
+from care_sim.policies.learned.weights import load_weights
 from care_sim.reports.page.provenance import CONFIG, _description
 from care_sim.sources.nuscenes.tables import LARGEST_TABLE, read_json
 from care_sim.study.journal import LARGEST_JOURNAL, Journal
@@ -43,7 +43,7 @@ def test_every_reader_says_so_in_one_line(tmp_path, levels):
     weights = tmp_path / "weights.npz"
     np.savez(weights, card=np.frombuffer(DEEP[levels].encode(), np.uint8))
     with pytest.raises(InvalidInput, match=r"weights\.npz: no \.npz of weights .*deep"):
-        load(weights)
+        load_weights(weights)
     (tmp_path / CONFIG).write_text(DEEP[levels])
     description, (trouble,) = _description(tmp_path / CONFIG)
     assert description == {}

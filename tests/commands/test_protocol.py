@@ -18,7 +18,7 @@ from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_of
 from care_sim.reports.report import reported
 from care_sim.reports.studies import STUDIES
-from care_sim.sources.scenes import Scene, Streets, chosen, source_of
+from care_sim.sources.scenes import Scene, Streets, chosen_scenes, source_of
 from care_sim.study import scene_play as plays
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
@@ -312,12 +312,12 @@ def test_a_source_without_recordings_is_one_line(tmp_path):
 def test_scenes_are_chosen_by_number_or_by_name():
     scenes = Streets().scenes()
     assert [scene.seed for scene in scenes] == list(range(150))
-    assert chosen(scenes, ()) == scenes
-    assert [scene.name for scene in chosen(scenes, ("2",))] == [
+    assert chosen_scenes(scenes, ()) == scenes
+    assert [scene.name for scene in chosen_scenes(scenes, ("2",))] == [
         "street-0000-straight",
         "street-0001-bend",
     ]
-    assert chosen(scenes, (scenes[7].name,)) == [scenes[7]]
+    assert chosen_scenes(scenes, (scenes[7].name,)) == [scenes[7]]
     assert {scene.seed for scene in Streets("calibration").scenes()}.isdisjoint(
         scene.seed for scene in scenes
     )

@@ -13,7 +13,7 @@ import care_sim
 from care_sim.core.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
-from care_sim.envs.reward import WEIGHTS
+from care_sim.envs.reward import REWARD_WEIGHTS
 from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.dartout import Dartout
 from care_sim.world.bodies import CATALOGUE
@@ -92,7 +92,7 @@ def test_an_episode_stays_inside_its_spaces_and_ends(name):
         assert env.observation_space.contains(observation)
         observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
         assert reward <= 0.0
-        assert set(info["reward_terms"]) == set(WEIGHTS)
+        assert set(info["reward_terms"]) == set(REWARD_WEIGHTS)
         assert len(info["fired"]) == env.unwrapped.rig.budget
         ended = terminated or truncated
     assert env.observation_space.contains(observation)
@@ -399,4 +399,4 @@ def test_bad_actions_get_one_clear_line_and_leave_the_episode_alone(action, mess
 def test_reward_weights_can_be_changed():
     env = make("CARE-Dartout-v0", reward_weights={"delay": 7.0}).unwrapped
     assert env._weights["delay"] == 7.0
-    assert env._weights["collision"] == WEIGHTS["collision"]
+    assert env._weights["collision"] == REWARD_WEIGHTS["collision"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import care_sim
 from care_sim.envs import CLOSED_LOOP
-from care_sim.sources.nuscenes.cameras import CHANNELS
+from care_sim.sources.nuscenes.cameras import CAMERA_CHANNELS
 from tests.helpers.av2_log import CAR_AHEAD, at, box, write
 from tests.helpers.nuscenes_drive import write_drive
 
@@ -109,7 +109,9 @@ def detections_file(path, root):
     """
     tables = json.loads((root / "v1.0-trainval" / "sample_data.json").read_text())
     pictures = [
-        row["token"] for row in tables if any(channel in row["token"] for channel in CHANNELS)
+        row["token"]
+        for row in tables
+        if any(channel in row["token"] for channel in CAMERA_CHANNELS)
     ]
     boxes = (
         [-30, 300, 100, 500],

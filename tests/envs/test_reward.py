@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.envs.reward import KEEP_CLEAR_M, WEIGHTS, Potential, terms, weights
+from care_sim.envs.reward import KEEP_CLEAR_M, REWARD_WEIGHTS, Potential, terms, weights
 from care_sim.loops.records import Keyframe
 
 
@@ -64,9 +64,9 @@ def test_terms(frame, before, expected):
 
 
 def test_a_weight_is_changed_by_name_and_the_rest_stays():
-    assert weights(None) == WEIGHTS
-    assert weights({"delay": 5.0}) == {**WEIGHTS, "delay": 5.0}
-    assert WEIGHTS["delay"] == 1.0
+    assert weights(None) == REWARD_WEIGHTS
+    assert weights({"delay": 5.0}) == {**REWARD_WEIGHTS, "delay": 5.0}
+    assert REWARD_WEIGHTS["delay"] == 1.0
 
 
 def test_an_unknown_term_is_refused_with_the_known_ones():
@@ -75,7 +75,7 @@ def test_an_unknown_term_is_refused_with_the_known_ones():
 
 
 def test_every_term_has_a_weight():
-    assert set(terms(keyframe(), False, False)) == set(WEIGHTS)
+    assert set(terms(keyframe(), False, False)) == set(REWARD_WEIGHTS)
 
 
 def losses(*frames):

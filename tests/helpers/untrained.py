@@ -3,10 +3,10 @@
 import numpy as np
 
 from care_sim.core.grid import AngularGrid
-from care_sim.policies.learned.grid_features import CHANNELS, EGO
-from care_sim.policies.learned.score_map import MARGIN
-from care_sim.policies.learned.weights import Card, save
-from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
+from care_sim.policies.learned.score_map import BLOCK_MARGIN
+from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.policies.learned.wrapping import Wrapping
 
 USUAL = Wrapping()
 
@@ -14,9 +14,9 @@ USUAL = Wrapping()
 def shapes(wrapping, hidden=5):
     tall, wide = wrapping.blocks_a_sector
     return {
-        "window.weight": (hidden, len(CHANNELS), tall + 2 * MARGIN, wide + 2 * MARGIN),
+        "window.weight": (hidden, len(CHANNELS), tall + 2 * BLOCK_MARGIN, wide + 2 * BLOCK_MARGIN),
         "window.bias": (hidden,),
-        "ego.weight": (hidden, len(EGO)),
+        "ego.weight": (hidden, len(EGO_INPUTS)),
         "hidden.weight": (hidden, hidden),
         "hidden.bias": (hidden,),
         "score.weight": (hidden,),
@@ -26,6 +26,13 @@ def shapes(wrapping, hidden=5):
 
 def untrained(path, wrapping=USUAL, seed=0, **card):
     rng = np.random.default_rng(seed)
-    arrays = {name: rng.normal(0, 0.5, shape).astype(np.float32) for name, shape in shapes(wrapping).items()}
-    save(path, arrays, Card(**{"kind": "ppo", "grid": AngularGrid(), "wrapper": str(wrapping)} | card))
+    arrays = {
+        name: rng.normal(0, 0.5, shape).astype(np.float32)
+        for name, shape in shapes(wrapping).items()
+    }
+    save_weights(
+        path,
+        arrays,
+        Card(**{"kind": "ppo", "grid": AngularGrid(), "wrapper": str(wrapping)} | card),
+    )
     return path

@@ -9,8 +9,8 @@ import pytest
 from care_sim.cli import main
 from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
-from care_sim.sources.nuscenes.films import film
-from care_sim.sources.nuscenes.results_form import MODALITIES, boxes
+from care_sim.sources.nuscenes.films import nuscenes_film
+from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.splits import scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_drive import OBJECTS, SPLIT, write_drive
@@ -18,7 +18,9 @@ from tests.helpers.places import ROOT
 
 pytestmark = [
     pytest.mark.official,
-    pytest.mark.skipif(not (ROOT / ".venv-official" / ".installed").exists(), reason="run by make test-official"),
+    pytest.mark.skipif(
+        not (ROOT / ".venv-official" / ".installed").exists(), reason="run by make test-official"
+    ),
 ]
 
 OTHERS = {"trailer", "construction_vehicle", "motorcycle", "traffic_cone", "barrier"}
@@ -41,7 +43,9 @@ def official(database, results, *options):
 def scored(database, results, *options):
     done = official(database, results, *options)
     assert done.returncode == 0, done.stderr
-    return json.loads((results.parent / f"{results.stem}-official" / "metrics_summary.json").read_text())
+    return json.loads(
+        (results.parent / f"{results.stem}-official" / "metrics_summary.json").read_text()
+    )
 
 
 def exported(database, out, *options):
@@ -59,35 +63,54 @@ def written(path, results):
 def truth(database):
     """The annotations as a detector that knows all would report them."""
     tables = Database(database)
-    return {shot.token: known(shot, SPLIT[s["name"]]) for s in scenes(tables) for shot in film(tables, s).shots}
+    return {
+        shot.token: known(shot, SPLIT[s["name"]])
+        for s in scenes(tables)
+        for shot in nuscenes_film(tables, s).shots
+    }  # noqa: E501
 
 
 def known(shot, heading):
     there = shot.annotations
     assert len(there) == len(OBJECTS)
-    velocities = turned(np.array([velocity for _, _, velocity, _, _ in OBJECTS]), heading - shot.sensor.yaw)
-    return boxes(shot, Detections(there.classes, there.boxes, np.full(len(there), 9)), velocities)
+    velocities = turned(
+        np.array([velocity for _, _, velocity, _, _ in OBJECTS]), heading - shot.sensor.yaw
+    )
+    return result_boxes(
+        shot, Detections(there.classes, there.boxes, np.full(len(there), 9)), velocities
+    )
 
 
 def test_the_truth_itself_has_every_class_at_1_and_no_error(tmp_path, database):
     """Place, size, heading, velocity and attribute of every box, in the devkit's own reckoning."""
     found = scored(database, written(tmp_path / "truth.json", truth(database)))
-    assert found["mean_dist_aps"] == pytest.approx(dict.fromkeys(CLASSES, 1.0) | dict.fromkeys(OTHERS, 0.0))
-    errors = [found["label_tp_errors"][name][error] for name in CLASSES for error in found["tp_errors"]]
+    assert found["mean_dist_aps"] == pytest.approx(
+        dict.fromkeys(CLASSES, 1.0) | dict.fromkeys(OTHERS, 0.0)
+    )
+    errors = [
+        found["label_tp_errors"][name][error] for name in CLASSES for error in found["tp_errors"]
+    ]
     assert errors == pytest.approx(np.zeros(25), abs=1e-3)
     assert found["mean_ap"] == pytest.approx(5 / 10)
-    assert found["nd_score"] == pytest.approx((5 * 0.5 + 0.5 + 0.5 + 5 / 9 + 5 / 8 + 5 / 8) / 10, abs=1e-3)
+    assert found["nd_score"] == pytest.approx(
+        (5 * 0.5 + 0.5 + 0.5 + 5 / 9 + 5 / 8 + 5 / 8) / 10, abs=1e-3
+    )
 
 
 def test_a_full_scan_reaches_the_truth_and_a_starved_one_does_not(tmp_path, database):
     full = scored(database, exported(database, tmp_path / "full.json", "--policy", "full"))
-    starved = exported(database, tmp_path / "starved.json", "--policy", "random", "--budget", "0.03")
+    starved = exported(
+        database, tmp_path / "starved.json", "--policy", "random", "--budget", "0.03"
+    )
     poor = scored(database, starved)
     assert full["mean_ap"] == pytest.approx(0.5)
     assert 0 < poor["mean_ap"] < 0.4
     assert full["nd_score"] > poor["nd_score"]
     assert poor["meta"] == json.loads(starved.read_text())["meta"]
-    assert (poor["meta"]["care_sim"]["policy"], poor["meta"]["care_sim"]["budget"]) == ("random", 0.03)
+    assert (poor["meta"]["care_sim"]["policy"], poor["meta"]["care_sim"]["budget"]) == (
+        "random",
+        0.03,
+    )
 
 
 def test_a_split_of_splits_json_is_scored_alone(tmp_path, database):

@@ -1,7 +1,7 @@
 """The list of policies, with what installed packages add, hide and break."""
 
 from care_sim.policies import BUILT_IN
-from care_sim.policies.listing import listing, parameters_of
+from care_sim.policies.listing import parameters_of, policy_paragraphs
 
 GOOD = '''
 import care_sim
@@ -24,7 +24,7 @@ class Good(care_sim.Policy):
 
 
 def test_every_built_in_policy_has_tags_a_source_and_a_summary_that_fit_80_columns():
-    paragraphs = list(listing())
+    paragraphs = list(policy_paragraphs())
     assert [text.partition(" ")[0] for text in paragraphs] == list(BUILT_IN)
     for text, make in zip(paragraphs, BUILT_IN.values(), strict=True):
         title, *lines = text.splitlines()
@@ -42,7 +42,7 @@ def test_parameters_come_with_their_defaults():
 
 def test_an_installed_policy_is_listed_with_its_package(install):
     install("good", GOOD, beacon="Good")
-    assert list(listing())[-1].splitlines() == [
+    assert list(policy_paragraphs())[-1].splitlines() == [
         "beacon (causal, learned)",
         "    Looks ahead. [good 1.5]",
         "    reach width=3 name='fan'",
@@ -53,7 +53,7 @@ def test_an_installed_policy_is_listed_with_its_package(install):
 def test_a_hidden_policy_is_said_to_be(install):
     install("good", GOOD, beacon="Good", care="Good")
     install("first", GOOD, beacon="Good")
-    assert [text.splitlines() for text in listing()][len(BUILT_IN) :] == [
+    assert [text.splitlines() for text in policy_paragraphs()][len(BUILT_IN) :] == [
         [
             "beacon (causal, learned)",
             "    Looks ahead. [first 1.5]",
@@ -67,7 +67,7 @@ def test_a_hidden_policy_is_said_to_be(install):
 
 def test_a_broken_policy_is_listed_with_the_reason(install):
     install("broken", "raise RuntimeError('no\\nweights')", torn="Torn")
-    assert list(listing())[-1].splitlines() == [
+    assert list(policy_paragraphs())[-1].splitlines() == [
         "torn (broken)",
         "    RuntimeError: no weights [broken 1.5]",
     ]

@@ -22,7 +22,7 @@ from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.false_boxes import EMPTY_POOL, MOST_DRAWS, BoxPool, FalseBoxes
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2 import films as argoverse2
-from care_sim.sources.nuscenes.cameras import CHANNELS
+from care_sim.sources.nuscenes.cameras import CAMERA_CHANNELS
 from care_sim.sources.recordings import recordings
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import make_street
@@ -434,7 +434,7 @@ def pixels_of_area(rows):
 
 
 def test_ghosts_of_an_argoverse_log_are_like_its_pictures(drive):
-    film = argoverse2.film(drive)
+    film = argoverse2.argoverse2_film(drive)
     ghosts = ghosts_of(film)
     pixels = 36 * ghosts[:, 1] / (1 - ghosts[:, 1])
     assert len(ghosts) > 50
@@ -467,7 +467,7 @@ def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
         seen = shot.seen.detections
         for label, box, camera in zip(seen.classes, seen.boxes, seen.cameras, strict=True):
             found = {"category_name": CLASSES[label], "score": round(rng.uniform(0.3, 0.99), 2)}
-            found["sample_data_token"] = f"{shot.token}-{CHANNELS[camera]}"
+            found["sample_data_token"] = f"{shot.token}-{CAMERA_CHANNELS[camera]}"
             rows.append(
                 found | {"bbox_corners": np.round(np.add(box, (20, 20, 25, 25)), 1).tolist()}
             )
@@ -486,7 +486,7 @@ def test_ghosts_of_a_detection_file_have_its_decimals(nuscenes, tmp_path):
 
 @pytest.mark.parametrize("keyframes", [1, 2])
 def test_a_film_too_short_to_lend_other_times_has_fewer_ghosts_and_no_duplicates(drive, keyframes):
-    film = argoverse2.film(drive)
+    film = argoverse2.argoverse2_film(drive)
     short = replace(film, shots=film.shots[:keyframes])
     for true, false in played(FilmEnv(short, budget=1.0, false_positive_rate=5.0), 0):
         assert len(false) < 30

@@ -73,20 +73,29 @@ def draw(case, known, most=3):
     for name in rng.sample(sorted(known), rng.randint(0, min(most, len(known)))):
         fitting = known[name]
         drawn[name] = fitting() if fitting and rng.random() < 0.4 else hostile.objects(rng)
-    case.tell(f"arguments {{{', '.join(f'{name}={told(value)}' for name, value in drawn.items())}}}")
+    case.tell(
+        f"arguments {{{', '.join(f'{name}={told(value)}' for name, value in drawn.items())}}}"
+    )
     return drawn
 
 
 def some(case, *fitting):
     """A value: one of the fitting, or a hostile one."""
-    value = case.rng.choice(fitting) if fitting and case.rng.random() < 0.4 else hostile.objects(case.rng)
+    value = (
+        case.rng.choice(fitting)
+        if fitting and case.rng.random() < 0.4
+        else hostile.objects(case.rng)
+    )
     case.tell(f"value {told(value)}")
     return value
 
 
 def _fields_of(kind):
     """The fields of a dataclass, with makers of their defaults."""
-    return {one.name: (lambda one=one: one.default) if one.default is not MISSING else None for one in fields(kind)}
+    return {
+        one.name: (lambda one=one: one.default) if one.default is not MISSING else None
+        for one in fields(kind)
+    }
 
 
 def environment(case):
@@ -113,7 +122,15 @@ def street(case):
 
     from care_sim.core.conditions import Conditions
 
-    extra = ("detector", "detector_parameters", "render_mode", "budget", "keyframe_s", "source", "unknown")
+    extra = (
+        "detector",
+        "detector_parameters",
+        "render_mode",
+        "budget",
+        "keyframe_s",
+        "source",
+        "unknown",
+    )
     arguments = draw(case, _fields_of(Conditions) | dict.fromkeys(extra))
     with gymnasium.make("CARE-Street-v0", disable_env_checker=True, **arguments) as env:
         if case.rng.random() < 0.2:
@@ -124,8 +141,21 @@ def replay(case):
     """Recorded scenes, from texts that name none."""
     import gymnasium
 
-    known = dict.fromkeys(("source", "scene", "split", "version", "camera_detections", "detector", "budget", "unknown"))
-    known["source"] = lambda: case.rng.choice(("argoverse2:.", "nuscenes:.", "argoverse2:", "nuscenes:/nowhere", ":"))
+    known = dict.fromkeys(
+        (
+            "source",
+            "scene",
+            "split",
+            "version",
+            "camera_detections",
+            "detector",
+            "budget",
+            "unknown",
+        )
+    )
+    known["source"] = lambda: case.rng.choice(
+        ("argoverse2:.", "nuscenes:.", "argoverse2:", "nuscenes:/nowhere", ":")
+    )
     gymnasium.make("CARE-Replay-v0", disable_env_checker=True, **draw(case, known)).close()
 
 
@@ -136,7 +166,9 @@ def _played(case, env):
     for _ in range(case.rng.randrange(4)):
         observation, reward, terminated, truncated, info = env.step(_action(case))
         check_observation(env, observation)
-        if not (np.isfinite(reward) and reward <= 0) and "reward_weights" not in " ".join(case.steps):
+        if not (np.isfinite(reward) and reward <= 0) and "reward_weights" not in " ".join(
+            case.steps
+        ):
             raise Fault("a reward that is not finite and at most 0", repr(reward))
         _check_cells(info["fired"], env.unwrapped.rig.budget, env.unwrapped.rig.grid.size)
         if terminated or truncated:
@@ -149,8 +181,16 @@ def _action(case):
     good = np.random.default_rng(rng.randrange(9)).random((32, 512), np.float32)
     kind = rng.randrange(9)
     if kind == 0:
-        good[rng.randrange(32), rng.randrange(512)] = rng.choice((np.nan, np.inf, -np.inf, 1e30, -1.0, 5e-45))
-    actions = {1: good > 0.9, 2: np.zeros((32, 512)), 3: good.tolist(), 4: good[:, ::-1], 5: good.astype(object)}
+        good[rng.randrange(32), rng.randrange(512)] = rng.choice(
+            (np.nan, np.inf, -np.inf, 1e30, -1.0, 5e-45)
+        )
+    actions = {
+        1: good > 0.9,
+        2: np.zeros((32, 512)),
+        3: good.tolist(),
+        4: good[:, ::-1],
+        5: good.astype(object),
+    }
     action = actions.get(kind, good if kind < 8 else hostile.objects(rng))
     case.tell(f"action {kind} {told(action)}")
     return action
@@ -162,11 +202,17 @@ def check_observation(env, observation):
         if not value.contains(observation[name]):
             given, low, high = observation[name], value.low, value.high
             wrong = (
-                np.argwhere(~((given >= low) & (given <= high)))[:3].tolist() if given.shape == low.shape else "shape"
+                np.argwhere(~((given >= low) & (given <= high)))[:3].tolist()
+                if given.shape == low.shape
+                else "shape"
             )
-            values = [float(given[tuple(index)]) for index in wrong] if wrong != "shape" else given.shape
+            values = (
+                [float(given[tuple(index)]) for index in wrong] if wrong != "shape" else given.shape
+            )
             column = wrong[0][-1] if wrong and wrong != "shape" else ""
-            raise Fault("an observation outside its space", f"{wrong} {values}", f"{name}, column {column}")
+            raise Fault(
+                "an observation outside its space", f"{wrong} {values}", f"{name}, column {column}"
+            )
 
 
 def _check_cells(cells, budget, size):
@@ -176,7 +222,10 @@ def _check_cells(cells, budget, size):
         or len(np.unique(cells)) < len(cells)
         or (len(cells) and not 0 <= cells.min() <= cells.max() < size)
     ):
-        raise Fault("cells beyond the budget, twice or outside the grid", f"{len(cells)} of {budget}: {cells[:5]}")
+        raise Fault(
+            "cells beyond the budget, twice or outside the grid",
+            f"{len(cells)} of {budget}: {cells[:5]}",
+        )
 
 
 def policy(case):
@@ -191,7 +240,9 @@ def policy(case):
     env = good_env() if case.rng.random() < 0.9 else some(case)
     make = BUILT_IN.get(name) if isinstance(name, str) else None
     known = {one.name: None for one in settable(make)} if make else {}
-    made = make_policy(name, env, **draw(case, known | dict.fromkeys(("path", "k_safe", "unknown"))))
+    made = make_policy(
+        name, env, **draw(case, known | dict.fromkeys(("path", "k_safe", "unknown")))
+    )
     made.reset()
     action = made(_observation(case))
     if action.shape != (32, 512) or not np.isfinite(action).all():
@@ -229,7 +280,9 @@ def _of_another_type(case, value):
 
 def _odd_number(case, value):
     flat = value.reshape(-1)
-    flat[case.rng.randrange(min(flat.size, 90))] = case.rng.choice((np.nan, np.inf, -np.inf, 1e30, -1e30, 1e9, -7, 99))
+    flat[case.rng.randrange(min(flat.size, 90))] = case.rng.choice(
+        (np.nan, np.inf, -np.inf, 1e30, -1e30, 1e9, -7, 99)
+    )
     return value
 
 
@@ -245,7 +298,18 @@ def _as_list(_case, value):
     return value.tolist()
 
 
-_CHANGES = (_gone, _anything, _of_another_type, _odd_number, _odd_number, _odd_number, _half, _deeper, _as_list, some)
+_CHANGES = (
+    _gone,
+    _anything,
+    _of_another_type,
+    _odd_number,
+    _odd_number,
+    _odd_number,
+    _half,
+    _deeper,
+    _as_list,
+    some,
+)
 
 
 def belief(case):
@@ -274,7 +338,9 @@ def allocation(case):
     floor = some(case, None, range(200), np.random.default_rng(0).permutation(16384))
     chosen = allocate(demand, budget, share, floor)
     if len(chosen) > budget or len(set(chosen.tolist())) < len(chosen):
-        raise Fault("an allocation beyond the budget, or of a cell twice", f"{len(chosen)} of {budget}")
+        raise Fault(
+            "an allocation beyond the budget, or of a cell twice", f"{len(chosen)} of {budget}"
+        )
 
 
 def rig(case):
@@ -291,13 +357,17 @@ def rig(case):
 
 def _boxes(case):
     boxes = np.tile([10.0, 1.0, -1.0, 4.0, 2.0, 1.5, 0.1], (3, 1))
-    boxes[case.rng.randrange(3), case.rng.randrange(7)] = case.rng.choice((0, -1, 1e9, 1e30, np.nan, np.inf, 1e-30, 5))
+    boxes[case.rng.randrange(3), case.rng.randrange(7)] = case.rng.choice(
+        (0, -1, 1e9, 1e30, np.nan, np.inf, 1e-30, 5)
+    )
     return boxes if case.rng.random() < 0.9 else boxes[:0]
 
 
 def _bundles(case):
     bundles = np.random.default_rng(case.rng.randrange(99)).normal(size=(2, 5, 3))
-    bundles[case.rng.randrange(2), case.rng.randrange(5)] = case.rng.choice((0, 1e300, np.nan, np.inf, 1e-300, 5))
+    bundles[case.rng.randrange(2), case.rng.randrange(5)] = case.rng.choice(
+        (0, 1e300, np.nan, np.inf, 1e-300, 5)
+    )
     return bundles
 
 
@@ -306,7 +376,11 @@ def grid(case):
     from care_sim import AngularGrid
 
     made = AngularGrid(**draw(case, _fields_of(AngularGrid)))
-    if isinstance(made.columns, int) and isinstance(made.rows, int) and abs(made.columns * made.rows) > 2**24:
+    if (
+        isinstance(made.columns, int)
+        and isinstance(made.rows, int)
+        and abs(made.columns * made.rows) > 2**24
+    ):
         return  # honest work
     made.cells_of(_bundles(case)[0])
     made.hulls(_boxes(case), case.rng.choice((0, 2, 99, 10**6)), case.rng.choice((0, 1, 99)))
@@ -321,7 +395,9 @@ def scenario(case):
     name = case.rng.choice(list(SCENARIOS)) if case.rng.random() < 0.95 else some(case)
     case.tell(told(name))
     known = _fields_of(SCENARIOS[name]) if isinstance(name, str) and name in SCENARIOS else {}
-    make_scenario(name, **draw(case, known | {"unknown": None})).build(np.random.default_rng(0)).close()
+    make_scenario(name, **draw(case, known | {"unknown": None})).build(
+        np.random.default_rng(0)
+    ).close()
 
 
 def conditions(case):
@@ -335,7 +411,9 @@ def wrapper(case):
     """Wrappers around an environment, or around something else."""
     from care_sim import wrappers
 
-    name = case.rng.choice(("GridObservation", "SectorReserve", "SectorScores", "RecordRerun", "ExportScans"))
+    name = case.rng.choice(
+        ("GridObservation", "SectorReserve", "SectorScores", "RecordRerun", "ExportScans")
+    )
     case.tell(name)
     env = good_env() if case.rng.random() < 0.9 else some(case)
     arguments = {"GridObservation": ("columns", "rows"), "RecordRerun": ("path", "policy", "name"),
@@ -347,7 +425,11 @@ def wrapper(case):
         return  # it would write wherever the value says
     observation, _ = made.reset(seed=1)
     check_observation(made, observation)
-    made.step(some(case, made.action_space.sample()) if case.rng.random() < 0.7 else made.action_space.sample())
+    made.step(
+        some(case, made.action_space.sample())
+        if case.rng.random() < 0.7
+        else made.action_space.sample()
+    )
 
 
 def vector(case):
@@ -391,12 +473,12 @@ def detector(case):
 
 def weights(case):
     """Files of weights that are none."""
-    from care_sim.policies.learned.weights import load
+    from care_sim.policies.learned.weights import load_weights
 
     path = some(case, "nowhere", ".", "")
     if isinstance(path, int):
         return  # a file descriptor, which is open for reading elsewhere
-    load(path)
+    load_weights(path)
 
 
 def tables(case):
@@ -405,7 +487,9 @@ def tables(case):
 
     kind = case.rng.choice((ImageDetections, Tracks))
     rows = np.ones((3, len(kind.COLUMNS)))
-    rows[case.rng.randrange(3), case.rng.randrange(rows.shape[1])] = case.rng.choice((np.nan, np.inf, -1, 1e30, 1e19))
+    rows[case.rng.randrange(3), case.rng.randrange(rows.shape[1])] = case.rng.choice(
+        (np.nan, np.inf, -1, 1e30, 1e19)
+    )
     case.tell(f"{kind.__name__} {told(rows)}")
     kind.from_rows(rows).rows()
 

@@ -30,7 +30,9 @@ def play(case):
     line, product = WRITER_LINES[kind]
     size = case.rng.choice((0, 1, 100, 4096, 2**15, 2**17, case.rng.randrange(1, 2**19)))
     mounted = case.name.number % 2 == 0 and may_mount()
-    case.tell(f"care-sim {' '.join(line)}, room for {size} bytes {'on the disk' if mounted else 'in a file'}")
+    case.tell(
+        f"care-sim {' '.join(line)}, room for {size} bytes {'on the disk' if mounted else 'in a file'}"
+    )
     with _small(case.folder, mounted) as folder:
         props.lay_out({"results"} & set(line), folder)
         before = {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
@@ -76,9 +78,9 @@ def _check_left(folder, product, before):
 
 def check_product(path):
     if path.suffix == ".npz":
-        from care_sim.policies.learned.weights import load
+        from care_sim.policies.learned.weights import load_weights
 
-        load(path)
+        load_weights(path)
     elif path.suffix == ".parquet":
         study.steady(path.parent)
     else:
@@ -120,7 +122,9 @@ def may_mount():
         return False
     place = props._templates() / "mountable"
     place.mkdir(exist_ok=True)
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(place)], capture_output=True).returncode:
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(place)], capture_output=True
+    ).returncode:
         return False
     subprocess.run(["umount", str(place)], check=True)
     return True

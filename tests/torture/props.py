@@ -43,10 +43,15 @@ def inline(seconds=PLAYS_S):
     from care_sim.reports.page.build import write_page
     from care_sim.study import executors
 
-    usual, defaults = executors.processes, {made: made.__defaults__ for made in (write_page, played)}
+    usual, defaults = (
+        executors.processes,
+        {made: made.__defaults__ for made in (write_page, played)},
+    )
     executors.processes = partial(Inline, seconds)
     for made, values in defaults.items():
-        made.__defaults__ = tuple(executors.processes if value is usual else value for value in values)
+        made.__defaults__ = tuple(
+            executors.processes if value is usual else value for value in values
+        )
     try:
         yield
     finally:
@@ -104,7 +109,18 @@ def _make_results(path):
 
 def _make_protocol(path):
     drive = template("drive")
-    options = ("--policies", "care", "history", "full", "--budgets", "0.1", "--floor-seeds", "1", "--workers", "1")
+    options = (
+        "--policies",
+        "care",
+        "history",
+        "full",
+        "--budgets",
+        "0.1",
+        "--floor-seeds",
+        "1",
+        "--workers",
+        "1",
+    )
     care_sim("protocol", "--source", f"argoverse2:{drive}", *options, "--out", path)
 
 
@@ -131,15 +147,15 @@ def _make_base(path):
 
 
 def _make_scorer(path):
-    from care_sim.policies.learned.weights import shipped
+    from care_sim.policies.learned.weights import shipped_weights
 
-    shutil.copy(shipped("learned-scorer"), path)
+    shutil.copy(shipped_weights("learned-scorer"), path)
 
 
 def _make_ppo(path):
-    from care_sim.policies.learned.weights import shipped
+    from care_sim.policies.learned.weights import shipped_weights
 
-    shutil.copy(shipped("ppo-dense"), path)
+    shutil.copy(shipped_weights("ppo-dense"), path)
 
 
 def _make_recording(path):
@@ -156,8 +172,12 @@ def _make_trained(path):
     from care_sim.training.config import Ppo
 
     (path / "config.json").write_text(Ppo().to_json())
-    (path / "rules.json").write_text(json.dumps(dict.fromkeys(("random", "history", "care", "full"), scores)))
-    (path / "curve.csv").write_text("steps,seconds,return,distance_m\n0,0.1,-5.0,8.0\n64,1.5,-4.0,9.5\n")
+    (path / "rules.json").write_text(
+        json.dumps(dict.fromkeys(("random", "history", "care", "full"), scores))
+    )
+    (path / "curve.csv").write_text(
+        "steps,seconds,return,distance_m\n0,0.1,-5.0,8.0\n64,1.5,-4.0,9.5\n"
+    )
 
 
 def lay_out(names, folder):

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from care_sim.cli import main
-from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS
-from care_sim.policies.learned.weights import load
+from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
+from care_sim.policies.learned.weights import load_weights
 from care_sim.training import scorer
 from care_sim.training.scorer_data import Examples
 
 torch = pytest.importorskip("torch")
-INPUTS = CUES + len(OUTLOOKS)
+INPUTS = SCAN_INPUTS + len(RIG_INPUTS)
 
 
 def drawn(seed, count=3000):
@@ -69,7 +69,7 @@ def test_the_command_writes_the_same_file_again_with_its_card(tmp_path, monkeypa
         assert trained(tmp_path / "new" / name, monkeypatch, "--steps", "20", "--seed", "3") == 0
     one, two = (tmp_path / "new" / name for name in ("one.npz", "two.npz"))
     assert one.read_bytes() == two.read_bytes()
-    card = load(one).card
+    card = load_weights(one).card
     assert (card.kind, card.steps, card.seeds["training"]) == ("learned-scorer", 20, 3)
     assert card.versions["torch"] == torch.__version__
     assert set(card.result) == {"loss calibration", "loss held out"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS
+from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
 from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
 from care_sim.training.scorer import HELD_OUT
@@ -89,7 +89,7 @@ def test_a_street_gives_the_same_examples_again():
     once, again = ([*examples([2000])] for _ in range(2))
     assert len(once) == 2 * len(BUDGETS)
     for one, other in zip(once, again, strict=True):
-        assert one.inputs.shape == (len(one), CUES + len(OUTLOOKS))
+        assert one.inputs.shape == (len(one), SCAN_INPUTS + len(RIG_INPUTS))
         assert np.array_equal(one.inputs, other.inputs)
         assert np.array_equal(one.weigh, other.weigh)
         assert 39 * OTHERS < (~one.positive).sum() <= 40 * OTHERS

@@ -10,7 +10,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.cli import main
-from care_sim.policies.learned.weights import load
+from care_sim.policies.learned.weights import load_weights
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import Ppo, Sac
 from care_sim.training.environments import bare, training
@@ -98,7 +98,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
         "care",
         "full",
     ]
-    weights = load(out / "weights.npz")
+    weights = load_weights(out / "weights.npz")
     assert "out" not in weights.card.result["config"]
     best = max(float(row["return"]) for row in rows)
     assert weights.card.result["validation"]["mean_return"] == pytest.approx(best)
@@ -160,7 +160,7 @@ def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
 def test_weights_of_several_budgets_fit_any(capsys, tmp_path):
     command = ["train", "ppo", *TINY, "--out", tmp_path, "--evaluate-every", "64", "--steps", "64"]
     assert care(capsys, *command, "--budget", "0.05", "0.1")[0] == 0
-    assert load(tmp_path / "weights.npz").card.budget is None
+    assert load_weights(tmp_path / "weights.npz").card.budget is None
 
 
 @pytest.mark.usefixtures("libraries")

@@ -9,12 +9,12 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from care_sim.envs.sensing import sensing
-from care_sim.policies.learned.grid_features import EGO, GridFeatures
+from care_sim.policies.learned.grid_features import EGO_INPUTS, GridFeatures
 
-Pictures = dict[str, NDArray[np.float32]]
+GridArrays = dict[str, NDArray[np.float32]]
 
 
-class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any], RecordConstructorArgs):
+class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], RecordConstructorArgs):
     """Shows the belief as six channels over `columns` x `rows` blocks of the angular grid, and the
     car's own motion.
 
@@ -56,11 +56,11 @@ class GridObservation(gymnasium.ObservationWrapper[Pictures, Any, Any], RecordCo
         shown: spaces.Space[Any] = spaces.Dict(
             {
                 "grid": spaces.Box(0.0, 1.0, (int(np.prod(self.features.shape)),), np.float32),
-                "ego": spaces.Box(-1.0, 1.0, (len(EGO),), np.float32),
+                "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
             }
         )
         self.observation_space = shown
 
-    def observation(self, observation: Any) -> Pictures:
+    def observation(self, observation: Any) -> GridArrays:
         """The pictures of what the unwrapped environment shows now."""
         return dict(self.features(self._sensing.belief))

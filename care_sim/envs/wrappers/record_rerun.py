@@ -19,7 +19,7 @@ from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
 if TYPE_CHECKING:
-    from care_sim.viewer.recording.recording import Episode, Recording
+    from care_sim.viewer.recording.recording import RecordedEpisode, Recording
 
 
 def recording(path: Path, lanes: Sequence[str]) -> "Recording":
@@ -74,7 +74,7 @@ class RecordRerun(Watching):
         self._path = Path(fspath(path)) if isinstance(path, str | PathLike) else None
         self._recording = None if isinstance(path, str | PathLike) else path
         self._name = name or (policy.name if policy is not None else "") or "agent"
-        self._episode: Episode | None = None
+        self._episode: RecordedEpisode | None = None
 
     def begin(self, loop: ClosedLoop, episode: int) -> None:
         """Open the file of this episode, or its lane in a file that was given."""

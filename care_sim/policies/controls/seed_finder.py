@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from care_sim.world.world import World
 
 
-USUAL = "dense"
+FALLBACK_SCENARIO = "dense"
 """The scenario that it knows where it is told none."""
 
 
@@ -44,7 +44,7 @@ class SeedFinder(Policy):
     def __init__(self, rig: Rig, scenario: str | None = None, seeds: int = 30):
         from care_sim.scenarios import SCENARIOS
 
-        scenario = USUAL if scenario is None else scenario
+        scenario = FALLBACK_SCENARIO if scenario is None else scenario
         check_known("scenario", scenario, SCENARIOS)
         check_whole("seeds", seeds, 1, 10**6)
         super().__init__(rig)

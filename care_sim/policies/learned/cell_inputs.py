@@ -15,7 +15,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.policies.paper.uncertainty import GROUND_CLEARANCE_M
 
-MARKS = (
+CELL_MARKS = (
     "in the wedge of a camera detection that no forecast explains",
     "in that wedge before it is dilated",
     "in such a wedge of a pedestrian or bicycle; of several wedges the smallest counts",
@@ -26,10 +26,10 @@ MARKS = (
     "within the margins of such a cell",
 )
 """What is true or not of a cell at a keyframe: the bits of its code, the lowest first."""
-CUES = len(MARKS) + 2
+SCAN_INPUTS = len(CELL_MARKS) + 2
 """The marks; log2 of the cells of the unexplained wedge over 10; nearness of the last return, 1 at
 the sensor, 0 at the range of a ray and without a return."""
-OUTLOOKS = (
+RIG_INPUTS = (
     "elevation over half a radian",
     "nearness of the road",
     "cos azimuth",
@@ -42,27 +42,27 @@ side.
 
 _SMALL_CLASSES = np.isin(CLASSES, ("pedestrian", "bicycle"))
 
-Table = NDArray[np.float32]
+Float32s = NDArray[np.float32]
 
 
-class Seen(NamedTuple):
-    """What is seen of all cells: `codes` (N,) of `MARKS`, `sizes` (N,) and `nearnesses` (N,) as in
-    `CUES`.
+class CellFeatures(NamedTuple):
+    """What is seen of all cells: `codes` (N,) of `CELL_MARKS`, `sizes` (N,) and `nearnesses` (N,)
+    as in `SCAN_INPUTS`.
     """
 
     codes: NDArray[np.uint8]
-    sizes: Table
-    nearnesses: Table
+    sizes: Float32s
+    nearnesses: Float32s
 
-    def rows(self, cells: Cells) -> Table:
-        """(n, `CUES`) of some cells (n,)."""
+    def rows(self, cells: Cells) -> Float32s:
+        """(n, `SCAN_INPUTS`) of some cells (n,)."""
         marks = np.unpackbits(self.codes[cells, None], axis=1, bitorder="little")
         return np.column_stack([marks, self.sizes[cells], self.nearnesses[cells]]).astype(
             np.float32
         )
 
 
-class Cues:
+class CellInputs:
     """The cues of a rig's cells, N of them in the order of their index."""
 
     def __init__(self, rig: Rig):
@@ -70,24 +70,24 @@ class Cues:
         self._bare = replace(rig, azimuth_margin=0, elevation_margin=0)
         self._heights = rig.grid.directions[:, 2].astype(np.float32)
 
-    def of(self, belief: Belief, hulls: Sequence[Cells]) -> Seen:
+    def of(self, belief: Belief, hulls: Sequence[Cells]) -> CellFeatures:
         """At a keyframe, given the hulls of its forecasts."""
-        from care_sim.policies.learned.cell_scores import mark, mark_scan
+        from care_sim.policies.learned.cell_kernels import mark_scan, mark_sets
 
         rig = self.rig
         cells = self.rig.grid.size
-        seen = Seen(
+        seen = CellFeatures(
             np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32)
         )
-        mark(seen.codes, seen.sizes, *self._sets(belief, hulls))
+        mark_sets(seen.codes, seen.sizes, *self._sets(belief, hulls))
         limits = np.float32(rig.grid.range_m), np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m)
         margins = rig.azimuth_margin, rig.elevation_margin
         mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, limits, margins)
         return seen
 
     @cached_property
-    def outlooks(self) -> Table:
-        """(N, `OUTLOOKS`)."""
+    def outlooks(self) -> Float32s:
+        """(N, `RIG_INPUTS`)."""
         x, y, z = self.rig.grid.directions.T
         flat = np.hypot(x, y)
         road = np.divide(self.rig.sensor_height_m, -z, out=np.full(len(z), np.inf), where=z < 0)
@@ -100,14 +100,24 @@ class Cues:
         self, belief: Belief, hulls: Sequence[Cells]
     ) -> tuple[Cells, Cells, NDArray[np.uint8]]:
         """Cells of hulls, wedges and undilated wedges, where each set ends, and its marks."""
-        from care_sim.policies.learned.cell_scores import BOX, EXPLAINED, HULL, SMALL, UNEXPLAINED
+        from care_sim.policies.learned.cell_kernels import (
+            MARK_BOX,
+            MARK_EXPLAINED,
+            MARK_HULL,
+            MARK_SMALL,
+            MARK_UNEXPLAINED,
+        )
 
         detections = belief.detections
         known = explained(detections, belief.tracks, self.rig)
         sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._bare)]
-        new = UNEXPLAINED + SMALL * _SMALL_CLASSES[detections.classes]
+        new = MARK_UNEXPLAINED + MARK_SMALL * _SMALL_CLASSES[detections.classes]
         marks = np.concatenate(
-            [np.full(len(hulls), HULL), np.where(known, EXPLAINED, new), np.where(known, 0, BOX)]
+            [
+                np.full(len(hulls), MARK_HULL),
+                np.where(known, MARK_EXPLAINED, new),
+                np.where(known, 0, MARK_BOX),
+            ]
         )
         cells = np.concatenate([np.empty(0, np.int64), *sets])
         return cells, np.cumsum([*map(len, sets)], dtype=np.int64), marks.astype(np.uint8)

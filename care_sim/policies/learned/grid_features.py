@@ -19,7 +19,7 @@ from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
 """The pictures, in order; see `care_sim.envs.wrappers.grid_observation.GridObservation`."""
-EGO = ("speed", "yaw_rate", "acceleration", "budget")
+EGO_INPUTS = ("speed", "yaw_rate", "acceleration", "budget")
 EGO_SCALES = np.array([30.0, 1.0, 10.0, 1.0], np.float32)
 """m/s, rad/s, m/s^2 and the share of the cells that are shown as 1."""
 STANDING_M = (KERB_CLEARANCE_M, 4.0)
@@ -31,7 +31,7 @@ of bridges and the crowns of trees. The tallest of the five classes are lower.
 @dataclass(frozen=True)
 class GridFeatures:
     """Beliefs of a rig as `CHANNELS` over `columns` x `rows` blocks of the grid, and the vector
-    `EGO`.
+    `EGO_INPUTS`.
 
     Blocks pool their cells: `nearness` takes the largest, the others the share. Raises InvalidInput
     unless the blocks divide the grid. Not for several threads at once: it reuses its memory.
@@ -64,18 +64,18 @@ class GridFeatures:
         return {"grid": np.minimum(out, 1, out=out).ravel(), "ego": self._ego(belief)}
 
     def _draw_objects(self, belief: Belief, out: NDArray[np.float32]) -> None:
-        from care_sim.policies.learned.pooling_kernels import share
+        from care_sim.policies.learned.block_kernels import add_object_shares
 
         groups = [self.rig.hulls(belief.tracks.boxes), *camera_layers(belief, self.rig)]
         cells = np.concatenate([np.empty(0, np.int64), *chain(*groups)])
         ends = np.cumsum([sum(map(len, group)) for group in groups])
-        share(cells, ends, self._blocks, self._marks, out)
+        add_object_shares(cells, ends, self._blocks, self._marks, out)
 
     def _draw_returns(self, ranges: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        from care_sim.policies.learned.pooling_kernels import look
+        from care_sim.policies.learned.block_kernels import add_returns
 
         scan = ranges, self._rises, self.rig.grid.range_m, self.rig.sensor_height_m, *STANDING_M
-        look(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
+        add_returns(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
 
     def _ego(self, belief: Belief) -> NDArray[np.float32]:
         ego = belief.ego

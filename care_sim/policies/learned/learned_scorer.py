@@ -10,8 +10,14 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.learned.cell_inputs import CUES, MARKS, OUTLOOKS, Cues, Seen
-from care_sim.policies.learned.weights import Weights, load, shipped
+from care_sim.policies.learned.cell_inputs import (
+    CELL_MARKS,
+    RIG_INPUTS,
+    SCAN_INPUTS,
+    CellFeatures,
+    CellInputs,
+)
+from care_sim.policies.learned.weights import Weights, load_weights, shipped_weights
 
 
 class LearnedScorer(Policy):
@@ -30,9 +36,9 @@ class LearnedScorer(Policy):
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
-        weights = load(shipped(self.name) if path is None else path)
+        weights = load_weights(shipped_weights(self.name) if path is None else path)
         weights.check(self.name, rig)
-        self._cues = Cues(rig)
+        self._cues = CellInputs(rig)
         self._network = CellNetwork(weights, self._cues.outlooks)
         self._reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
 
@@ -45,24 +51,26 @@ class LearnedScorer(Policy):
 
 
 class CellNetwork:
-    """The network of some weights over cells whose outlooks (N, `OUTLOOKS`) are fixed."""
+    """The network of some weights over cells whose outlooks (N, `RIG_INPUTS`) are fixed."""
 
     def __init__(self, weights: Weights, outlooks: NDArray[np.float32]):
-        layer = weights.array("layer", CUES + len(OUTLOOKS), None)
+        layer = weights.array("layer", SCAN_INPUTS + len(RIG_INPUTS), None)
         units = layer.shape[1]
         self._out = weights.array("out", units)
-        hidden = outlooks @ layer[CUES:] + weights.array("bias", units)
+        hidden = outlooks @ layer[SCAN_INPUTS:] + weights.array("bias", units)
         self._outlook = hidden, np.maximum(hidden, 0) @ self._out
         self._layers = (
-            _by_code(layer[: len(MARKS)]),
-            *np.ascontiguousarray(layer[len(MARKS) : CUES]),
+            _by_code(layer[: len(CELL_MARKS)]),
+            *np.ascontiguousarray(layer[len(CELL_MARKS) : SCAN_INPUTS]),
         )
 
-    def scores(self, seen: Seen) -> NDArray[np.float32]:
+    def scores(self, seen: CellFeatures) -> NDArray[np.float32]:
         """(N,) of cells; higher where an object without a track is likelier."""
-        from care_sim.policies.learned.cell_scores import score
+        from care_sim.policies.learned.cell_kernels import network_scores
 
-        scores: NDArray[np.float32] = score(tuple(seen), self._outlook, self._layers, self._out)
+        scores: NDArray[np.float32] = network_scores(
+            tuple(seen), self._outlook, self._layers, self._out
+        )
         return scores
 
 

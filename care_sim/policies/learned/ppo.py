@@ -11,11 +11,11 @@ from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.score_map import ScoreMap
 from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
 from care_sim.policies.learned.tiling import Tiling
-from care_sim.policies.learned.weights import load, shipped
-from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.policies.learned.weights import load_weights, shipped_weights
+from care_sim.policies.learned.wrapping import Wrapping
 
 
-class Ppo(Policy):
+class PpoPolicy(Policy):
     """Does what the learner would behind its wrappers, without noise: the same scores, the same
     allocator.
 
@@ -34,8 +34,8 @@ class Ppo(Policy):
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
-        file = load(shipped(self.weights) if path is None else path)
-        file.check(Ppo.name, rig)
+        file = load_weights(shipped_weights(self.weights) if path is None else path)
+        file.check(PpoPolicy.name, rig)
         wrapping = Wrapping.parse(file.card.wrapper)
         self._reserve_alone = wrapping.action == "SectorReserve"
         self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
@@ -52,7 +52,7 @@ class Ppo(Policy):
         return sector_demand(self.rig, self._sectors, scores)
 
 
-class PpoDartout(Ppo):
+class PpoDartoutPolicy(PpoPolicy):
     """The same, learned on the dart-out."""
 
     name = "ppo-dartout"

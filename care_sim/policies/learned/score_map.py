@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.belief import Observation
-from care_sim.policies.learned.grid_features import CHANNELS, EGO
+from care_sim.policies.learned.grid_features import CHANNELS, EGO_INPUTS
 from care_sim.policies.learned.weights import Weights
-from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.policies.learned.wrapping import Wrapping
 
-MARGIN = 1
+BLOCK_MARGIN = 1
 """Blocks seen beyond a sector on every side."""
 
 
@@ -30,12 +30,12 @@ class ScoreMap:
     def __init__(self, weights: Weights, wrapping: Wrapping):
         self._shape = len(CHANNELS), wrapping.rows, wrapping.columns
         self._stride = wrapping.blocks_a_sector
-        self._window = tuple(blocks + 2 * MARGIN for blocks in self._stride)
+        self._window = tuple(blocks + 2 * BLOCK_MARGIN for blocks in self._stride)
         kernel = weights.array("window.weight", None, len(CHANNELS), *self._window)
         hidden = len(kernel)
         self._kernel = np.ascontiguousarray(kernel.reshape(hidden, -1).T)
         self._bias = weights.array("window.bias", hidden)
-        self._ego = weights.array("ego.weight", hidden, len(EGO))
+        self._ego = weights.array("ego.weight", hidden, len(EGO_INPUTS))
         self._hidden = (
             weights.array("hidden.weight", hidden, hidden),
             weights.array("hidden.bias", hidden),
@@ -55,10 +55,14 @@ class ScoreMap:
     def _windows(self, grid: NDArray[np.float32]) -> NDArray[np.float32]:
         """(sectors, channels * blocks) what each sector sees; nothing above and below the grid."""
         channels, rows, columns = self._shape
-        padded = np.zeros((channels, rows + 2 * MARGIN, columns + 2 * MARGIN), np.float32)
-        padded[:, MARGIN:-MARGIN, MARGIN:-MARGIN] = grid.reshape(self._shape)
-        padded[:, :, :MARGIN] = padded[:, :, -2 * MARGIN : -MARGIN]
-        padded[:, :, -MARGIN:] = padded[:, :, MARGIN : 2 * MARGIN]
+        padded = np.zeros(
+            (channels, rows + 2 * BLOCK_MARGIN, columns + 2 * BLOCK_MARGIN), np.float32
+        )
+        padded[:, BLOCK_MARGIN:-BLOCK_MARGIN, BLOCK_MARGIN:-BLOCK_MARGIN] = grid.reshape(
+            self._shape
+        )
+        padded[:, :, :BLOCK_MARGIN] = padded[:, :, -2 * BLOCK_MARGIN : -BLOCK_MARGIN]
+        padded[:, :, -BLOCK_MARGIN:] = padded[:, :, BLOCK_MARGIN : 2 * BLOCK_MARGIN]
         tall, wide = self._stride
         windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[
             :, ::tall, ::wide

@@ -24,7 +24,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 
 FORMAT = "care-sim weights 1"
-LARGEST = 2**26
+MOST_UNPACKED_BYTES = 2**26
 """Bytes that a file may hold when it is unpacked; the shipped ones hold some thousands."""
 LARGEST_WEIGHT = 1e6
 """What a weight may be, of either sign. Inputs are at most 1 and a file holds 2^24 numbers, so that
@@ -132,7 +132,9 @@ class Weights:
         return array
 
 
-def save(path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: Card) -> None:
+def save_weights(
+    path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], card: Card
+) -> None:
     """Write weights, whole or not at all; the same arrays and card give the same bytes."""
     entries: dict[str, Any] = {_CARD: np.frombuffer(card.to_json().encode(), np.uint8)}
     entries |= {name: np.asarray(array, np.float32) for name, array in arrays.items()}
@@ -140,7 +142,7 @@ def save(path: str | PathLike[str], arrays: Mapping[str, NDArray[np.floating]], 
         np.savez(file, **entries)
 
 
-def load(path: str | PathLike[str]) -> Weights:
+def load_weights(path: str | PathLike[str]) -> Weights:
     """Read weights. Raises InvalidInput for a file that is missing, damaged or something else.
 
     Whatever a spoilt archive provokes in its readers becomes that one line.
@@ -163,7 +165,7 @@ def load(path: str | PathLike[str]) -> Weights:
         ) from error
 
 
-def shipped(name: str) -> Path:
+def shipped_weights(name: str) -> Path:
     """Where the weights of that name lie that come with the package."""
     return Path(__file__).parent / "shipped" / f"{name}.npz"
 
@@ -171,8 +173,8 @@ def shipped(name: str) -> Path:
 def _check_contents(entries: list[ZipInfo]) -> None:
     if len({entry.filename for entry in entries}) < len(entries):
         raise ValueError("an entry comes twice")
-    if sum(entry.file_size for entry in entries) > LARGEST:
-        raise ValueError(f"unpacked it is larger than {LARGEST} bytes")
+    if sum(entry.file_size for entry in entries) > MOST_UNPACKED_BYTES:
+        raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
 
 
 def _grid(plain: dict[str, Any]) -> AngularGrid:

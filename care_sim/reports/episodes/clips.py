@@ -12,7 +12,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.study.episode_play import Watcher
 from care_sim.viewer.pictures.clip_files import check_clip, write_clip
-from care_sim.viewer.pictures.drawing import PAPER
+from care_sim.viewer.pictures.drawing import BACKGROUND
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 
 LAST_PICTURE_S = 2.5
@@ -77,7 +77,7 @@ def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> Iterator[Image.Imag
 
 def _row(pictures: Sequence[Image.Image]) -> Image.Image:
     width, height = pictures[0].size
-    canvas = Image.new("RGB", (len(pictures) * (width + _GAP) - _GAP, height), PAPER)
+    canvas = Image.new("RGB", (len(pictures) * (width + _GAP) - _GAP, height), BACKGROUND)
     for number, picture in enumerate(pictures):
         canvas.paste(picture, (number * (width + _GAP), 0))
     return canvas

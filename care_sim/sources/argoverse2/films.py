@@ -23,7 +23,7 @@ from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2.feather import Columns
 from care_sim.sources.argoverse2.tables import (
     ANNOTATION_FILES,
-    CATEGORIES,
+    ARGOVERSE2_CATEGORIES,
     PLACE,
     POSE_FILE,
     SIZE,
@@ -33,7 +33,7 @@ from care_sim.sources.argoverse2.tables import (
     read_poses,
     table,
 )
-from care_sim.sources.boxes_as_bodies import Prop, annotations_of, shoot
+from care_sim.sources.boxes_as_bodies import Prop, annotations_of, sense
 from care_sim.sources.car_motion import motions
 
 UP_LIDAR = (1.35, 0.0, 1.64)
@@ -41,8 +41,8 @@ UP_LIDAR = (1.35, 0.0, 1.64)
 CAR_FRAME_HEIGHT_M = 0.33
 """The origin of the car's frame, the middle of its rear axle, stands this far above the road: the
 wheels' radius, and where the returns of a recorded sweep lie within 10 m."""
-SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
-KEYFRAME_S = 0.5
+ARGOVERSE2_SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
+ARGOVERSE2_KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
 HALF_SWEEP_NS = NANOSECONDS // 20
 """Annotations come at 10 Hz: the nearest is this far from a moment at most, unless a sweep holds
@@ -63,7 +63,7 @@ def logs(folder: Path) -> list[Path]:
     return found[:1] if found[0] == folder else found
 
 
-def film(log: Path, grid: AngularGrid | None = None) -> Film:
+def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
     """The film of a log, every cell of `grid` (the paper's, unless given) fired in every keyframe.
 
     Raises InvalidInput for a file that is missing, truncated or incomplete, a timestamp without a
@@ -87,11 +87,20 @@ def film(log: Path, grid: AngularGrid | None = None) -> Film:
     shots = []
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
-        seen = shoot(_props(_rows(boxes, moments[row], seen=True)), sensor, SENSOR_HEIGHT_M, grid)
+        seen = sense(
+            _props(_rows(boxes, moments[row], seen=True)), sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid
+        )
         shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
     unseen = _props(_rows(boxes, keyframes[0], seen=False))
     hidden = annotations_of([prop for prop in unseen if prop.label is not None])
-    return Film(log.name, SURROUND_CAMERAS, SENSOR_HEIGHT_M, KEYFRAME_S, tuple(shots), hidden)
+    return Film(
+        log.name,
+        SURROUND_CAMERAS,
+        ARGOVERSE2_SENSOR_HEIGHT_M,
+        ARGOVERSE2_KEYFRAME_S,
+        tuple(shots),
+        hidden,
+    )
 
 
 def _is_log(path: Path) -> bool:
@@ -103,7 +112,9 @@ def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
     sweep that is nearest, or, where the sweep holds no annotation, of the nearest pose. Both
     ascend.
     """
-    moments = np.arange(sweeps[0], sweeps[-1] + HALF_SWEEP_NS, round(KEYFRAME_S * NANOSECONDS))
+    moments = np.arange(
+        sweeps[0], sweeps[-1] + HALF_SWEEP_NS, round(ARGOVERSE2_KEYFRAME_S * NANOSECONDS)
+    )
     annotated = _nearest(sweeps, moments)
     chosen = np.where(
         np.abs(annotated - moments) <= HALF_SWEEP_NS, annotated, _nearest(posed, moments)
@@ -139,7 +150,7 @@ def _rows(boxes: Columns, sweep: int, seen: bool) -> Columns:
 def _props(boxes: Columns) -> list[Prop]:
     """The boxes as bodies; the sensor's axes are the car's."""
     numbers = boxes["number"].tolist()
-    labels = [CATEGORIES[name] for name in boxes["category"].tolist()]
+    labels = [ARGOVERSE2_CATEGORIES[name] for name in boxes["category"].tolist()]
     sizes = [tuple(size) for size in table(boxes, SIZE).tolist()]
     places = table(boxes, PLACE) - UP_LIDAR
     turns = table(boxes, TURN)

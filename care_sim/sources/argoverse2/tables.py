@@ -11,9 +11,16 @@ from care_sim.base.text import shown
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.sources.argoverse2.feather import Columns, read_columns
-from care_sim.sources.plausible import AWAY_M, MAP_M, SIZES_M, STAMPS_NS, check_span, turn_fault
+from care_sim.sources.plausible import (
+    AWAY_M,
+    MAP_M,
+    SIZES_M,
+    STAMPS_NS,
+    check_span,
+    quaternion_fault,
+)
 
-CATEGORIES: dict[str, str | None] = {
+ARGOVERSE2_CATEGORIES: dict[str, str | None] = {
     "REGULAR_VEHICLE": "car",
     "BOX_TRUCK": "truck",
     "LARGE_VEHICLE": "truck",
@@ -96,10 +103,10 @@ def read_boxes(path: Path) -> tuple[Cells, Columns]:
         raise InvalidInput(f"{path}: no annotations")
     check_span(path, (sweeps[-1] - sweeps[0]) * 1e-9)
     for category in np.unique(boxes["category"]).tolist():
-        if category not in CATEGORIES:
-            raise InvalidInput(f"{path}: {unknown('category', category, CATEGORIES)}")
+        if category not in ARGOVERSE2_CATEGORIES:
+            raise InvalidInput(f"{path}: {unknown('category', category, ARGOVERSE2_CATEGORIES)}")
     numbers = np.unique(boxes["track_uuid"], return_inverse=True)[1]
-    fault = turn_fault(table(boxes, TURN))
+    fault = quaternion_fault(table(boxes, TURN))
     if fault is not None:
         raise InvalidInput(f"{path}: {_seen(boxes, fault[0])} has {fault[1]}")
     again = _first_again(np.column_stack([boxes["timestamp_ns"], numbers]))
@@ -119,7 +126,7 @@ def read_poses(path: Path) -> Columns:
     again = _first_again(stamps[:, None])
     if again is not None:
         raise InvalidInput(f"{path}: two poses at {stamps[again]}")
-    fault = turn_fault(table(poses, TURN))
+    fault = quaternion_fault(table(poses, TURN))
     if fault is not None:
         raise InvalidInput(f"{path}: the pose at {stamps[fault[0]]} has {fault[1]}")
     order = np.argsort(stamps)

@@ -16,7 +16,7 @@ from care_sim.sensors.annotated import Annotations, IdentifiedDetections
 from care_sim.sensors.camera import CAMERA_WIDTH
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 
-CHANNELS = (
+CAMERA_CHANNELS = (
     "CAM_FRONT",
     "CAM_FRONT_LEFT",
     "CAM_FRONT_RIGHT",

@@ -2,7 +2,7 @@
 
 from care_sim.base.errors import InvalidInput, unknown
 
-CATEGORIES: dict[str, str | None] = {
+NUSCENES_CATEGORIES: dict[str, str | None] = {
     "human.pedestrian.adult": "pedestrian",
     "human.pedestrian.child": "pedestrian",
     "human.pedestrian.construction_worker": "pedestrian",
@@ -56,7 +56,7 @@ def class_of(name: str) -> str | None:
 
     Raises UnknownCategory for any other name.
     """
-    known = CATEGORIES | DETECTION_NAMES
+    known = NUSCENES_CATEGORIES | DETECTION_NAMES
     if name not in known:
         raise UnknownCategory(str(unknown("category", name, known)))
     return known[name]

@@ -22,7 +22,7 @@ from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import NOBODY, Annotations, IdentifiedDetections
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
-from care_sim.sources.nuscenes.tables import Database, Row, read_json
+from care_sim.sources.nuscenes.tables import Database, JsonRow, read_json
 
 COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
 """The categories of COCO that the five classes hold."""
@@ -69,7 +69,10 @@ class DetectionFile:
                 )
 
     def seen(
-        self, cameras: Sequence[RecordedCamera], pictures: Sequence[Row], annotations: Annotations
+        self,
+        cameras: Sequence[RecordedCamera],
+        pictures: Sequence[JsonRow],
+        annotations: Annotations,
     ) -> IdentifiedDetections:
         """The detections on the pictures of a keyframe, one a camera, each with the object that it
         lies on.
@@ -94,7 +97,7 @@ class DetectionFile:
         )
 
 
-def _rows(path: Path) -> list[Row]:
+def _rows(path: Path) -> list[JsonRow]:
     """The rows of either form, which may be none."""
     content = read_json(path)
     results = content.get("results") if isinstance(content, dict) else None
@@ -111,7 +114,7 @@ def _rows(path: Path) -> list[Row]:
     return content
 
 
-def _read(row: Row) -> tuple[str, Found | None]:
+def _read(row: JsonRow) -> tuple[str, Found | None]:
     """The picture and the detection on it, None outside the five classes."""
     if not isinstance(row, dict):
         raise TypeError(f"no map of fields: {row!r}")

@@ -20,7 +20,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, IdentifiedDetections
 from care_sim.sources.car_motion import motions
 from care_sim.sources.nuscenes.cameras import (
-    CHANNELS,
+    CAMERA_CHANNELS,
     PICTURE,
     VISIBLE_SHARES,
     RecordedCamera,
@@ -30,10 +30,10 @@ from care_sim.sources.nuscenes.cameras import (
 from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
-from care_sim.sources.nuscenes.tables import Database, Row
-from care_sim.sources.plausible import AWAY_M, MAP_M, MOUNT_M, SIZES_M, turn_fault
+from care_sim.sources.nuscenes.tables import Database, JsonRow
+from care_sim.sources.plausible import AWAY_M, MAP_M, MOUNT_M, SIZES_M, quaternion_fault
 
-KEYFRAME_S = 0.5
+NUSCENES_KEYFRAME_S = 0.5
 """nuScenes annotates its keyframes at 2 Hz."""
 LIDAR = "LIDAR_TOP"
 FOCALS = (10.0, 1e5)
@@ -42,9 +42,9 @@ _FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
 """In LIDAR_TOP's own frame x points right and y forward."""
 
 
-def film(
+def nuscenes_film(
     database: Database,
-    scene: Row,
+    scene: JsonRow,
     grid: AngularGrid | None = None,
     detections: DetectionFile | None = None,
 ) -> Film:
@@ -70,7 +70,7 @@ def film(
     )
     cameras = tuple(camera.pinhole for camera in stage.cameras)
     hidden = stage.hidden(samples[0], cars[0])
-    return Film(scene["name"], cameras, stage.lidar.z, KEYFRAME_S, shots, hidden)
+    return Film(scene["name"], cameras, stage.lidar.z, NUSCENES_KEYFRAME_S, shots, hidden)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class _Stage:
     detections: DetectionFile | None
 
     def shot(
-        self, sample: Row, recordings: dict[str, Row], time_s: float, car: Frame, ego: Ego
+        self, sample: JsonRow, recordings: dict[str, JsonRow], time_s: float, car: Frame, ego: Ego
     ) -> Shot:
         sensor = car.holding(self.lidar.origin, self.lidar.rotation)
         boxes = self._boxes(sample, seen=True)
@@ -97,14 +97,14 @@ class _Stage:
         identified = self._seen(recordings, boxes, annotations)
         return Shot(time_s, sample["token"], sensor, ego, annotations, identified, cloud)
 
-    def hidden(self, sample: Row, car: Frame) -> Annotations:
+    def hidden(self, sample: JsonRow, car: Frame) -> Annotations:
         """What is annotated without a point."""
         boxes = self._boxes(sample, seen=False)
         return _annotations(
             self.database, boxes, self.numbers, car.holding(self.lidar.origin, self.lidar.rotation)
         )
 
-    def _boxes(self, sample: Row, seen: bool) -> list[Row]:
+    def _boxes(self, sample: JsonRow, seen: bool) -> list[JsonRow]:
         """The annotations of the five classes that hold a point, or those that hold none."""
         boxes = self.database.annotations(sample["token"])
         return [
@@ -114,30 +114,30 @@ class _Stage:
         ]
 
     def _seen(
-        self, recordings: dict[str, Row], boxes: list[Row], annotations: Annotations
+        self, recordings: dict[str, JsonRow], boxes: list[JsonRow], annotations: Annotations
     ) -> IdentifiedDetections:
         if self.detections is None:
             return projected_detections(self.cameras, annotations, _shares(self.database, boxes))
         return self.detections.seen(
-            self.cameras, [recordings[channel] for channel in CHANNELS], annotations
+            self.cameras, [recordings[channel] for channel in CAMERA_CHANNELS], annotations
         )
 
 
 def _stage(
     database: Database,
-    samples: list[Row],
-    recordings: dict[str, Row],
+    samples: list[JsonRow],
+    recordings: dict[str, JsonRow],
     grid: AngularGrid,
     detections: DetectionFile | None,
 ) -> _Stage:
     lidar = _lidar_mount(database, recordings[LIDAR])
-    cameras = tuple(_camera(database, recordings[channel], lidar) for channel in CHANNELS)
+    cameras = tuple(_camera(database, recordings[channel], lidar) for channel in CAMERA_CHANNELS)
     return _Stage(database, lidar, cameras, _object_numbers(database, samples), grid, detections)
 
 
-def _recordings(database: Database, sample: Row) -> dict[str, Row]:
+def _recordings(database: Database, sample: JsonRow) -> dict[str, JsonRow]:
     found = database.keyframe_data(sample["token"])
-    for channel in (LIDAR, *CHANNELS):
+    for channel in (LIDAR, *CAMERA_CHANNELS):
         if channel not in found:
             raise InvalidInput(
                 f"{database.path('sample_data')}: no {channel} of the sample {sample['token']!r}"
@@ -148,14 +148,14 @@ def _recordings(database: Database, sample: Row) -> dict[str, Row]:
 def _frame(database: Database, table: str, token: str) -> Frame:
     w, x, y, z = database.numbers(table, token, "rotation", 4).tolist()
     mounted = table == "calibrated_sensor"
-    fault = turn_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
+    fault = quaternion_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
     if fault is not None:
         raise InvalidInput(f"{database.path(table)}: rotation of {token!r}: {fault[1]}")
     origin = database.numbers(table, token, "translation", 3, within=MOUNT_M if mounted else MAP_M)
     return Frame.turned_by(Rotation.from_quat([x, y, z, w]), origin)
 
 
-def _lidar_mount(database: Database, data: Row) -> Frame:
+def _lidar_mount(database: Database, data: JsonRow) -> Frame:
     """The sensor frame in the car's: x forward where LIDAR_TOP has y forward."""
     token = data["calibrated_sensor_token"]
     own = _frame(database, "calibrated_sensor", token)
@@ -165,7 +165,7 @@ def _lidar_mount(database: Database, data: Row) -> Frame:
     return Frame.turned_by(own.rotation * _FORWARD_FROM_RIGHT, own.origin)
 
 
-def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
+def _camera(database: Database, data: JsonRow, lidar: Frame) -> RecordedCamera:
     token = data["calibrated_sensor_token"]
     intrinsic = database.numbers("calibrated_sensor", token, "camera_intrinsic", 3, 3)
     if not FOCALS[0] <= intrinsic[0, 0] <= FOCALS[1]:
@@ -183,7 +183,7 @@ def _camera(database: Database, data: Row, lidar: Frame) -> RecordedCamera:
     return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
 
 
-def _class_name(database: Database, box: Row) -> str | None:
+def _class_name(database: Database, box: JsonRow) -> str | None:
     token = database.row("instance", box["instance_token"])["category_token"]
     try:
         return class_of(database.row("category", token)["name"])
@@ -191,11 +191,11 @@ def _class_name(database: Database, box: Row) -> str | None:
         raise InvalidInput(f"{database.path('category')}: {token!r}: {error}") from None
 
 
-def _has_points(box: Row) -> bool:
+def _has_points(box: JsonRow) -> bool:
     return bool(box["num_lidar_pts"] + box["num_radar_pts"] > 0)
 
 
-def _object_numbers(database: Database, samples: list[Row]) -> dict[str, int]:
+def _object_numbers(database: Database, samples: list[JsonRow]) -> dict[str, int]:
     """A number for every instance of a scene."""
     tokens = {
         box["instance_token"] for sample in samples for box in database.annotations(sample["token"])
@@ -204,7 +204,7 @@ def _object_numbers(database: Database, samples: list[Row]) -> dict[str, int]:
 
 
 def _annotations(
-    database: Database, boxes: list[Row], numbers: dict[str, int], sensor: Frame
+    database: Database, boxes: list[JsonRow], numbers: dict[str, int], sensor: Frame
 ) -> Annotations:
     rows = np.array([_world_box(database, box) for box in boxes]).reshape(-1, 7)
     classes = [CLASSES.index(str(_class_name(database, box))) for box in boxes]
@@ -222,7 +222,7 @@ def _annotations(
     return Annotations(np.array(objects, dtype=np.int64), np.array(classes, dtype=np.int64), local)
 
 
-def _world_box(database: Database, box: Row) -> tuple[float, ...]:
+def _world_box(database: Database, box: JsonRow) -> tuple[float, ...]:
     """Sizes are width, length, height in the table."""
     frame = _frame(database, "sample_annotation", box["token"])
     width, length, height = database.numbers(
@@ -231,7 +231,7 @@ def _world_box(database: Database, box: Row) -> tuple[float, ...]:
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 
 
-def _shares(database: Database, boxes: list[Row]) -> Floats:
+def _shares(database: Database, boxes: list[JsonRow]) -> Floats:
     return np.array([_share(database, box["visibility_token"]) for box in boxes])
 
 

@@ -11,7 +11,7 @@ from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.frames import Floats, turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.loops.film import Shot
-from care_sim.sources.nuscenes.tables import Row
+from care_sim.sources.nuscenes.tables import JsonRow
 
 MODALITIES = {
     "use_camera": True,
@@ -41,7 +41,7 @@ box and its speed could tell.
 """
 
 
-def boxes(shot: Shot, detections: Detections, velocities: Floats) -> list[Row]:
+def result_boxes(shot: Shot, detections: Detections, velocities: Floats) -> list[JsonRow]:
     """The detections (n) of a keyframe as boxes of its sample, surest first, the MOST_BOXES surest
     of more.
 
@@ -80,7 +80,7 @@ def attribute(name: str, speed_mps: float) -> str:
     return moving if speed_mps > STANDING_MPS else standing
 
 
-def _box(name: str, box: Floats, velocity: Floats, score: float) -> Row:
+def _box(name: str, box: Floats, velocity: Floats, score: float) -> JsonRow:
     x, y, z, length, width, height, yaw = box.tolist()
     return {
         "translation": [x, y, z],

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.nuscenes.tables import Database, Row, read_json
+from care_sim.sources.nuscenes.tables import Database, JsonRow, read_json
 
 _VAL_NUMBERS = (
     (3, 3),
@@ -41,7 +41,7 @@ VAL = tuple(
 """The 150 scenes of the official validation split (nuScenes devkit, utils/splits.py)."""
 
 
-def scenes(database: Database, split: str = "val") -> list[Row]:
+def scenes(database: Database, split: str = "val") -> list[JsonRow]:
     """The scenes of a split that the database holds, by name: of `val`, of a split in
     `<root>/<version>/splits.json` (a map from names of splits to lists of names of scenes, which
     goes before), or `all`.

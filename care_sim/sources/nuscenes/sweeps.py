@@ -12,7 +12,7 @@ from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
 VALUES_A_POINT = 5
 """float32 x, y, z, intensity and ring."""
-LARGEST = 2**28
+MOST_SWEEP_BYTES = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
 OWN_CAR_M = 1.0
 """Points nearer than this lie on the recording car (the radius within which the devkit drops them
@@ -24,13 +24,15 @@ def read_points(path: Path) -> Floats:
     """(n, 3) points of a `.pcd.bin` file in the sensor frame: x forward, y left. In the file x is
     right, y forward.
 
-    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST`, and for a
-    place that is not finite.
+    Raises InvalidInput for a file that is missing, truncated or larger than `MOST_SWEEP_BYTES`, and
+    for a place that is not finite.
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such file")
-    if path.stat().st_size > LARGEST:
-        raise InvalidInput(f"{path}: {path.stat().st_size} bytes, a sweep may hold {LARGEST}")
+    if path.stat().st_size > MOST_SWEEP_BYTES:
+        raise InvalidInput(
+            f"{path}: {path.stat().st_size} bytes, a sweep may hold {MOST_SWEEP_BYTES}"
+        )
     try:
         values = np.fromfile(path, np.uint8)
     except OSError as error:

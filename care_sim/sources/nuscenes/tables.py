@@ -12,11 +12,11 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import json_content
 from care_sim.core.frames import Floats
-from care_sim.sources.plausible import STAMPS_NS, Range, check_span
+from care_sim.sources.plausible import STAMPS_NS, Interval, check_span
 
-Row = dict[str, Any]
+JsonRow = dict[str, Any]
 
-ANY: Range = (float("-inf"), float("inf"))
+UNBOUNDED: Interval = (float("-inf"), float("inf"))
 LARGEST_TABLE = 2**33
 """Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of
 half a kilobyte).
@@ -68,13 +68,13 @@ class Database:
     def __init__(self, root: Path, version: str | None = None):
         self.root = root
         self.folder = root / version if version else _only_version(root)
-        self._tables: dict[str, dict[str, Row]] = {}
+        self._tables: dict[str, dict[str, JsonRow]] = {}
 
     def path(self, table: str) -> Path:
         """The file of a table."""
         return self.folder / f"{table}.json"
 
-    def rows(self, table: str) -> dict[str, Row]:
+    def rows(self, table: str) -> dict[str, JsonRow]:
         """The rows of a table by token. Of recordings and car poses only those of keyframes: one in
         six.
         """
@@ -82,7 +82,7 @@ class Database:
             self._tables[table] = self._read(table)
         return self._tables[table]
 
-    def row(self, table: str, token: str) -> Row:
+    def row(self, table: str, token: str) -> JsonRow:
         """The row with a token."""
         rows = self.rows(table)
         if token not in rows:
@@ -90,7 +90,7 @@ class Database:
         return rows[token]
 
     def numbers(
-        self, table: str, token: str, field: str, *shape: int, within: Range = ANY
+        self, table: str, token: str, field: str, *shape: int, within: Interval = UNBOUNDED
     ) -> Floats:
         """A field of finite numbers as an array of `shape`, all in the range `within`."""
         found = self.row(table, token)[field]
@@ -110,17 +110,17 @@ class Database:
             raise InvalidInput(f"{self.path(table)}: {field} of {token!r} {place}")
         return values.astype(float)
 
-    def keyframe_data(self, sample: str) -> dict[str, Row]:
+    def keyframe_data(self, sample: str) -> dict[str, JsonRow]:
         """The keyframe recordings of a sample by channel."""
         return {self.sensor_of(row)["channel"]: row for row in self._data_of_samples[sample]}
 
-    def sensor_of(self, data: Row) -> Row:
+    def sensor_of(self, data: JsonRow) -> JsonRow:
         """The sensor that made a recording."""
         return self.row(
             "sensor", self.row("calibrated_sensor", data["calibrated_sensor_token"])["sensor_token"]
         )
 
-    def annotations(self, sample: str) -> Sequence[Row]:
+    def annotations(self, sample: str) -> Sequence[JsonRow]:
         """The annotated boxes of a sample, one an instance."""
         boxes = self._boxes_of_samples[sample]
         for token, count in Counter(box["instance_token"] for box in boxes).items():
@@ -131,9 +131,9 @@ class Database:
                 )
         return boxes
 
-    def samples(self, scene: Row) -> list[Row]:
+    def samples(self, scene: JsonRow) -> list[JsonRow]:
         """The samples of a scene in order of time."""
-        found: list[Row] = []
+        found: list[JsonRow] = []
         token = scene["first_sample_token"]
         while token or not found:
             row = self.row("sample", token)
@@ -154,13 +154,13 @@ class Database:
         check_span(self.path("sample"), (found[-1]["timestamp"] - found[0]["timestamp"]) * 1e-6)
         return found
 
-    def _read(self, table: str) -> dict[str, Row]:
+    def _read(self, table: str) -> dict[str, JsonRow]:
         """The rows and fields that are needed; whatever else a table holds is dropped while it is
         parsed.
         """
         kinds = {"token": str, **FIELDS[table]}
 
-        def taken(row: Row) -> object:
+        def taken(row: JsonRow) -> object:
             return (
                 {name: row[name] for name in kinds if name in row}
                 if self._is_needed(table, row)
@@ -169,7 +169,7 @@ class Database:
 
         return _indexed(self.path(table), read_json(self.path(table), taken), kinds)
 
-    def _is_needed(self, table: str, row: Row) -> bool:
+    def _is_needed(self, table: str, row: JsonRow) -> bool:
         if table == "sample_data":
             return row.get("is_key_frame") is not False
         return table != "ego_pose" or "token" not in row or str(row["token"]) in self._poses_read
@@ -188,18 +188,18 @@ class Database:
         )
 
     @cached_property
-    def _data_of_samples(self) -> dict[str, list[Row]]:
+    def _data_of_samples(self) -> dict[str, list[JsonRow]]:
         return _grouped(self.rows("sample_data").values())
 
     @cached_property
-    def _boxes_of_samples(self) -> dict[str, list[Row]]:
+    def _boxes_of_samples(self) -> dict[str, list[JsonRow]]:
         boxes = self.rows("sample_annotation").values()
         for box in boxes:
             self.row("sample", box["sample_token"])
         return _grouped(boxes)
 
 
-def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
+def read_json(path: Path, taken: Callable[[JsonRow], object] | None = None) -> Any:
     """The content of a JSON file, every map in it replaced by what is `taken` of it.
 
     Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
@@ -212,7 +212,7 @@ def read_json(path: Path, taken: Callable[[Row], object] | None = None) -> Any:
         raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
 
 
-def _check_stamp(path: Path, sample: Row) -> None:
+def _check_stamp(path: Path, sample: JsonRow) -> None:
     least, most = (nanoseconds // 1000 for nanoseconds in STAMPS_NS)
     check_whole(f"{path}: timestamp of {sample['token']!r}", sample["timestamp"], least, most)
 
@@ -230,7 +230,7 @@ def _only_version(root: Path) -> Path:
 _DROPPED = object()
 
 
-def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str, Row]:
+def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str, JsonRow]:
     """The rows by token, once every field is of its kind."""
     if not isinstance(content, list):
         raise InvalidInput(f"{path}: must hold a list of rows")
@@ -245,20 +245,20 @@ def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str
     return _by_token(path, [row for row in content if row is not _DROPPED])
 
 
-def _what_is_wrong(row: Row, number: int, name: str, kind: type) -> str:
+def _what_is_wrong(row: JsonRow, number: int, name: str, kind: type) -> str:
     which = f"row {row.get('token') or number}"
     return (
-        f"{which}: {name} must be {KINDS[kind]}, got {row[name]!r}"
+        f"{which}: {name} must be {KIND_WORDS[kind]}, got {row[name]!r}"
         if name in row
         else f"{which} lacks {name!r}"
     )
 
 
-KINDS = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}
+KIND_WORDS = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}
 """What the kinds of values are called."""
 
 
-def _by_token(path: Path, rows: list[Row]) -> dict[str, Row]:
+def _by_token(path: Path, rows: list[JsonRow]) -> dict[str, JsonRow]:
     indexed = {row["token"]: row for row in rows}
     if len(indexed) < len(rows):
         (token, count), *_ = Counter(row["token"] for row in rows).most_common(1)
@@ -266,8 +266,8 @@ def _by_token(path: Path, rows: list[Row]) -> dict[str, Row]:
     return indexed
 
 
-def _grouped(rows: Iterable[Row]) -> dict[str, list[Row]]:
-    groups: dict[str, list[Row]] = defaultdict(list)
+def _grouped(rows: Iterable[JsonRow]) -> dict[str, list[JsonRow]]:
+    groups: dict[str, list[JsonRow]] = defaultdict(list)
     for row in rows:
         groups[row["sample_token"]].append(row)
     return groups

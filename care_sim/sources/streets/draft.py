@@ -14,10 +14,10 @@ STEP_S = 0.1
 """Between two samples of a way: at 30 km/h a car moves 0.8 m in it, so that nobody steps through a
 car unseen.
 """
-KEYFRAME_S = 0.5
+STREET_KEYFRAME_S = 0.5
 KEYFRAMES = 40
 """20 s at 2 Hz, as the scenes of nuScenes (paper, Sec. 5.1)."""
-TIMES: Floats = STEP_S * np.arange(round(KEYFRAMES * KEYFRAME_S / STEP_S), dtype=np.float64)
+TIMES: Floats = STEP_S * np.arange(round(KEYFRAMES * STREET_KEYFRAME_S / STEP_S), dtype=np.float64)
 """(t,) seconds at which ways are sampled."""
 
 Footprint = tuple[float, float]
@@ -50,7 +50,7 @@ def _reach(poses: Floats, sizes: Floats, angle: Floats) -> Floats:
 
 
 @dataclass
-class Crowd:
+class PlacedBodies:
     """Footprints with their ways: lists that grow together. A way is (1, 3) for what stands, else
     (t, 3).
     """
@@ -99,9 +99,9 @@ class Draft:
         self.rng = rng
         self.kinds: list[str] = []
         self.ways: list[Floats] = []
-        self._fixed = Crowd()
-        self._moving = Crowd()
-        self._reserved = Crowd()
+        self._fixed = PlacedBodies()
+        self._moving = PlacedBodies()
+        self._reserved = PlacedBodies()
 
     def reserve(self, pose: Floats, size: Footprint) -> None:
         """Keep a rectangle free of everything that stands: a carriageway, a junction."""

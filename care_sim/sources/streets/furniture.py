@@ -29,7 +29,7 @@ HOUSE_GAP_M: Range = (6.0, 12.0)
 """Between detached houses: twice the 3 m that German building codes keep from a boundary, and a
 garage.
 """
-GATE_M: Range = (1.0, 3.5)
+GATE_WIDTH_M: Range = (1.0, 3.5)
 """Openings in a hedge, between every other two of its pieces: a gate, or a drive."""
 GATE_CHANCE = 0.5
 CORNER_M = 5.0
@@ -127,9 +127,9 @@ def _line_with_houses(draft: Draft, road: Road, side: Side, span: Span) -> None:
         ).fill(draft, road, span)
         return
     _outside(side.front_m, side, "house", lambda: draw(rng, HOUSE_GAP_M)).fill(draft, road, span)
-    _outside(side.boundary_m, side, "hedge", lambda: _now_and_then(rng, GATE_CHANCE, GATE_M)).fill(
-        draft, road, span
-    )
+    _outside(
+        side.boundary_m, side, "hedge", lambda: _now_and_then(rng, GATE_CHANCE, GATE_WIDTH_M)
+    ).fill(draft, road, span)
 
 
 def _outside(edge_m: float, side: Side, kind: str, next_gap: Callable[[], float]) -> _Row:

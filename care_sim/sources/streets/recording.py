@@ -17,7 +17,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
-from care_sim.sources.streets.draft import KEYFRAME_S
+from care_sim.sources.streets.draft import STREET_KEYFRAME_S
 from care_sim.sources.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
@@ -46,7 +46,7 @@ def record(
         shots, hidden = zip(
             *(stage.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True
         )
-    return Film(street.name, cameras, LIDAR_POSITION[2], KEYFRAME_S, shots, hidden[0])
+    return Film(street.name, cameras, LIDAR_POSITION[2], STREET_KEYFRAME_S, shots, hidden[0])
 
 
 def street_film(seed: int, secret: str = "") -> Film:
@@ -109,7 +109,7 @@ class _Stage:
         token = f"{street.name}/{keyframe:02d}"
         motion = street.motion[keyframe]
         return Shot(
-            keyframe * KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
+            keyframe * STREET_KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
         ), hidden
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Cells:

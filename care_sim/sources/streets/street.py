@@ -16,7 +16,7 @@ import numpy as np
 
 from care_sim.core.frames import Floats
 from care_sim.core.types import Ego
-from care_sim.sources.streets.draft import KEYFRAME_S, STEP_S, Draft
+from care_sim.sources.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
 from care_sim.sources.streets.drivers import BEYOND_M, drive_joining, drive_main
 from care_sim.sources.streets.furniture import JOINING_M, furnish
 from care_sim.sources.streets.layouts import LAYOUTS
@@ -85,7 +85,7 @@ def make_street(seed: int) -> Street:
         ),
     ):
         populate(draft, road, reach)
-    every = round(KEYFRAME_S / STEP_S)
+    every = round(STREET_KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]
     return Street(
         street_name(seed), tuple(draft.kinds), poses, drive.poses[::every], drive.motion[::every]

@@ -26,7 +26,7 @@ def check_clip(path: Path) -> None:
     check_known("ending of a clip", path.suffix, ENDINGS)
     if path.suffix == ".mp4":
         import_imageio_ffmpeg()
-    check_output(path, KINDS[path.suffix])
+    check_output(path, CLIP_KINDS[path.suffix])
 
 
 def write_clip(
@@ -38,7 +38,7 @@ def write_clip(
     The ending of `path`, which `check_clip` has let pass, decides the form. The file is there whole
     or not at all.
     """
-    with replacing(path, KINDS[path.suffix]) as unfinished:
+    with replacing(path, CLIP_KINDS[path.suffix]) as unfinished:
         ENDINGS[path.suffix](unfinished, pictures, picture_s, hold_s)
 
 
@@ -48,10 +48,15 @@ def _write_mp4(
     shown = iter(pictures)
     first = next(shown)
     ffmpeg = import_imageio_ffmpeg()
-    looks = {"fps": 1 / picture_s, "macro_block_size": 2, "quality": 7, "ffmpeg_log_level": "quiet"}
+    settings = {
+        "fps": 1 / picture_s,
+        "macro_block_size": 2,
+        "quality": 7,
+        "ffmpeg_log_level": "quiet",
+    }
     sent = 0
     try:
-        with closing(ffmpeg.write_frames(str(path), first.size, **looks)) as film:
+        with closing(ffmpeg.write_frames(str(path), first.size, **settings)) as film:
             film.send(None)
             for picture in chain([first], shown):
                 film.send(picture.tobytes())
@@ -92,7 +97,7 @@ def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
 
 
-KINDS = {".mp4": MP4, ".gif": GIF, ".webp": WEBP, ".png": PNG}
+CLIP_KINDS = {".mp4": MP4, ".gif": GIF, ".webp": WEBP, ".png": PNG}
 ENDINGS: dict[str, Callable[[Path, Iterable[Image.Image], float, float], None]] = {
     ".mp4": _write_mp4,
     ".gif": _write_gif,

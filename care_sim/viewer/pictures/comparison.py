@@ -13,12 +13,12 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
+from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
 from care_sim.viewer.pictures.furnished_world import add_car, furnished
 from care_sim.viewer.pictures.keyframe import (
-    BRAKING,
-    DETECTED,
-    IN_VIEW,
+    BRAKING_COLOUR,
+    DETECTED_COLOUR,
+    IN_VIEW_COLOUR,
     mark_first_sighting,
     mark_tracks,
 )
@@ -29,7 +29,7 @@ _TOP = 36
 _COLUMN_PIXELS = 2
 _ROW_PIXELS = 3
 _GRID_TOP = _TOP + _VIEW[1] + 22
-WIDTH, HEIGHT = _VIEW[0], 508
+COMPARISON_WIDTH, COMPARISON_HEIGHT = _VIEW[0], 508
 
 
 def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
@@ -40,29 +40,29 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
     front half of the angular grid with the cells that fired, coloured by range, and whether the
     first-sighting actor is detected, since when and how far away. The episode is left as it was.
     """
-    canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
+    canvas = Image.new("RGB", (COMPARISON_WIDTH, COMPARISON_HEIGHT), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     _write_header(draw, name, loop, frames[-1])
     canvas.paste(_chase_view(loop, frames[-1]), (0, _TOP))
     draw.text(
         (8, _GRID_TOP - 20),
         f"{len(frames[-1].fired)} LiDAR cells fired, those ahead:",
-        FAINT,
+        FAINT_INK,
         drawing.font(14),
     )
     canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
-    text, colour = verdict(frames, loop.rig.keyframe_s)
-    draw.text((8, HEIGHT - 26), text, colour, drawing.font(18))
+    text, colour = verdict_text(frames, loop.rig.keyframe_s)
+    draw.text((8, COMPARISON_HEIGHT - 26), text, colour, drawing.font(18))
     return canvas
 
 
 def _write_header(draw: ImageDraw.ImageDraw, name: str, loop: ClosedLoop, frame: Keyframe) -> None:
     draw.text((8, 6), name, INK, drawing.font(22))
-    draw.text((250, 8), f"{loop.world.time:.1f} s", FAINT, drawing.font(18))
-    draw.text((305, 8), f"{loop.world.ego_motion.speed:.1f} m/s", FAINT, drawing.font(18))
+    draw.text((250, 8), f"{loop.world.time:.1f} s", FAINT_INK, drawing.font(18))
+    draw.text((305, 8), f"{loop.world.ego_motion.speed:.1f} m/s", FAINT_INK, drawing.font(18))
     if frame.braking:
-        draw.rounded_rectangle((398, 4, 508, 32), 6, BRAKING)
-        draw.text((453, 18), "BRAKING", PAPER, drawing.font(20), anchor="mm")
+        draw.rounded_rectangle((398, 4, 508, 32), 6, BRAKING_COLOUR)
+        draw.text((453, 18), "BRAKING", BACKGROUND, drawing.font(20), anchor="mm")
 
 
 def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
@@ -84,17 +84,20 @@ def _cells_ahead(loop: ClosedLoop) -> Image.Image:
     )
 
 
-def verdict(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:
+def verdict_text(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:
     """What has come of the first sighting so far."""
     seen = next((frame.time_s for frame in frames if frame.in_view), None)
     found = next((frame.time_s for frame in frames if frame.detected), None)
     if found is None:
         if seen is None:
-            return "not in view yet", FAINT
-        return f"in view for {frames[-1].time_s - seen + keyframe_s:.1f} s, not detected", IN_VIEW
+            return "not in view yet", FAINT_INK
+        return (
+            f"in view for {frames[-1].time_s - seen + keyframe_s:.1f} s, not detected",
+            IN_VIEW_COLOUR,
+        )
     so_far = outcome(frames)
     late = f", {found - seen:.1f} s late" if seen is not None and found > seen else ""
     clearance = (
         "" if so_far.clearance_m is None else f"; least clearance {so_far.clearance_m:.1f} m"
     )
-    return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED
+    return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED_COLOUR

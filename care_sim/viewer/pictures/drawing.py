@@ -16,10 +16,10 @@ from care_sim.core.pinhole import NEAR_M, PinholeCamera
 Colour = tuple[int, int, int]
 
 INK = (235, 237, 240)
-FAINT = (150, 155, 162)
-PAPER = (24, 26, 30)
-NOT_FIRED = (44, 47, 53)
-NO_RETURN = (112, 116, 124)
+FAINT_INK = (150, 155, 162)
+BACKGROUND = (24, 26, 30)
+NOT_FIRED_COLOUR = (44, 47, 53)
+NO_RETURN_COLOUR = (112, 116, 124)
 _RANGE_COLOURS = colormaps["plasma_r"]
 
 
@@ -37,7 +37,7 @@ def label(
     canvas = draw.im.size
     x = min(max(at[0] - width / 2, 0), canvas[0] - width)
     y = min(max(at[1] - height - 2, 0), canvas[1] - height)
-    draw.rectangle((x, y, x + width, y + height), PAPER)
+    draw.rectangle((x, y, x + width, y + height), BACKGROUND)
     draw.text((x + 3 - left, y + 3 - top), text, colour, font(size))
 
 
@@ -79,10 +79,10 @@ def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: in
     """The scan (E, A) as the car sees it: left of the picture is the left, straight ahead is the
     middle.
     """
-    picture = np.full((*grid.shape, 3), NOT_FIRED, np.uint8)
+    picture = np.full((*grid.shape, 3), NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
-    picture[fired] = NO_RETURN
+    picture[fired] = NO_RETURN_COLOUR
     picture[returned] = range_colours(ranges[returned] / grid.range_m)
     return Image.fromarray(np.repeat(picture[:, ::-1], row_pixels, axis=0))
 

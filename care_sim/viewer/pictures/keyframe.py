@@ -14,7 +14,13 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.drawing import FAINT, INK, NO_RETURN, NOT_FIRED, PAPER
+from care_sim.viewer.pictures.drawing import (
+    BACKGROUND,
+    FAINT_INK,
+    INK,
+    NO_RETURN_COLOUR,
+    NOT_FIRED_COLOUR,
+)
 from care_sim.viewer.pictures.furnished_world import (
     CHASE_CAMERA,
     CHASE_SIZE,
@@ -23,7 +29,7 @@ from care_sim.viewer.pictures.furnished_world import (
     furnished,
 )
 
-WIDTH, HEIGHT = 960, 720
+PICTURE_WIDTH, PICTURE_HEIGHT = 960, 720
 _HEADER = 40
 _PANELS = _HEADER + CHASE_SIZE[1]
 _CAMERA_AT = (20, _PANELS + 30)
@@ -31,13 +37,13 @@ _GRID_AT = (392, _PANELS + 44)
 _ROW_PIXELS = 4
 _BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
-TRACKED = (90, 220, 255)
-COASTING = (120, 140, 190)
-UNEXPLAINED = (255, 170, 40)
-HIDDEN = (225, 225, 225)
-IN_VIEW = (255, 170, 40)
-DETECTED = (80, 230, 110)
-BRAKING = (255, 80, 70)
+TRACKED_COLOUR = (90, 220, 255)
+COASTING_COLOUR = (120, 140, 190)
+UNEXPLAINED_COLOUR = (255, 170, 40)
+HIDDEN_COLOUR = (225, 225, 225)
+IN_VIEW_COLOUR = (255, 170, 40)
+DETECTED_COLOUR = (80, 230, 110)
+BRAKING_COLOUR = (255, 80, 70)
 
 
 def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]:
@@ -49,7 +55,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     detections, those that no forecast explains in another colour, and the cells that fired,
     coloured by range. `frame` is None before the first scan. The episode is left as it was.
     """
-    canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
+    canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
     with furnished(loop.world) as scene:
         camera = Image.fromarray(scene.colours(loop.rig.cameras[0], loop.sensor))
         add_car(scene, loop.world, LIDAR_POSITION[0])
@@ -61,8 +67,10 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     canvas.paste(chase, (0, _HEADER))
     canvas.paste(camera, _CAMERA_AT)
     draw.text((_CAMERA_AT[0], _PANELS + 8), "Front camera:", INK, drawing.font(14))
-    draw.text((_CAMERA_AT[0] + 104, _PANELS + 8), "explained by a track", TRACKED, drawing.font(14))
-    draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", UNEXPLAINED, drawing.font(14))
+    draw.text(
+        (_CAMERA_AT[0] + 104, _PANELS + 8), "explained by a track", TRACKED_COLOUR, drawing.font(14)
+    )
+    draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", UNEXPLAINED_COLOUR, drawing.font(14))
     draw_grid(canvas, draw, loop.rig.grid, loop.belief.ranges)
     return np.asarray(canvas)
 
@@ -73,15 +81,15 @@ def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe |
     words = [(12, f"{loop.world.time:.1f} s", INK), (90, f"{motion.speed:.1f} m/s", INK)]
     if frame is None:
         words.append(
-            (330, f"nothing fired yet, budget {budget} of {loop.rig.grid.size} cells", FAINT)
+            (330, f"nothing fired yet, budget {budget} of {loop.rig.grid.size} cells", FAINT_INK)
         )
     else:
         words.append((330, f"{len(frame.fired)} of {budget} cells fired", INK))
         if np.isfinite(frame.clearance_m):
             words.append((640, f"clearance to {_target_name(loop)} {frame.clearance_m:.1f} m", INK))
         if frame.braking:
-            draw.rounded_rectangle((192, 6, 308, 34), 6, BRAKING)
-            words.append((203, "BRAKING", PAPER))
+            draw.rounded_rectangle((192, 6, 308, 34), 6, BRAKING_COLOUR)
+            words.append((203, "BRAKING", BACKGROUND))
     for x, text, colour in words:
         draw.text((x, 8), text, colour, drawing.font(20))
 
@@ -94,7 +102,7 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
             draw.text(at, f"{metres:.0f} m", INK, drawing.font(12), anchor="rm")
     mark_tracks(draw, CHASE_CAMERA, loop.belief.tracks)
     mark_first_sighting(draw, CHASE_CAMERA, loop, frame)
-    drawing.label(draw, (0, CHASE_SIZE[1]), _BOXES_MEAN, TRACKED)
+    drawing.label(draw, (0, CHASE_SIZE[1]), _BOXES_MEAN, TRACKED_COLOUR)
 
 
 def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks) -> None:
@@ -102,7 +110,7 @@ def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks
     for box, number, misses in reversed(
         list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))
     ):
-        colour = COASTING if misses else TRACKED
+        colour = COASTING_COLOUR if misses else TRACKED_COLOUR
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
         if at := drawing.point_above(camera, box):
             drawing.label(draw, at, CLASSES[number], colour)
@@ -115,11 +123,11 @@ def mark_first_sighting(
     target = loop.world.first_sighting
     if target is None:
         return
-    state, colour = "hidden", HIDDEN
+    state, colour = "hidden", HIDDEN_COLOUR
     if frame is not None and frame.detected:
-        state, colour = "detected", DETECTED
+        state, colour = "detected", DETECTED_COLOUR
     elif loop.picture.shows(target.body):
-        state, colour = "in view", IN_VIEW
+        state, colour = "in view", IN_VIEW_COLOUR
     (box,) = loop.sensor.boxes_to_local(loop.world.boxes([target]))
     if at := drawing.point_above(camera, box):
         drawing.arrow(draw, at, f"{target.name}: {state}", colour)
@@ -133,7 +141,7 @@ def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
         ImageDraw.Draw(camera),
         seen.boxes,
         names,
-        [TRACKED if is_known else UNEXPLAINED for is_known in known],
+        [TRACKED_COLOUR if is_known else UNEXPLAINED_COLOUR for is_known in known],
     )
 
 
@@ -155,11 +163,19 @@ def draw_grid(
     )
     for share, name, anchor in ((0.0, "behind", "la"), (0.25, "left", "ma"), (0.5, "ahead", "ma")):
         draw.text(
-            (left + share * grid.columns, bottom + 4), name, FAINT, drawing.font(13), anchor=anchor
+            (left + share * grid.columns, bottom + 4),
+            name,
+            FAINT_INK,
+            drawing.font(13),
+            anchor=anchor,
         )
     for share, name, anchor in ((0.75, "right", "ma"), (1.0, "behind", "ra")):
         draw.text(
-            (left + share * grid.columns, bottom + 4), name, FAINT, drawing.font(13), anchor=anchor
+            (left + share * grid.columns, bottom + 4),
+            name,
+            FAINT_INK,
+            drawing.font(13),
+            anchor=anchor,
         )
     _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
 
@@ -168,17 +184,17 @@ def _draw_legend(
     canvas: Image.Image, draw: ImageDraw.ImageDraw, left: int, top: int, reach: float
 ) -> None:
     for x, colour, name in (
-        (0, NOT_FIRED, "not fired"),
-        (95, NO_RETURN, "no return"),
+        (0, NOT_FIRED_COLOUR, "not fired"),
+        (95, NO_RETURN_COLOUR, "no return"),
         (195, None, ""),
     ):
         if colour is not None:
             draw.rectangle((left + x, top, left + x + 14, top + 12), colour)
-            draw.text((left + x + 20, top - 2), name, FAINT, drawing.font(13))
+            draw.text((left + x + 20, top - 2), name, FAINT_INK, drawing.font(13))
     scale = np.tile(drawing.range_colours(np.linspace(0.0, 1.0, 160)), (13, 1, 1))
     canvas.paste(Image.fromarray(scale), (left + 245, top))
-    draw.text((left + 240, top - 2), "0 m", FAINT, drawing.font(13), anchor="ra")
-    draw.text((left + 411, top - 2), f"{reach:.0f} m", FAINT, drawing.font(13))
+    draw.text((left + 240, top - 2), "0 m", FAINT_INK, drawing.font(13), anchor="ra")
+    draw.text((left + 411, top - 2), f"{reach:.0f} m", FAINT_INK, drawing.font(13))
 
 
 def _target_name(loop: ClosedLoop) -> str:

@@ -11,27 +11,27 @@ from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.sensors.annotated import Cloud
 from care_sim.viewer.pictures import drawing
-from care_sim.viewer.pictures.drawing import FAINT, INK, PAPER
-from care_sim.viewer.pictures.keyframe import HEIGHT, WIDTH, draw_grid
+from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
+from care_sim.viewer.pictures.keyframe import PICTURE_HEIGHT, PICTURE_WIDTH, draw_grid
 from care_sim.world.bodies import CATALOGUE
 
 _TOP = 40
-_MAP_SIZE = (WIDTH, 460)
+_MAP_SIZE = (PICTURE_WIDTH, 460)
 _BOTTOM = _TOP + _MAP_SIZE[1]
 _PIXELS_PER_M = _MAP_SIZE[1] / (2 * RANGE_M + 4)
 _RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
 _CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
 _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
 
-FOUND = (80, 230, 110)
-MISSED = (255, 120, 60)
-OUT_OF_RANGE = (95, 100, 108)
-RING = (52, 56, 63)
+FOUND_COLOUR = (80, 230, 110)
+MISSED_COLOUR = (255, 120, 60)
+OUT_OF_RANGE_COLOUR = (95, 100, 108)
+RING_COLOUR = (52, 56, 63)
 RETURN = (172, 176, 184)
-LEGEND = (
-    ("found", FOUND),
-    ("not found", MISSED),
-    ("beyond 50 m", OUT_OF_RANGE),
+PLAN_LEGEND = (
+    ("found", FOUND_COLOUR),
+    ("not found", MISSED_COLOUR),
+    ("beyond 50 m", OUT_OF_RANGE_COLOUR),
     ("double line: its first sighting", INK),
 )
 
@@ -53,10 +53,10 @@ def draw_plan(
     """
     shot = loop.film.shots[index]
     returned = _returned(shot.cloud, record)
-    canvas = Image.new("RGB", (WIDTH, HEIGHT), PAPER)
+    canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     colours = [
-        FOUND if one else MISSED if near else OUT_OF_RANGE
+        FOUND_COLOUR if one else MISSED_COLOUR if near else OUT_OF_RANGE_COLOUR
         for one, near in zip(found, scored, strict=True)
     ]
     canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
@@ -69,15 +69,19 @@ def _map(
     boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np.bool_], points: Floats
 ) -> Image.Image:
     """Range rings, points (P, 3), the car and boxes (n, 7) with their colours."""
-    picture = Image.new("RGB", _MAP_SIZE, PAPER)
+    picture = Image.new("RGB", _MAP_SIZE, BACKGROUND)
     draw = ImageDraw.Draw(picture)
     for metres in _RINGS:
         (left, top), (right, bottom) = _pixels(
             np.array([[-metres, metres], [metres, -metres]])
         ).tolist()
-        draw.ellipse((left, top, right, bottom), outline=RING)
+        draw.ellipse((left, top, right, bottom), outline=RING_COLOUR)
         draw.text(
-            (right - 4, (top + bottom) / 2), f"{metres:.0f} m", FAINT, drawing.font(11), anchor="rm"
+            (right - 4, (top + bottom) / 2),
+            f"{metres:.0f} m",
+            FAINT_INK,
+            drawing.font(11),
+            anchor="rm",
         )
     draw.point(_pixels(points[:, :2]).ravel().tolist(), RETURN)
     _draw_box(draw, _CAR, INK, 2)
@@ -108,11 +112,13 @@ def _write_words(
         (420, fired),
     ):
         draw.text((x, 8), text, INK, drawing.font(20))
-    draw.text((WIDTH - 12, 12), loop.film.name[:28], FAINT, drawing.font(14), anchor="ra")
+    draw.text(
+        (PICTURE_WIDTH - 12, 12), loop.film.name[:28], FAINT_INK, drawing.font(14), anchor="ra"
+    )
     draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
-    for row, (text, colour) in enumerate(LEGEND):
+    for row, (text, colour) in enumerate(PLAN_LEGEND):
         draw.text((20, _BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
-    draw.text((20, _BOTTOM + 40 + 24 * len(LEGEND)), "dots: returns", RETURN, drawing.font(16))
+    draw.text((20, _BOTTOM + 40 + 24 * len(PLAN_LEGEND)), "dots: returns", RETURN, drawing.font(16))
 
 
 def _draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, width: int) -> None:

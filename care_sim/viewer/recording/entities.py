@@ -2,7 +2,7 @@
 
 from care_sim.core.types import CLASSES
 
-ABOUT = "about"
+ABOUT_ENTITY = "about"
 """The page that says what a recording holds; every other entity is one of an episode."""
 SECONDS, KEYFRAME = "seconds", "keyframe"
 """The timelines: time of the scan, and number of the keyframe from 0."""
@@ -97,17 +97,17 @@ BODY_COLOURS = dict(
 NO_CLASS = (120, 124, 132)
 SHARE_COLOURS = ((38, 41, 48), (80, 200, 255), (255, 150, 30), (112, 116, 132), (170, 225, 110))
 """Not fired, exploitation, reserve, floor, chosen."""
-EXPLAINED = (80, 200, 255)
-RESIDUAL = (255, 150, 30)
-MISSED = (255, 80, 120)
-OUT_OF_VIEW = (225, 225, 225)
-IN_VIEW = (255, 170, 40)
-DETECTED = (80, 230, 110)
-EGO = (200, 204, 212)
-COASTING = (110, 130, 165)
-BRAKE = (255, 80, 70)
-PATH = (46, 54, 68)
-ACTOR_COLOURS = {"out of view": OUT_OF_VIEW, "in view": IN_VIEW, "detected": DETECTED}
+EXPLAINED_RGB = (80, 200, 255)
+RESIDUAL_RGB = (255, 150, 30)
+MISSED_RGB = (255, 80, 120)
+OUT_OF_VIEW_RGB = (225, 225, 225)
+IN_VIEW_RGB = (255, 170, 40)
+DETECTED_RGB = (80, 230, 110)
+EGO_RGB = (200, 204, 212)
+COASTING_RGB = (110, 130, 165)
+BRAKE_RGB = (255, 80, 70)
+PATH_RGB = (46, 54, 68)
+ACTOR_COLOURS = {"out of view": OUT_OF_VIEW_RGB, "in view": IN_VIEW_RGB, "detected": DETECTED_RGB}
 LANES = (
     (170, 225, 110),
     (230, 120, 200),

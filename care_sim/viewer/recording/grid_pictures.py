@@ -11,20 +11,24 @@ from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.watcher import Situation, WatchedKeyframe
-from care_sim.viewer.recording import entities as looks
+from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane
 from care_sim.viewer.recording.outlines import outlines
 
 CAMERA = "world/lidar/camera"
-COLOURS = {"explained": looks.EXPLAINED, "residual": looks.RESIDUAL, "missed": looks.MISSED}
+COLOURS = {
+    "explained": entities.EXPLAINED_RGB,
+    "residual": entities.RESIDUAL_RGB,
+    "missed": entities.MISSED_RGB,
+}
 OUTLINES = {
-    "hulls": looks.EGO,
-    "wedges/explained": looks.EXPLAINED,
-    "wedges/residual": looks.RESIDUAL,
+    "hulls": entities.EGO_RGB,
+    "wedges/explained": entities.EXPLAINED_RGB,
+    "wedges/residual": entities.RESIDUAL_RGB,
 }
 
 
-class Pictures:
+class PictureLog:
     """Logs the camera's picture and the picture of the grid."""
 
     def __init__(self, lane: Lane, rig: Rig):
@@ -42,7 +46,7 @@ class Pictures:
         lane.fix(CAMERA, place, lens)
         shares = [
             (n, name, colour)
-            for n, (name, colour) in enumerate(zip(SHARES, looks.SHARE_COLOURS, strict=True))
+            for n, (name, colour) in enumerate(zip(SHARES, entities.SHARE_COLOURS, strict=True))
         ]
         lane.fix("grid", rr.AnnotationContext(shares))
         for kind, colour in COLOURS.items():
@@ -89,7 +93,7 @@ class Pictures:
         belief = watched.situation.belief
         known = watched.situation.known
         rig = self._rig
-        cells = np.repeat(watched.shares[:, ::-1], looks.ROW_PIXELS, axis=0)
+        cells = np.repeat(watched.shares[:, ::-1], entities.ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
         sectors = wedges(belief.detections, rig)
         for entity, chosen in (

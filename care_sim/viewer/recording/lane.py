@@ -60,8 +60,8 @@ class Lane:
         self._stream.log(entity_path(self.name, entity), *content, static=True)
 
 
-def boxes(table: Floats, **looks: Any) -> rr.Boxes3D:
+def box_batch(table: Floats, **appearance: Any) -> rr.Boxes3D:
     """Boxes (n, 7), upright, in the frame of their entity."""
     half = table[:, 6] / 2
     turns = np.column_stack([np.zeros((len(table), 2)), np.sin(half), np.cos(half)])
-    return rr.Boxes3D(centers=table[:, :3], sizes=table[:, 3:6], quaternions=turns, **looks)
+    return rr.Boxes3D(centers=table[:, :3], sizes=table[:, 3:6], quaternions=turns, **appearance)

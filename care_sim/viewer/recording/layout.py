@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import rerun.blueprint as rrb
 
-from care_sim.viewer.recording.entities import ABOUT, SECONDS
+from care_sim.viewer.recording.entities import ABOUT_ENTITY, SECONDS
 from care_sim.viewer.recording.lane import entity_path
 
 EYE_M, TARGET_M = (-11.0, 0.0, 6.0), (12.0, 0.0, -1.0)
 """Behind the car and above it, in the sensor frame."""
 DARK = (24, 26, 30)
-FIRED = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
+GRID_TITLE = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
 
 
 def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
@@ -29,7 +29,7 @@ def _one(lane: str) -> rrb.Vertical:
             columns=rrb.TextLogColumns(text_log_columns=["Body"]),
         ),
         rrb.TextDocumentView(origin=entity_path(lane, "outcome"), name="Outcome"),
-        rrb.TextDocumentView(origin=ABOUT, name="About"),
+        rrb.TextDocumentView(origin=ABOUT_ENTITY, name="About"),
     )
     budget = rrb.TimeSeriesView(origin=entity_path(lane, "budget"), name="Budget, percent")
     side = rrb.Vertical(_camera(lane), words, row_shares=[3, 2])
@@ -71,7 +71,7 @@ def _camera(lane: str) -> rrb.Spatial2DView:
 
 
 def _grid(lane: str) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {FIRED}")
+    return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {GRID_TITLE}")
 
 
 def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:

@@ -13,12 +13,12 @@ from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.viewer.recording.camera_photo import photograph
-from care_sim.viewer.recording.curves import Curves
-from care_sim.viewer.recording.entities import ABOUT, LANES, about
-from care_sim.viewer.recording.grid_pictures import Pictures
+from care_sim.viewer.recording.entities import ABOUT_ENTITY, LANES, about
+from care_sim.viewer.recording.grid_pictures import PictureLog
 from care_sim.viewer.recording.lane import Lane
 from care_sim.viewer.recording.layout import blueprint
-from care_sim.viewer.recording.space import Space
+from care_sim.viewer.recording.measures import MeasureLog
+from care_sim.viewer.recording.space import SpaceLog
 
 
 class Recording(AbstractContextManager["Recording"]):
@@ -30,9 +30,9 @@ class Recording(AbstractContextManager["Recording"]):
     """
 
     def __init__(self, path: Path, lanes: Sequence[str]):
-        if ABOUT in lanes:
+        if ABOUT_ENTITY in lanes:
             raise InvalidInput(
-                f"{ABOUT!r} is a page of every recording: name the episode otherwise"
+                f"{ABOUT_ENTITY!r} is a page of every recording: name the episode otherwise"
             )
         self._lanes = tuple(lanes)
         self._file = ExitStack()
@@ -45,15 +45,17 @@ class Recording(AbstractContextManager["Recording"]):
         self._file.callback(self._write)
         self._stream.send_recording_name(path.stem)
         self._stream.log(
-            ABOUT, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True
+            ABOUT_ENTITY, rr.TextDocument(about(), media_type=rr.MediaType.MARKDOWN), static=True
         )
 
-    def episode(self, name: str, loop: ClosedLoop) -> "Episode":
+    def episode(self, name: str, loop: ClosedLoop) -> "RecordedEpisode":
         """Begin the lane `name`. Raises InvalidInput for one that was not announced."""
         if name not in self._lanes:
             raise unknown("lane", name, self._lanes)
         colour = LANES[self._lanes.index(name) % len(LANES)]
-        return Episode(Lane(self._stream, name), loop.rig, loop.world.ego_kind.size[1], colour)
+        return RecordedEpisode(
+            Lane(self._stream, name), loop.rig, loop.world.ego_kind.size[1], colour
+        )
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -67,14 +69,14 @@ class Recording(AbstractContextManager["Recording"]):
         self._stream.disconnect()
 
 
-class Episode:
+class RecordedEpisode:
     """Logs one episode, keyframe by keyframe."""
 
     def __init__(self, lane: Lane, rig: Rig, ego_width_m: float, colour: tuple[int, int, int]):
         self._lane = lane
-        self._space = Space(lane, rig, ego_width_m)
-        self._pictures = Pictures(lane, rig)
-        self._curves = Curves(lane, rig.budget, colour)
+        self._space = SpaceLog(lane, rig, ego_width_m)
+        self._pictures = PictureLog(lane, rig)
+        self._curves = MeasureLog(lane, rig.budget, colour)
         self._photo = b""
 
     def look(self, loop: ClosedLoop) -> None:

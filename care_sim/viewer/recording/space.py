@@ -12,20 +12,20 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.driving.braking import BrakingRules
 from care_sim.loops.watcher import Situation, WatchedKeyframe
-from care_sim.viewer.recording import entities as looks
-from care_sim.viewer.recording.lane import THIN, Lane, boxes
+from care_sim.viewer.recording import entities
+from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 
 PATH_M = 40.0
 CORNERS = (1, 2, 4, 3)
 """The corners of an image box among its rays, in turn."""
-SHARE_COLOURS = np.array(looks.SHARE_COLOURS, np.uint8)
+SHARE_COLOUR_ARRAY = np.array(entities.SHARE_COLOURS, np.uint8)
 GLASSY = FillMode.TransparentFillMajorWireframe
 """People look through bodies at what they hide."""
 MARGIN_M = 0.15
 """How much larger than its body the box of the first-sighting actor is drawn."""
 
 
-class Space:
+class SpaceLog:
     """Logs the 3D part of an episode whose car is `ego_width_m` wide."""
 
     def __init__(self, lane: Lane, rig: Rig, ego_width_m: float):
@@ -35,19 +35,25 @@ class Space:
         lane.fix("world", rr.ViewCoordinates.FLU)
         width = ego_width_m + 2 * BrakingRules().side_margin_m
         strip = np.array([[PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, PATH_M, width, 0.02, 0.0]])
-        lane.fix("world/lidar/path", boxes(strip, colors=looks.PATH, fill_mode=FillMode.Solid))
-        lane.fix("world/ego", rr.Boxes3D.from_fields(colors=[looks.EGO], fill_mode=FillMode.Solid))
+        lane.fix(
+            "world/lidar/path", box_batch(strip, colors=entities.PATH_RGB, fill_mode=FillMode.Solid)
+        )
+        lane.fix(
+            "world/ego", rr.Boxes3D.from_fields(colors=[entities.EGO_RGB], fill_mode=FillMode.Solid)
+        )
         lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=GLASSY))
-        lane.fix("world/driven", rr.LineStrips3D.from_fields(colors=[looks.EGO], radii=[THIN]))
+        lane.fix(
+            "world/driven", rr.LineStrips3D.from_fields(colors=[entities.EGO_RGB], radii=[THIN])
+        )
         lane.fix("world/lidar/returns", rr.Points3D.from_fields(radii=[2 * THIN]))
         lane.fix("world/lidar/tracks", rr.Boxes3D.from_fields(show_labels=False))
         lane.fix(
             "world/lidar/velocities",
-            rr.Arrows3D.from_fields(colors=[looks.EXPLAINED], radii=[0.08]),
+            rr.Arrows3D.from_fields(colors=[entities.EXPLAINED_RGB], radii=[0.08]),
         )
         for kind, colour in (
-            ("residual", (*looks.RESIDUAL, 200)),
-            ("explained", (*looks.EXPLAINED, 50)),
+            ("residual", (*entities.RESIDUAL_RGB, 200)),
+            ("explained", (*entities.EXPLAINED_RGB, 50)),
         ):
             lane.fix(
                 f"world/lidar/wedges/{kind}",
@@ -68,11 +74,11 @@ class Space:
 
     def _log_bodies(self, situation: Situation, state: str) -> None:
         colours = [
-            looks.NO_CLASS if label is None else looks.BODY_COLOURS[CLASSES[label]]
+            entities.NO_CLASS if label is None else entities.BODY_COLOURS[CLASSES[label]]
             for label in situation.labels
         ]
         self._lane.log(
-            "world/bodies", boxes(situation.bodies, colors=colours, labels=situation.names)
+            "world/bodies", box_batch(situation.bodies, colors=colours, labels=situation.names)
         )
         if situation.target is not None:
             around = situation.bodies[[situation.target]] + np.array(
@@ -81,11 +87,11 @@ class Space:
             text = [f"{situation.names[situation.target]}: {state}"]
             self._lane.log(
                 "world/first_sighting",
-                boxes(around, colors=looks.ACTOR_COLOURS[state], labels=text),
+                box_batch(around, colors=entities.ACTOR_COLOURS[state], labels=text),
             )
 
     def _log_ego(self, situation: Situation) -> None:
-        self._lane.log("world/ego", boxes(situation.ego[None]))
+        self._lane.log("world/ego", box_batch(situation.ego[None]))
         self._driven.append(np.array([*situation.ego[:2], 0.03]))
         self._lane.log("world/driven", rr.LineStrips3D([self._driven]))
         sensor = situation.sensor
@@ -94,23 +100,25 @@ class Space:
 
     def _log_returns(self, watched: WatchedKeyframe) -> None:
         cells, points = watched.returned(self._rig.grid)
-        step = math.ceil(len(cells) / looks.MOST_POINTS) or 1
-        colours = SHARE_COLOURS[watched.shares.ravel()[cells[::step]]]
+        step = math.ceil(len(cells) / entities.MOST_POINTS) or 1
+        colours = SHARE_COLOUR_ARRAY[watched.shares.ravel()[cells[::step]]]
         self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
 
     def _log_tracks(self, situation: Situation) -> None:
         tracks = situation.belief.tracks
-        colours = [looks.COASTING if misses else looks.EXPLAINED for misses in tracks.misses]
+        colours = [
+            entities.COASTING_RGB if misses else entities.EXPLAINED_RGB for misses in tracks.misses
+        ]
         names = [CLASSES[label] for label in tracks.classes]
         moves = np.column_stack([tracks.velocities, np.zeros(len(tracks))])
         for entity, make in (
-            ("tracks", lambda: [boxes(tracks.boxes, colors=colours, labels=names)]),
+            ("tracks", lambda: [box_batch(tracks.boxes, colors=colours, labels=names)]),
             ("velocities", lambda: [rr.Arrows3D(vectors=moves, origins=tracks.boxes[:, :3])]),
         ):
             self._lane.log_list(f"world/lidar/{entity}", len(tracks), make)
 
     def _log_wedges(self, kind: str, rays: Floats) -> None:
-        ends = looks.WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        ends = entities.WEDGE_M * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         strips = [strip for corners in ends for strip in _pyramid(corners)]
         self._lane.log_list(
             f"world/lidar/wedges/{kind}", len(strips), lambda: [rr.LineStrips3D(strips)]

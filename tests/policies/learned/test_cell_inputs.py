@@ -9,7 +9,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.policies.learned.cell_inputs import CUES, MARKS, OUTLOOKS, Cues
+from care_sim.policies.learned.cell_inputs import CELL_MARKS, RIG_INPUTS, SCAN_INPUTS, CellInputs
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 GRID = AngularGrid()
@@ -24,7 +24,9 @@ DOWN = 20 * GRID.columns + 256
 
 @pytest.fixture
 def seen_of(belief_of):
-    """Makes the cues (N, `CUES`) of a belief from camera detections, tracks and ranges by cell."""
+    """Makes the cues (N, `SCAN_INPUTS`) of a belief from camera detections, tracks and ranges by
+    cell.
+    """
 
     def make(pictures=(), tracks=(), ranges=None):
         scan = np.zeros(GRID.size, np.float32)
@@ -32,7 +34,7 @@ def seen_of(belief_of):
         table = [[CLASSES.index(name), 0.9, *box, 0, 0, 0] for name, *box in pictures]
         detections = ImageDetections.from_rows(np.array(table, float).reshape(-1, 9))
         belief = replace(belief_of(tracks, ranges=scan.reshape(GRID.shape)), detections=detections)
-        seen = Cues(RIG).of(belief, RIG.hulls(belief.tracks.boxes))
+        seen = CellInputs(RIG).of(belief, RIG.hulls(belief.tracks.boxes))
         return belief, seen.rows(np.arange(GRID.size))
 
     return make
@@ -44,8 +46,8 @@ def cells_with(seen, cue):
 
 def test_of_an_empty_belief_nothing_is_seen(seen_of):
     _, seen = seen_of()
-    assert seen.shape == (GRID.size, CUES)
-    assert len(MARKS) + 2 == CUES
+    assert seen.shape == (GRID.size, SCAN_INPUTS)
+    assert len(CELL_MARKS) + 2 == SCAN_INPUTS
     assert not seen.any()
 
 
@@ -95,8 +97,8 @@ def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
 
 
 def test_outlooks_are_those_of_the_ray():
-    elevation, ground, cosine, sine, covered = Cues(RIG).outlooks.T.reshape(
-        len(OUTLOOKS), *GRID.shape
+    elevation, ground, cosine, sine, covered = CellInputs(RIG).outlooks.T.reshape(
+        len(RIG_INPUTS), *GRID.shape
     )
     assert elevation[:, 0] == pytest.approx(np.linspace(GRID.top, GRID.bottom, 32) / 0.5, abs=1e-6)
     assert ground[7, 3] == 0
@@ -108,7 +110,7 @@ def test_outlooks_are_those_of_the_ray():
 
 
 def test_a_front_camera_covers_what_is_ahead():
-    covered = Cues(Rig(GRID, SURROUND_CAMERAS[:1])).outlooks[:, 4].reshape(GRID.shape)
+    covered = CellInputs(Rig(GRID, SURROUND_CAMERAS[:1])).outlooks[:, 4].reshape(GRID.shape)
     assert covered[8, 256 - 40 : 256 + 40].all()
     assert not covered[:, :150].any()
     assert not covered[:, 362:].any()

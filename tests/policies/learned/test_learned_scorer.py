@@ -14,11 +14,11 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.cell_inputs import CUES, OUTLOOKS, Cues
+from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS, CellInputs
 from care_sim.policies.learned.learned_scorer import CellNetwork, LearnedScorer, highest
-from care_sim.policies.learned.weights import Card, load, save, shipped
+from care_sim.policies.learned.weights import Card, load_weights, save_weights, shipped_weights
 
-INPUTS = CUES + len(OUTLOOKS)
+INPUTS = SCAN_INPUTS + len(RIG_INPUTS)
 CARD = Card("learned-scorer", asdict(AngularGrid()))
 
 
@@ -31,7 +31,7 @@ def drawn(tmp_path):
         "bias": rng.normal(size=5),
         "out": rng.normal(size=5),
     }
-    save(tmp_path / "drawn.npz", arrays, CARD)
+    save_weights(tmp_path / "drawn.npz", arrays, CARD)
     return tmp_path / "drawn.npz"
 
 
@@ -43,8 +43,8 @@ def test_the_highest_are_those_of_a_stable_sort(scores, data):
 
 
 def test_every_cell_is_scored_as_a_plain_network_does(drawn, encounter, environment):
-    weights = load(drawn)
-    cues = Cues(environment.unwrapped.rig)
+    weights = load_weights(drawn)
+    cues = CellInputs(environment.unwrapped.rig)
     network = CellNetwork(weights, cues.outlooks)
     layer, bias, out = (weights.arrays[name].astype(float) for name in ("layer", "bias", "out"))
     for observation in encounter[::8]:
@@ -88,8 +88,8 @@ def test_the_shipped_weights_look_where_the_camera_sees_someone_new(encounter, e
 
 
 def test_shipped_weights_are_small_and_say_what_they_are():
-    path = shipped("learned-scorer")
-    card = load(path).card
+    path = shipped_weights("learned-scorer")
+    card = load_weights(path).card
     assert path.stat().st_size < 3e6
     assert (card.kind, card.budget, card.wrapper, card.scenario) == (
         "learned-scorer",
@@ -132,7 +132,7 @@ def test_weights_of_the_user_are_used(drawn, encounter, environment):
 def test_weights_for_something_else_are_refused_in_one_line(
     tmp_path, environment, card, arrays, message
 ):
-    save(tmp_path / "w.npz", arrays, card)
+    save_weights(tmp_path / "w.npz", arrays, card)
     with pytest.raises(InvalidInput, match=message) as refusal:
         care_sim.make_policy("learned-scorer", environment, path=tmp_path / "w.npz")
     assert "\n" not in str(refusal.value)

@@ -16,8 +16,14 @@ from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.policies.learned.grid_features import CHANNELS
 from care_sim.policies.learned.score_map import ScoreMap
-from care_sim.policies.learned.weights import Card, Weights, load, save, shipped
-from care_sim.policies.learned.wrapper_text import Wrapping
+from care_sim.policies.learned.weights import (
+    Card,
+    Weights,
+    load_weights,
+    save_weights,
+    shipped_weights,
+)
+from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.training.validation import evaluate, rule
 from tests.helpers.untrained import shapes, untrained
 
@@ -82,7 +88,7 @@ def test_it_fires_what_its_learner_would_behind_the_wrappers(tmp_path, env, acti
     path = untrained(tmp_path / "w.npz", wrapping)
     policy = care_sim.make_policy("ppo", env, path=path)
     behind = GridObservation(ACTIONS[action](env, 16, 2), 32, 4)
-    learned = ScoreMap(load(path), wrapping)
+    learned = ScoreMap(load_weights(path), wrapping)
     fired = []
     for wrapped, choose in ((env, policy), (behind, learned)):
         seen, _ = wrapped.reset(seed=4)
@@ -103,8 +109,8 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
     config = Ppo(environments=2, rollout=32, batch=32, hidden=8)
     envs = side_by_side(config)
     model = make(config, envs).learn(128)
-    save(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
-    numpy = ScoreMap(load(tmp_path / "w.npz"), config.wrapping)
+    save_weights(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
+    numpy = ScoreMap(load_weights(tmp_path / "w.npz"), config.wrapping)
     observations = envs.reset()
     for _ in range(20):
         actions, _ = model.predict(observations, deterministic=True)
@@ -184,11 +190,13 @@ def test_on_the_dense_street_a_place_is_enough_and_so_are_pictures(tmp_path, env
     """What the results say of the shipped weights: without pictures as early, without the place
     nearly so.
     """
-    weights = load(shipped("ppo-dense"))
-    paths = [shipped("ppo-dense")]
+    weights = load_weights(shipped_weights("ppo-dense"))
+    paths = [shipped_weights("ppo-dense")]
     for name in ("window.weight", "place"):
         paths.append(tmp_path / f"without-{name}.npz")
-        save(paths[-1], weights.arrays | {name: np.zeros_like(weights.arrays[name])}, weights.card)
+        save_weights(
+            paths[-1], weights.arrays | {name: np.zeros_like(weights.arrays[name])}, weights.card
+        )
     distances = []
     for path in paths:
         policy = care_sim.make_policy("ppo", env, path=path)

@@ -15,7 +15,13 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies.learned.weights import LARGEST_WEIGHT, Card, load, save, shipped
+from care_sim.policies.learned.weights import (
+    LARGEST_WEIGHT,
+    Card,
+    load_weights,
+    save_weights,
+    shipped_weights,
+)
 
 ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}
 CARD = Card(
@@ -26,17 +32,17 @@ CARD = Card(
     seeds={"train": [1]},
 )
 RIG = Rig(budget=492)
-SHIPPED = {"learned-scorer": shipped("learned-scorer"), "ppo": shipped("ppo-dense")}
+SHIPPED = {"learned-scorer": shipped_weights("learned-scorer"), "ppo": shipped_weights("ppo-dense")}
 
 
 @pytest.fixture
 def saved(tmp_path):
-    save(tmp_path / "w.npz", ARRAYS, CARD)
+    save_weights(tmp_path / "w.npz", ARRAYS, CARD)
     return tmp_path / "w.npz"
 
 
 def test_what_is_written_is_read_back_bit_for_bit(saved):
-    weights = load(saved)
+    weights = load_weights(saved)
     assert weights.card == CARD
     assert list(weights.arrays) == list(ARRAYS)
     for name, array in ARRAYS.items():
@@ -45,17 +51,17 @@ def test_what_is_written_is_read_back_bit_for_bit(saved):
 
 
 def test_the_same_weights_give_the_same_bytes(saved, tmp_path):
-    save(tmp_path / "again", ARRAYS, CARD)
+    save_weights(tmp_path / "again", ARRAYS, CARD)
     assert (tmp_path / "again").read_bytes() == saved.read_bytes()
 
 
 def test_weights_that_fit_are_accepted(saved):
-    load(saved).check("learned-scorer", RIG)
+    load_weights(saved).check("learned-scorer", RIG)
 
 
 def test_without_a_budget_any_will_do(tmp_path):
-    save(tmp_path / "w.npz", ARRAYS, replace(CARD, budget=None))
-    load(tmp_path / "w.npz").check("learned-scorer", Rig(budget=7))
+    save_weights(tmp_path / "w.npz", ARRAYS, replace(CARD, budget=None))
+    load_weights(tmp_path / "w.npz").check("learned-scorer", Rig(budget=7))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +83,7 @@ def test_without_a_budget_any_will_do(tmp_path):
 )
 def test_weights_that_do_not_fit_are_refused_with_what_they_are(saved, kind, rig, message):
     with pytest.raises(InvalidInput, match=f"w.npz: {message}") as refusal:
-        load(saved).check(kind, rig)
+        load_weights(saved).check(kind, rig)
     assert "\n" not in str(refusal.value)
 
 
@@ -118,7 +124,7 @@ def large(path: Path) -> None:
 
 
 def twice(path: Path) -> None:
-    save(path, ARRAYS, CARD)
+    save_weights(path, ARRAYS, CARD)
     with ZipFile(path, "a") as file, pytest.warns(UserWarning, match="Duplicate"):
         file.writestr("bias.npy", file.read("bias.npy"))
 
@@ -133,13 +139,13 @@ def squeezed(path: Path) -> None:
 
 
 def broken_header(path: Path) -> None:
-    save(path, ARRAYS, CARD)
+    save_weights(path, ARRAYS, CARD)
     path.write_bytes(path.read_bytes().replace(b"{'descr'", b"{'descr(", 1))
 
 
 def locked(path: Path) -> None:
     """Marked as encrypted."""
-    save(path, ARRAYS, CARD)
+    save_weights(path, ARRAYS, CARD)
     content = bytearray(path.read_bytes())
     for signature, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
         content[content.index(signature) + flags] |= 1
@@ -147,26 +153,26 @@ def locked(path: Path) -> None:
 
 
 def doubles(path: Path) -> None:
-    save(path, {}, CARD)
+    save_weights(path, {}, CARD)
     card = np.load(path)["card"]
     np.savez(path, card=card, weight=np.zeros(3))
 
 
 def not_finite(path: Path) -> None:
-    save(path, {"weight": np.array([np.nan])}, CARD)
+    save_weights(path, {"weight": np.array([np.nan])}, CARD)
 
 
 def too_large(path: Path) -> None:
-    save(path, {"weight": np.array([0, -1.01 * LARGEST_WEIGHT])}, CARD)
+    save_weights(path, {"weight": np.array([0, -1.01 * LARGEST_WEIGHT])}, CARD)
 
 
 def cut(path: Path) -> None:
-    save(path, ARRAYS, CARD)
+    save_weights(path, ARRAYS, CARD)
     path.write_bytes(path.read_bytes()[:-40])
 
 
 def flipped(path: Path) -> None:
-    save(path, ARRAYS, CARD)
+    save_weights(path, ARRAYS, CARD)
     content = bytearray(path.read_bytes())
     content[content.index(ARRAYS["weight"].tobytes())] ^= 1
     path.write_bytes(content)
@@ -213,7 +219,7 @@ def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
     with pytest.raises(
         InvalidInput, match=r"spoilt\.npz: no \.npz of weights .*, or damaged"
     ) as refusal:
-        load(path)
+        load_weights(path)
     assert "\n" not in str(refusal.value)
 
 
@@ -221,9 +227,9 @@ def test_anything_else_is_refused_in_one_line(tmp_path, spoil):
 @pytest.mark.parametrize("largest", [LARGEST_WEIGHT, -LARGEST_WEIGHT])
 @pytest.mark.parametrize("name", ["learned-scorer", "ppo"])
 def test_the_largest_weights_overflow_nowhere(tmp_path, name, largest):
-    arrays = {n: np.full_like(a, largest) for n, a in load(SHIPPED[name]).arrays.items()}
-    card = load(SHIPPED[name]).card
-    save(tmp_path / "w.npz", arrays, card)
+    arrays = {n: np.full_like(a, largest) for n, a in load_weights(SHIPPED[name]).arrays.items()}
+    card = load_weights(SHIPPED[name]).card
+    save_weights(tmp_path / "w.npz", arrays, card)
     with gymnasium.make("CARE-Dartout-v0", budget=0.03, disable_env_checker=True) as env:
         policy = care_sim.make_policy(name, env, path=str(tmp_path / "w.npz"))
         observation, _ = env.reset(seed=0)
@@ -236,17 +242,17 @@ def test_what_would_run_when_it_is_unpickled_does_not_run(tmp_path):
     sprung = tmp_path / "sprung"
     np.savez(tmp_path / "w.npz", card=card, weight=np.array([Trap(sprung)], object))
     with pytest.raises(InvalidInput, match="allow_pickle=False"):
-        load(tmp_path / "w.npz")
+        load_weights(tmp_path / "w.npz")
     assert not sprung.exists()
 
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InvalidInput, match=r"nowhere\.npz: no such file"):
-        load(tmp_path / "nowhere.npz")
+        load_weights(tmp_path / "nowhere.npz")
 
 
 def test_arrays_are_taken_by_name_and_shape(saved):
-    weights = load(saved)
+    weights = load_weights(saved)
     assert weights.array("weight", 2, None) is weights.arrays["weight"]
     with pytest.raises(InvalidInput, match=r"'weight' has the shape \(2, 3\), needed is any x 4"):
         weights.array("weight", None, 4)

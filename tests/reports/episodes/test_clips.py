@@ -80,7 +80,7 @@ def test_filming_leaves_the_episode_as_it_was(tmp_path):
     film.write()
     assert filmed["episode_hash"] == trace(config)[0]["episode_hash"]
     with Image.open(tmp_path / "clip.png") as clip:
-        assert (clip.n_frames, clip.size) == (3, (picture.WIDTH, picture.HEIGHT))
+        assert (clip.n_frames, clip.size) == (3, (picture.PICTURE_WIDTH, picture.PICTURE_HEIGHT))
 
 
 def test_a_folder_is_no_clip_and_what_was_there_stays_until_the_new_one_is_whole(tmp_path):
@@ -120,7 +120,7 @@ def test_a_policy_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, capsy
     assert "RuntimeError: no idea" in err
     with Image.open(tmp_path / "clip.png") as clip:
         assert clip.n_frames == 4
-        assert clip.width > 3 * panel.WIDTH
+        assert clip.width > 3 * panel.COMPARISON_WIDTH
 
 
 def test_what_was_played_is_printed_when_the_rest_is_interrupted(monkeypatch, capsys):
@@ -157,7 +157,11 @@ def test_episodes_side_by_side_end_together(tmp_path, capsys):
         pictures = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(clip)]
     assert len(pictures) == 4
     left, right = zip(
-        *((each[:, : panel.WIDTH], each[:, -panel.WIDTH :]) for each in pictures), strict=True
+        *(
+            (each[:, : panel.COMPARISON_WIDTH], each[:, -panel.COMPARISON_WIDTH :])
+            for each in pictures
+        ),
+        strict=True,
     )
     assert np.array_equal(left[1], left[3])
     assert not np.array_equal(left[0], left[1])
@@ -190,12 +194,18 @@ def keyframes(*states, distance_m=20.0):
 
 def test_the_verdict_of_a_panel():
     hidden, seen, found = (False, False), (True, False), (True, True)
-    assert panel.verdict(keyframes(hidden), 0.1)[0] == "not in view yet"
-    assert panel.verdict(keyframes(hidden, seen, seen), 0.1)[0] == "in view for 0.2 s, not detected"
-    late = panel.verdict(keyframes(hidden, seen, seen, found, found), 0.1)
-    assert late == ("detected at 17.0 m, 0.2 s late; least clearance 14.0 m", picture.DETECTED)
+    assert panel.verdict_text(keyframes(hidden), 0.1)[0] == "not in view yet"
     assert (
-        panel.verdict(keyframes(hidden, found), 0.1)[0]
+        panel.verdict_text(keyframes(hidden, seen, seen), 0.1)[0]
+        == "in view for 0.2 s, not detected"
+    )
+    late = panel.verdict_text(keyframes(hidden, seen, seen, found, found), 0.1)
+    assert late == (
+        "detected at 17.0 m, 0.2 s late; least clearance 14.0 m",
+        picture.DETECTED_COLOUR,
+    )
+    assert (
+        panel.verdict_text(keyframes(hidden, found), 0.1)[0]
         == "detected at 19.0 m; least clearance 17.0 m"
     )
 
@@ -212,4 +222,4 @@ def test_gymnasiums_wrapper_records_a_video(tmp_path):
     env.close()
     frames = frames_of(tmp_path / "videos" / "rl-video-episode-0.mp4")
     assert len(frames) == 4
-    assert frames[0].shape == (picture.HEIGHT, picture.WIDTH, 3)
+    assert frames[0].shape == (picture.PICTURE_HEIGHT, picture.PICTURE_WIDTH, 3)

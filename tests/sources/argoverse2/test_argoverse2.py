@@ -4,7 +4,13 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NOBODY
-from care_sim.sources.argoverse2.films import CATEGORIES, SENSOR_HEIGHT_M, UP_LIDAR, film, logs
+from care_sim.sources.argoverse2.films import (
+    ARGOVERSE2_CATEGORIES,
+    ARGOVERSE2_SENSOR_HEIGHT_M,
+    UP_LIDAR,
+    argoverse2_film,
+    logs,
+)
 from tests.helpers.av2_log import CAR_AHEAD, at, box, parked, replaced, rewrite, stamp, write
 
 
@@ -13,7 +19,7 @@ def returns_of(shot, number):
 
 
 def test_a_car_ahead_is_annotated_hit_and_seen_where_it_stands(tmp_path):
-    (shot,) = film(parked(tmp_path, CAR_AHEAD)).shots
+    (shot,) = argoverse2_film(parked(tmp_path, CAR_AHEAD)).shots
     assert [CLASSES[c] for c in shot.annotations.classes] == ["car"]
     centre = np.subtract((15.0, 0.0, 0.42), UP_LIDAR)
     assert shot.annotations.boxes[0] == pytest.approx([*centre, 4.0, 2.0, 1.5, 0.0])
@@ -30,16 +36,18 @@ def test_a_car_ahead_is_annotated_hit_and_seen_where_it_stands(tmp_path):
 
 
 def test_the_road_returns_the_rays_that_nothing_stopped(tmp_path):
-    (shot,) = film(parked(tmp_path, CAR_AHEAD)).shots
+    (shot,) = argoverse2_film(parked(tmp_path, CAR_AHEAD)).shots
     road = returns_of(shot, NOBODY)
-    assert road[:, 2] == pytest.approx(-SENSOR_HEIGHT_M)
+    assert road[:, 2] == pytest.approx(-ARGOVERSE2_SENSOR_HEIGHT_M)
     assert np.linalg.norm(road, axis=1).max() <= 50.0
     assert np.all(np.diff(shot.cloud.cells) > 0)
 
 
 def test_a_car_that_the_plane_would_bury_is_hit_all_the_same(tmp_path):
     """Ahead the real road falls: the whole box lies under the plane through the wheels."""
-    (shot,) = film(parked(tmp_path, box("BUS", (20.0, 0.0, -2.0), (10.0, 3.0, 3.0)))).shots
+    (shot,) = argoverse2_film(
+        parked(tmp_path, box("BUS", (20.0, 0.0, -2.0), (10.0, 3.0, 3.0)))
+    ).shots
     assert len(returns_of(shot, 0)) > 20
 
 
@@ -49,7 +57,7 @@ def test_the_tilt_of_the_car_reaches_the_world_and_not_its_own_view(tmp_path):
     """
     boxes = [CAR_AHEAD, box("PEDESTRIAN", (8.0, 5.0, 0.6), (0.6, 0.7, 1.8), yaw=0.7)]
     level, tilted = (
-        film(parked(tmp_path / name, *boxes, pose=pose)).shots[0]
+        argoverse2_film(parked(tmp_path / name, *boxes, pose=pose)).shots[0]
         for name, pose in {
             "level": at(),
             "tilted": at(3.0, 4.0, 5.0, yaw=2.0, pitch=-0.06, roll=0.04),
@@ -71,10 +79,10 @@ def test_the_tilt_of_the_car_reaches_the_world_and_not_its_own_view(tmp_path):
 
 def test_a_box_has_its_own_roll_and_pitch(tmp_path):
     slab = (6.0, 6.0, 0.1)
-    flat = film(parked(tmp_path / "flat", box("SIGN", (12.0, 0.0, 1.64), slab))).shots[0]
-    steep = film(parked(tmp_path / "steep", box("BUS", (12.0, 0.0, 1.64), slab, pitch=1.2))).shots[
-        0
-    ]
+    flat = argoverse2_film(parked(tmp_path / "flat", box("SIGN", (12.0, 0.0, 1.64), slab))).shots[0]
+    steep = argoverse2_film(
+        parked(tmp_path / "steep", box("BUS", (12.0, 0.0, 1.64), slab, pitch=1.2))
+    ).shots[0]
     assert len(returns_of(steep, 0)) > 100
     assert np.ptp(returns_of(steep, 0)[:, 2]) > 4.0, (
         "it is hit wherever it stands, however flat it was"
@@ -84,7 +92,7 @@ def test_a_box_has_its_own_roll_and_pitch(tmp_path):
 
 def test_only_the_five_classes_are_annotated_and_everything_occludes(tmp_path):
     wall = box("VEHICULAR_TRAILER", (10.0, 0.0, 1.17), (1.0, 8.0, 3.0))
-    (shot,) = film(parked(tmp_path, wall, CAR_AHEAD)).shots
+    (shot,) = argoverse2_film(parked(tmp_path, wall, CAR_AHEAD)).shots
     assert len(shot.annotations) == 1
     assert len(returns_of(shot, 0)) == 0
     assert len(shot.seen.objects) == 0
@@ -94,7 +102,7 @@ def test_only_the_five_classes_are_annotated_and_everything_occludes(tmp_path):
 def test_the_recording_car_and_boxes_without_a_point_are_left_out(tmp_path):
     ego = box("EGO_VEHICLE", (1.4, 0.0, 0.5), (4.9, 1.9, 1.5))
     unseen = box("REGULAR_VEHICLE", (0.0, 12.0, 0.4), track="b", points=0)
-    (shot,) = film(parked(tmp_path, CAR_AHEAD, ego, unseen)).shots
+    (shot,) = argoverse2_film(parked(tmp_path, CAR_AHEAD, ego, unseen)).shots
     assert shot.annotations.objects.tolist() == [0]
     assert len(returns_of(shot, 0)) > 20
     assert not np.any(shot.cloud.points[:, 1] == pytest.approx(11.0, abs=1e-6))
@@ -109,7 +117,7 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
         *([[CAR_AHEAD, late]] * 4),
         [CAR_AHEAD, waiting | {"num_interior_pts": 3}],
     ]
-    movie = film(write(tmp_path, sweeps, [at()] * 6))
+    movie = argoverse2_film(write(tmp_path, sweeps, [at()] * 6))
     assert [len(shot.annotations) for shot in movie.shots] == [1, 2]
     assert [CLASSES[n] for n in movie.hidden.classes] == ["pedestrian"]
     assert (
@@ -122,7 +130,7 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
 
 
 def test_a_keyframe_in_which_nobody_is_seen_shows_the_road_alone(tmp_path):
-    (shot,) = film(parked(tmp_path, CAR_AHEAD | {"num_interior_pts": 0})).shots
+    (shot,) = argoverse2_film(parked(tmp_path, CAR_AHEAD | {"num_interior_pts": 0})).shots
     assert (len(shot.annotations), len(shot.seen.objects)) == (0, 0)
     assert set(shot.cloud.objects.tolist()) == {NOBODY}
 
@@ -131,7 +139,7 @@ def test_every_fifth_annotated_sweep_is_a_keyframe_and_tracks_keep_their_number(
     walker = [box("PEDESTRIAN", (10.0, n / 10, 0.6), (0.6, 0.7, 1.8), track="w") for n in range(12)]
     early = box("BICYCLE", (12.0, 5.0, 0.3), (1.7, 0.6, 1.2), track="e")
     sweeps = [[w, early] if n < 3 else [w] for n, w in enumerate(walker)]
-    movie = film(write(tmp_path, sweeps, [at()] * 12))
+    movie = argoverse2_film(write(tmp_path, sweeps, [at()] * 12))
     assert [shot.token for shot in movie.shots] == [str(stamp(n)) for n in (0, 5, 10)]
     assert [shot.time_s for shot in movie.shots] == pytest.approx([0.0, 0.5, 1.0])
     numbers = [
@@ -149,7 +157,7 @@ def test_keyframes_stay_half_a_second_apart_where_sweeps_hold_nobody(tmp_path):
     """
     ego = box("EGO_VEHICLE", (1.4, 0.0, 0.5), (4.9, 1.9, 1.5))
     sweeps = [[ego], *([[CAR_AHEAD]] * 2), *([[]] * 5), *([[CAR_AHEAD]] * 3)]
-    movie = film(write(tmp_path, sweeps, [at()] * 11))
+    movie = argoverse2_film(write(tmp_path, sweeps, [at()] * 11))
     assert [shot.token for shot in movie.shots] == [str(stamp(n)) for n in (0, 5, 10)]
     assert [len(shot.annotations) for shot in movie.shots] == [0, 0, 1]
     assert [shot.time_s for shot in movie.shots] == pytest.approx([0.0, 0.5, 1.0])
@@ -159,7 +167,7 @@ def test_sweeps_that_jitter_are_still_the_nearest_to_every_half_second(tmp_path)
     log = write(tmp_path, [[CAR_AHEAD]] * 11, [at()] * 11)
     for name in ("annotations.feather", "city_SE3_egovehicle.feather"):
         rewrite(log / name, lambda t: shifted(t, {stamp(5): 9_000_000, stamp(10): -4_000_000}))
-    assert [shot.token for shot in film(log).shots] == [
+    assert [shot.token for shot in argoverse2_film(log).shots] == [
         str(s) for s in (stamp(0), stamp(5) + 9_000_000, stamp(10) - 4_000_000)
     ]
 
@@ -174,14 +182,14 @@ def test_the_cars_motion_comes_from_its_poses(tmp_path):
     times = np.arange(16) / 10
     way = 4 * times + times**2
     poses = [at(20 * np.sin(w / 20), 20 * (1 - np.cos(w / 20)), yaw=w / 20) for w in way]
-    movie = film(write(tmp_path, [[CAR_AHEAD]] * 16, poses))
+    movie = argoverse2_film(write(tmp_path, [[CAR_AHEAD]] * 16, poses))
     ego = movie.shots[1].ego
     assert ego.speed == pytest.approx(5.0, abs=0.01)
     assert ego.yaw_rate == pytest.approx(0.25, abs=0.001)
     assert ego.acceleration == pytest.approx(2.0, abs=0.1), (
         "of so tight a circle a parabola is not all"
     )
-    assert film(parked(tmp_path / "one", CAR_AHEAD)).shots[0].ego.speed == 0.0
+    assert argoverse2_film(parked(tmp_path / "one", CAR_AHEAD)).shots[0].ego.speed == 0.0
 
 
 def test_the_six_cameras_cover_the_whole_circle(tmp_path):
@@ -194,7 +202,7 @@ def test_the_six_cameras_cover_the_whole_circle(tmp_path):
         )
         for n, a in enumerate(np.linspace(-np.pi, np.pi, 24, endpoint=False))
     ]
-    (shot,) = film(parked(tmp_path, *ring)).shots
+    (shot,) = argoverse2_film(parked(tmp_path, *ring)).shots
     assert set(shot.seen.objects.tolist()) == set(range(24))
     assert set(shot.seen.detections.cameras.tolist()) == set(range(6))
 
@@ -205,7 +213,10 @@ def test_a_log_with_sensor_recordings_loads_and_either_name_of_the_annotations(t
     write(tmp_path / "b", [[CAR_AHEAD]], [at()], "annotations_with_ego.feather")
     assert [path.name for path in logs(tmp_path)] == ["a", "b"]
     assert logs(first) == [first]
-    assert len({film(path).shots[0].annotations.boxes.tobytes() for path in logs(tmp_path)}) == 1
+    assert (
+        len({argoverse2_film(path).shots[0].annotations.boxes.tobytes() for path in logs(tmp_path)})
+        == 1
+    )
 
 
 def test_a_folder_without_logs_is_named(tmp_path):
@@ -214,5 +225,7 @@ def test_a_folder_without_logs_is_named(tmp_path):
 
 
 def test_every_category_of_the_taxonomy_has_its_place():
-    assert len(CATEGORIES) == 31, "the 30 of the guide, and the second name of one of them"
-    assert set(CATEGORIES.values()) == {*CLASSES, None}
+    assert len(ARGOVERSE2_CATEGORIES) == 31, (
+        "the 30 of the guide, and the second name of one of them"
+    )
+    assert set(ARGOVERSE2_CATEGORIES.values()) == {*CLASSES, None}

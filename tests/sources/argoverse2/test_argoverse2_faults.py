@@ -3,7 +3,7 @@ import pyarrow as pa
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.argoverse2.films import film
+from care_sim.sources.argoverse2.films import argoverse2_film
 from tests.helpers.av2_log import CAR_AHEAD, box, parked, replaced, rewrite, stamp
 
 
@@ -148,7 +148,7 @@ def test_what_is_wrong_with_a_log_is_said_in_one_line(tmp_path, name):
     log = parked(tmp_path / "log", CAR_AHEAD, sweeps=2)
     breaks(log)
     with pytest.raises(InvalidInput, match=message) as caught:
-        film(log)
+        argoverse2_film(log)
     assert "\n" not in str(caught.value)
     assert str(log) in str(caught.value)
 
@@ -191,4 +191,4 @@ def test_what_is_wrong_with_a_log_is_said_in_one_line(tmp_path, name):
 )
 def test_a_wrong_box_is_named(tmp_path, wrong, message):
     with pytest.raises(InvalidInput, match=message):
-        film(parked(tmp_path, CAR_AHEAD, wrong))
+        argoverse2_film(parked(tmp_path, CAR_AHEAD, wrong))

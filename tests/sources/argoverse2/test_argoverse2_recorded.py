@@ -7,9 +7,9 @@ from pyarrow import feather
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.sensors.annotated import NOBODY
-from care_sim.sources.argoverse2.films import SENSOR_HEIGHT_M, UP_LIDAR, film
+from care_sim.sources.argoverse2.films import ARGOVERSE2_SENSOR_HEIGHT_M, UP_LIDAR, argoverse2_film
 
-loaded = functools.cache(film)
+loaded = functools.cache(argoverse2_film)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_the_road_lies_where_the_recorded_sweep_has_it(sweep):
     counts, edges = np.histogram(
         points[(distance > 4) & (distance < 10), 2], np.arange(-3.0, 1.0, 0.05)
     )
-    assert edges[counts.argmax()] + 0.025 == pytest.approx(-SENSOR_HEIGHT_M, abs=0.05)
+    assert edges[counts.argmax()] + 0.025 == pytest.approx(-ARGOVERSE2_SENSOR_HEIGHT_M, abs=0.05)
 
 
 def test_cast_returns_lie_where_the_recorded_sweep_has_them(recorded, sweep):

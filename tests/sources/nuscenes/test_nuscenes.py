@@ -9,7 +9,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import NOBODY, Annotations
-from care_sim.sources.nuscenes.categories import CATEGORIES, DETECTION_NAMES
+from care_sim.sources.nuscenes.categories import DETECTION_NAMES, NUSCENES_CATEGORIES
 from care_sim.sources.nuscenes.splits import VAL, scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
 from care_sim.sources.nuscenes.tables import Database
@@ -150,10 +150,10 @@ def test_cameras_see_what_the_recorded_calibration_projects(tmp_path, channel):
 
 
 def test_every_category_of_the_taxonomy_has_its_place():
-    assert len(CATEGORIES) == 23 + 9, (
+    assert len(NUSCENES_CATEGORIES) == 23 + 9, (
         "the 23 of the annotations, and 9 more of the lidarseg extension"
     )
-    assert {*CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
+    assert {*NUSCENES_CATEGORIES.values(), *DETECTION_NAMES.values()} == {*CLASSES, None}
     assert len(DETECTION_NAMES) == 10
 
 

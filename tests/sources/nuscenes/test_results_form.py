@@ -9,8 +9,8 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
-from care_sim.sources.nuscenes.films import film
-from care_sim.sources.nuscenes.results_form import MOST_BOXES, attribute, boxes, confidences
+from care_sim.sources.nuscenes.films import nuscenes_film
+from care_sim.sources.nuscenes.results_form import MOST_BOXES, attribute, confidences, result_boxes
 from care_sim.sources.nuscenes.splits import scenes
 from care_sim.sources.nuscenes.tables import Database
 from tests.helpers.nuscenes_drive import KEYFRAMES, OBJECTS, SPLIT, write_drive
@@ -35,7 +35,7 @@ def detections(*names, box=CAR, returns=None, scores=None):
 
 def test_a_box_has_the_place_heading_and_velocity_of_the_world_and_its_width_first():
     sensor = Frame(100.0, 50.0, 1.84, np.pi / 2)
-    (found,) = boxes(shot(sensor), detections("car"), np.array([[3.0, 0.0]]))
+    (found,) = result_boxes(shot(sensor), detections("car"), np.array([[3.0, 0.0]]))
     assert found.pop("translation") == pytest.approx([98.0, 60.0, 0.84])
     half = (np.pi / 2 + 0.3) / 2
     assert found.pop("rotation") == pytest.approx([np.cos(half), 0, 0, np.sin(half)])
@@ -56,7 +56,7 @@ angles = st.floats(-np.pi, np.pi)
 def test_a_box_of_the_world_comes_back_from_any_sensor_that_stands_upright(x, y, yaw, heading):
     sensor = Frame(x, y, 1.84, yaw)
     world = np.array([[3.0, -4.0, 0.8, 4.6, 1.9, 1.7, heading]])
-    (found,) = boxes(
+    (found,) = result_boxes(
         shot(sensor), detections("car", box=sensor.boxes_to_local(world)[0]), np.zeros((1, 2))
     )
     assert found["translation"] == pytest.approx(world[0, :3], abs=1e-9)
@@ -69,11 +69,11 @@ def test_the_annotations_of_a_database_come_back_as_its_tables_hold_them(tmp_pat
     tables = Database(write_drive(tmp_path / "nuscenes"))
     compared = 0
     for scene in scenes(tables):
-        for moment in film(tables, scene).shots:
+        for moment in nuscenes_film(tables, scene).shots:
             truth = moment.annotations
             counts = np.arange(100, 100 - len(truth), -1)
             still = np.zeros((len(truth), 2))
-            found = boxes(moment, Detections(truth.classes, truth.boxes, counts), still)
+            found = result_boxes(moment, Detections(truth.classes, truth.boxes, counts), still)
             for box, row in zip(found, tables.annotations(moment.token), strict=True):
                 assert box["sample_token"] == row["sample_token"]
                 assert box["translation"] == pytest.approx(row["translation"], abs=1e-6)
@@ -101,7 +101,7 @@ def test_the_speed_tells_the_attribute(name, standing, moving):
         moving,
     ]
     velocities = np.array([[0.3, 0.3], [-0.4, -0.4]])
-    found = boxes(shot(Frame(0, 0, 0, 1.0)), detections(name, name), velocities)
+    found = result_boxes(shot(Frame(0, 0, 0, 1.0)), detections(name, name), velocities)
     assert [box["attribute_name"] for box in found] == [standing, moving]
 
 
@@ -114,7 +114,7 @@ def test_confidence_grows_with_the_returns_and_is_never_0_or_1():
 
 def test_a_detectors_own_scores_count():
     given_scores = np.array([0.2, 0.9, 0.9])
-    found = boxes(
+    found = result_boxes(
         shot(Frame(0, 0, 0, 0)),
         detections("car", "bus", "truck", scores=given_scores),
         np.zeros((3, 2)),
@@ -128,7 +128,7 @@ def test_a_detectors_own_scores_count():
 
 def test_a_sample_holds_at_most_the_500_surest():
     scores = np.random.default_rng(0).permutation(np.linspace(0.0, 1.0, MOST_BOXES + 7))
-    found = boxes(
+    found = result_boxes(
         shot(Frame(0, 0, 0, 0)),
         detections(*["car"] * len(scores), scores=scores),
         np.zeros((len(scores), 2)),
@@ -138,6 +138,8 @@ def test_a_sample_holds_at_most_the_500_surest():
 
 
 def test_boxes_are_plain_json_and_none_are_none():
-    found = boxes(shot(Frame(1, 2, 3, 4, 0.1, 0.2)), detections("car", "bicycle"), np.ones((2, 2)))
+    found = result_boxes(
+        shot(Frame(1, 2, 3, 4, 0.1, 0.2)), detections("car", "bicycle"), np.ones((2, 2))
+    )
     assert json.loads(json.dumps(found)) == found
-    assert boxes(shot(Frame(0, 0, 0, 0)), detections(), np.empty((0, 2))) == []
+    assert result_boxes(shot(Frame(0, 0, 0, 0)), detections(), np.empty((0, 2))) == []

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from care_sim.evaluation.sightings import Sightings
-from care_sim.sources.streets.draft import KEYFRAME_S, footprints_meet
+from care_sim.sources.streets.draft import STREET_KEYFRAME_S, footprints_meet
 from care_sim.sources.streets.layouts import LAYOUTS
 from care_sim.sources.streets.people import (
     CYCLING_MPS,
@@ -34,7 +34,7 @@ def sizes_of(street):
 
 def speeds_of(poses):
     """(k - 1, n) m/s between keyframes."""
-    return np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=0), -1, 0)) / KEYFRAME_S
+    return np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=0), -1, 0)) / STREET_KEYFRAME_S
 
 
 def moving(street, *kinds):
@@ -118,7 +118,7 @@ def test_vehicles_keep_the_limit_and_drive_forwards(street):
 def test_the_ego_moves_as_its_odometry_says(street):
     motion = np.array([[ego.speed, ego.yaw_rate] for ego in street.motion])
     speeds = speeds_of(street.ego[:, None])[:, 0]
-    turns = np.diff(street.ego[:, 2]) / KEYFRAME_S
+    turns = np.diff(street.ego[:, 2]) / STREET_KEYFRAME_S
     assert speeds == pytest.approx((motion[1:, 0] + motion[:-1, 0]) / 2, abs=0.3)
     between = np.sort(np.stack([motion[1:, 1], motion[:-1, 1]]), axis=0)
     assert (turns > between[0] - 0.02).all()

@@ -12,12 +12,12 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.envs import CLOSED_LOOP
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.keyframe import (
-    BRAKING,
-    DETECTED,
-    HEIGHT,
-    HIDDEN,
-    TRACKED,
-    WIDTH,
+    BRAKING_COLOUR,
+    DETECTED_COLOUR,
+    HIDDEN_COLOUR,
+    PICTURE_HEIGHT,
+    PICTURE_WIDTH,
+    TRACKED_COLOUR,
     draw_keyframe,
 )
 
@@ -68,10 +68,10 @@ def test_it_has_one_size_before_and_after_the_first_scan(name):
     after = env.render()
     env.close()
     for picture in (before, after):
-        assert picture.shape == (HEIGHT, WIDTH, 3)
+        assert picture.shape == (PICTURE_HEIGHT, PICTURE_WIDTH, 3)
         assert picture.dtype == np.uint8
     assert np.any(before != after)
-    assert shows(before, HIDDEN)
+    assert shows(before, HIDDEN_COLOUR)
 
 
 def test_rendering_changes_no_observation():
@@ -87,14 +87,14 @@ def test_the_same_keyframe_gives_the_same_picture(dense):
 
 def test_it_says_what_happened(dense):
     picture = dense.render()
-    assert shows(picture, BRAKING, 1000)
-    assert shows(picture, DETECTED, 50)
-    assert shows(picture, TRACKED, 500)
+    assert shows(picture, BRAKING_COLOUR, 1000)
+    assert shows(picture, DETECTED_COLOUR, 50)
+    assert shows(picture, TRACKED_COLOUR, 500)
     loop = dense.unwrapped.loop
     frame = dense.unwrapped.keyframes[-1]
     calm = draw_keyframe(loop, replace(frame, braking=False, detected=False))
-    assert not shows(calm, BRAKING)
-    assert not shows(calm, DETECTED)
+    assert not shows(calm, BRAKING_COLOUR)
+    assert not shows(calm, DETECTED_COLOUR)
 
 
 def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
@@ -105,9 +105,9 @@ def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
     ranges[1, right] = 10.0
     picture = np.asarray(drawing.grid_picture(grid, ranges, 3))
     assert picture.shape == (6, 8, 3)
-    assert tuple(picture[0, 1]) == drawing.NO_RETURN
+    assert tuple(picture[0, 1]) == drawing.NO_RETURN_COLOUR
     assert tuple(picture[5, 6]) == tuple(drawing.range_colours(np.array([0.2]))[0])
-    assert tuple(picture[5, 1]) == drawing.NOT_FIRED
+    assert tuple(picture[5, 1]) == drawing.NOT_FIRED_COLOUR
 
 
 def test_points_behind_the_camera_are_not_marked():

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import care_sim
-from care_sim.viewer.pictures.keyframe import HEIGHT, WIDTH
-from care_sim.viewer.pictures.scene_from_above import FOUND, MISSED, RETURN
+from care_sim.viewer.pictures.keyframe import PICTURE_HEIGHT, PICTURE_WIDTH
+from care_sim.viewer.pictures.scene_from_above import FOUND_COLOUR, MISSED_COLOUR, RETURN
 
 STEPS_OUT = 5
 """The keyframe at which the person of the drive appears."""
@@ -49,25 +49,28 @@ def test_there_is_a_picture_before_the_first_scan_and_after_the_last(play):
     pictures, _ = play("full")
     assert len(pictures) == 11
     assert all(
-        picture.shape == (HEIGHT, WIDTH, 3) and picture.dtype == np.uint8 for picture in pictures
+        picture.shape == (PICTURE_HEIGHT, PICTURE_WIDTH, 3) and picture.dtype == np.uint8
+        for picture in pictures
     )
     assert all(np.any(one != next_) for one, next_ in pairwise(pictures))
 
 
 def test_what_fired_decides_what_is_drawn_as_found(play):
     before, scanned = play("full", keyframes=1)[0]
-    assert count(before, FOUND) == count(before, RETURN) == 0
-    assert count(before, MISSED) > 50
-    assert count(scanned, FOUND) > 50
+    assert count(before, FOUND_COLOUR) == count(before, RETURN) == 0
+    assert count(before, MISSED_COLOUR) > 50
+    assert count(scanned, FOUND_COLOUR) > 50
     assert count(scanned, RETURN) > 500
     _, starved = play("random", budget=1e-4, keyframes=1)[0]
-    assert count(starved, FOUND) == 0
+    assert count(starved, FOUND_COLOUR) == 0
     assert count(starved, RETURN) <= 2
 
 
 def test_a_first_sighting_has_a_second_line_at_its_keyframe_alone(play):
     pictures, _ = play("full", keyframes=STEPS_OUT + 2)
-    drawn = [count(picture, FOUND) + count(picture, MISSED) for picture in pictures[1:]]
+    drawn = [
+        count(picture, FOUND_COLOUR) + count(picture, MISSED_COLOUR) for picture in pictures[1:]
+    ]
     assert drawn[STEPS_OUT] > drawn[STEPS_OUT + 1] + 10
     assert drawn[STEPS_OUT] > drawn[STEPS_OUT - 1]
 

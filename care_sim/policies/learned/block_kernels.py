@@ -11,7 +11,7 @@ from care_sim.base.compiled import compiled
 
 
 @compiled()
-def share(sets, ends, blocks, marks, out):  # type: ignore[no-untyped-def]
+def add_object_shares(sets, ends, blocks, marks, out):  # type: ignore[no-untyped-def]
     """Add to `out` (3, B) a part for every cell of three groups of `sets`, a cell counting once a
     group.
 
@@ -30,7 +30,7 @@ def share(sets, ends, blocks, marks, out):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def look(fired, scan, blocks, marks, out):  # type: ignore[no-untyped-def]
+def add_returns(fired, scan, blocks, marks, out):  # type: ignore[no-untyped-def]
     """Fill `out` (3, B) from the cells that fired: the nearness of the nearest return, and the
     shares of cells fired and of those with a return that stands above the road outside every hull,
     which `marks` has as its first group.

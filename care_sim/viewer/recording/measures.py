@@ -12,11 +12,11 @@ from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import WatchedKeyframe
-from care_sim.viewer.recording import entities as looks
+from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import Lane
 
-UNITS = {"speed": "m/s", "distance": "m", "clearance": "m", "braking": ""}
-MEASURES = {
+MEASURE_UNITS = {"speed": "m/s", "distance": "m", "clearance": "m", "braking": ""}
+MEASURE_FIELDS = {
     "speed": "speed_mps",
     "distance": "distance_m",
     "clearance": "clearance_m",
@@ -24,7 +24,7 @@ MEASURES = {
 }
 
 
-class Curves:
+class MeasureLog:
     """Logs the numbers of an episode, in the colour of its lane; `budget` is B in cells."""
 
     def __init__(self, lane: Lane, budget: int, colour: tuple[int, int, int]):
@@ -33,16 +33,16 @@ class Curves:
         self._states: dict[str, str] = {}
         self._frames: list[Keyframe] = []
         self._counts: list[Cells] = []
-        for name, unit in UNITS.items():
+        for name, unit in MEASURE_UNITS.items():
             step = InterpolationMode.StepAfter if name == "braking" else InterpolationMode.Linear
             series = rr.SeriesLines(
                 names=f"{lane.name} {name} {unit}".strip(), colors=colour, interpolation_mode=step
             )
             lane.fix(f"measures/{name}", series)
-        for name, colour_ in zip(SHARES[1:], looks.SHARE_COLOURS[1:], strict=True):
+        for name, colour_ in zip(SHARES[1:], entities.SHARE_COLOURS[1:], strict=True):
             lane.fix(f"budget/{name}", rr.SeriesLines(names=f"{name} %", colors=colour_))
-        actor = looks.ACTOR_COLOURS
-        brake = {"off": looks.COASTING, "on": looks.BRAKE}
+        actor = entities.ACTOR_COLOURS
+        brake = {"off": entities.COASTING_RGB, "on": entities.BRAKE_RGB}
         for entity, colours in (("states/actor", actor), ("states/brake", brake)):
             values = list(colours)
             lane.fix(
@@ -80,7 +80,7 @@ class Curves:
     def _log_curves(self) -> None:
         frames = self._frames
         percents = 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
-        for name, field in MEASURES.items():
+        for name, field in MEASURE_FIELDS.items():
             self._log_curve(
                 f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float)
             )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from care_sim.base.checks import check_known, check_whole
 from care_sim.base.errors import InvalidInput
 
-ACTIONS = ("SectorReserve", "SectorScores")
+ACTION_WRAPPERS = ("SectorReserve", "SectorScores")
 _TEXT = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")
 
 
@@ -28,7 +28,7 @@ class Wrapping:
     rows: int = 8
 
     def __post_init__(self) -> None:
-        check_known("action", self.action, ACTIONS)
+        check_known("action", self.action, ACTION_WRAPPERS)
         for name in ("azimuths", "elevations", "columns", "rows"):
             check_whole(name, getattr(self, name), 1)
         for blocks, sectors in (("columns", "azimuths"), ("rows", "elevations")):

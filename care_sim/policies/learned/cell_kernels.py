@@ -10,13 +10,20 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 
-UNEXPLAINED, BOX, SMALL, EXPLAINED, HULL, FIRED, STANDING, NEAR_STANDING = (
-    1 << bit for bit in range(8)
-)
+(
+    MARK_UNEXPLAINED,
+    MARK_BOX,
+    MARK_SMALL,
+    MARK_EXPLAINED,
+    MARK_HULL,
+    MARK_FIRED,
+    MARK_STANDING,
+    MARK_NEAR_STANDING,
+) = (1 << bit for bit in range(8))
 
 
 @compiled()
-def mark(codes, sizes, cells, ends, marks):  # type: ignore[no-untyped-def]
+def mark_sets(codes, sizes, cells, ends, marks):  # type: ignore[no-untyped-def]
     """Give the cells of sets, which lie one after the other and end at `ends` (s,), the marks (s,)
     of their sets.
 
@@ -28,10 +35,10 @@ def mark(codes, sizes, cells, ends, marks):  # type: ignore[no-untyped-def]
         size = np.float32(math.log2(end - start + 1) / 10)
         for cell in cells[start:end]:
             code = codes[cell]
-            if not marks[n] & UNEXPLAINED:
+            if not marks[n] & MARK_UNEXPLAINED:
                 codes[cell] = code | marks[n]
-            elif not code & UNEXPLAINED or size < sizes[cell]:
-                codes[cell] = (code & ~SMALL) | marks[n]
+            elif not code & MARK_UNEXPLAINED or size < sizes[cell]:
+                codes[cell] = (code & ~MARK_SMALL) | marks[n]
                 sizes[cell] = size
         start = end
 
@@ -53,21 +60,21 @@ def mark_scan(codes, nearnesses, ranges, heights, limits, margins):  # type: ign
             distance = ranges[row, column]
             if distance <= 0:
                 continue
-            codes[cell] |= FIRED
+            codes[cell] |= MARK_FIRED
             nearnesses[cell] = 1 - distance / reach
             if (
                 distance < reach
                 and heights[cell] * distance >= clearance
-                and not codes[cell] & HULL
+                and not codes[cell] & MARK_HULL
             ):
-                codes[cell] |= STANDING
+                codes[cell] |= MARK_STANDING
                 for near in range(max(row - up, 0), min(row + up + 1, rows)):
                     for by in range(column - aside, column + aside + 1):
-                        codes[near * columns + by % columns] |= NEAR_STANDING
+                        codes[near * columns + by % columns] |= MARK_NEAR_STANDING
 
 
 @compiled()
-def score(seen, outlook, layers, out):  # type: ignore[no-untyped-def]
+def network_scores(seen, outlook, layers, out):  # type: ignore[no-untyped-def]
     """(N,) the output for every cell.
 
     `seen` are codes, sizes and nearnesses (N,); they enter the h units through `layers`: (256, h)
