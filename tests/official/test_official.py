@@ -67,7 +67,7 @@ def truth(database):
         shot.token: known(shot, SPLIT[s["name"]])
         for s in scenes(tables)
         for shot in nuscenes_film(tables, s).shots
-    }  # noqa: E501
+    }
 
 
 def known(shot, heading):
