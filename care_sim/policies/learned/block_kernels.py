@@ -1,28 +1,45 @@
-"""Pictures of the angular grid drawn coarse, compiled: only cells that are marked or fired are
-touched.
+"""Coarse pictures of the angular grid, compiled: only marked or fired cells are touched."""
 
-Numba's cache notices a change in a compiled function's own file only, so no other file's compiled
-code calls these.
-"""
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.core.grid import Cells
+
+BlockPictures = NDArray[np.float32]
+"""(3, B) a number per block, for three pictures."""
+
+
+class LastScan(NamedTuple):
+    """The last scan, and the heights between which a return stands above the road."""
+
+    ranges: NDArray[np.float32]
+    """(N,) metres."""
+    rises: NDArray[np.float64]
+    """(N,) how far each ray rises per metre."""
+    reach_m: float
+    sensor_height_m: float
+    lowest_m: float
+    highest_m: float
 
 
 @compiled()
-def add_object_shares(sets, ends, blocks, marks, out):  # type: ignore[no-untyped-def]
-    """Add to `out` (3, B) a part for every cell of three groups of `sets`, a cell counting once a
-    group.
+def add_object_shares(
+    sets: Cells, ends: Cells, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
+) -> None:
+    """Add to `out` the share of each block's cells that lie in three groups of `sets`.
 
-    The groups end at `ends` (3,). `blocks` (N,) is the block of every cell, `marks` (N,) uint8 is
-    for scribbling.
+    The groups end at `ends` (3,). `blocks` (N,) is the block of every cell. `marks` (N,) is memory
+    to work in; afterwards its bit g says whether a cell lies in group g.
     """
     part = np.float32(out.shape[1] / len(blocks))
     marks[:] = 0
     start = 0
     for group, end in enumerate(ends):
         for cell in sets[start:end]:
+            # Sets of a group overlap; a cell counts once per group.
             if not marks[cell] >> group & 1:
                 marks[cell] |= 1 << group
                 out[group, blocks[cell]] += part
@@ -30,21 +47,21 @@ def add_object_shares(sets, ends, blocks, marks, out):  # type: ignore[no-untype
 
 
 @compiled()
-def add_returns(fired, scan, blocks, marks, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (3, B) from the cells that fired: the nearness of the nearest return, and the
-    shares of cells fired and of those with a return that stands above the road outside every hull,
-    which `marks` has as its first group.
-
-    `scan` are ranges (N,), how far each ray rises a metre (N,), the reach, the sensor's height, and
-    the lowest and the highest that stands above the road.
+def add_returns(
+    fired: Cells, scan: LastScan, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
+) -> None:
+    """Fill `out` from the cells that fired: the nearness of each block's nearest return, the share
+    of its cells that fired, and of those with a return that stands above the road outside every
+    hull. The hulls are the first group of `marks`.
     """
-    ranges, rises, reach, sensor, lowest, highest = scan
     part = np.float32(out.shape[1] / len(blocks))
     for cell in fired:
         block = blocks[cell]
-        distance = ranges[cell]
+        distance = scan.ranges[cell]
         out[1, block] += part
-        if distance < reach:
-            out[0, block] = max(out[0, block], np.float32(1 - distance / reach))
-            if not marks[cell] & 1 and lowest < sensor + distance * rises[cell] < highest:
+        # A ray without a return reads the reach.
+        if distance < scan.reach_m:
+            out[0, block] = max(out[0, block], np.float32(1 - distance / scan.reach_m))
+            height = scan.sensor_height_m + distance * scan.rises[cell]
+            if not marks[cell] & 1 and scan.lowest_m < height < scan.highest_m:
                 out[2, block] += part

@@ -13,6 +13,16 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
+from care_sim.policies.learned.cell_kernels import (
+    MARK_BOX,
+    MARK_EXPLAINED,
+    MARK_HULL,
+    MARK_SMALL,
+    MARK_UNEXPLAINED,
+    ScanRules,
+    mark_scan,
+    mark_sets,
+)
 from care_sim.policies.paper.uncertainty import GROUND_CLEARANCE_M
 
 CELL_MARKS = (
@@ -72,17 +82,19 @@ class CellInputs:
 
     def of(self, belief: Belief, hulls: Sequence[Cells]) -> CellFeatures:
         """At a keyframe, given the hulls of its forecasts."""
-        from care_sim.policies.learned.cell_kernels import mark_scan, mark_sets
-
         rig = self.rig
         cells = self.rig.grid.size
         seen = CellFeatures(
             np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32)
         )
         mark_sets(seen.codes, seen.sizes, *self._sets(belief, hulls))
-        limits = np.float32(rig.grid.range_m), np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m)
-        margins = rig.azimuth_margin, rig.elevation_margin
-        mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, limits, margins)
+        rules = ScanRules(
+            np.float32(rig.grid.range_m),
+            np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m),
+            rig.azimuth_margin,
+            rig.elevation_margin,
+        )
+        mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, rules)
         return seen
 
     @cached_property
@@ -100,14 +112,6 @@ class CellInputs:
         self, belief: Belief, hulls: Sequence[Cells]
     ) -> tuple[Cells, Cells, NDArray[np.uint8]]:
         """Cells of hulls, wedges and undilated wedges, where each set ends, and its marks."""
-        from care_sim.policies.learned.cell_kernels import (
-            MARK_BOX,
-            MARK_EXPLAINED,
-            MARK_HULL,
-            MARK_SMALL,
-            MARK_UNEXPLAINED,
-        )
-
         detections = belief.detections
         known = explained(detections, belief.tracks, self.rig)
         sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._bare)]

@@ -1,14 +1,19 @@
 """What is seen of every cell, and its score by a network of one hidden layer, compiled.
 
-`codes` (N,) hold the marks of cells, one a bit. Numba's cache notices a change in a compiled
-function's own file only, so no other file's compiled code calls these.
+`codes` (N,) hold the marks of cells, one per bit.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.core.grid import Cells
+
+Codes = NDArray[np.uint8]
+CellNumbers = NDArray[np.float32]
 
 (
     MARK_UNEXPLAINED,
@@ -22,76 +27,129 @@ from care_sim.base.compiled import compiled
 ) = (1 << bit for bit in range(8))
 
 
-@compiled()
-def mark_sets(codes, sizes, cells, ends, marks):  # type: ignore[no-untyped-def]
-    """Give the cells of sets, which lie one after the other and end at `ends` (s,), the marks (s,)
-    of their sets.
+class ScanRules(NamedTuple):
+    """What a return must be to stand above the road, and how far its surroundings reach."""
 
-    `sizes` (N,) becomes, where there are UNEXPLAINED sets, log2 of the cells of the smallest over
-    10; whether a cell is SMALL the smallest says too.
+    reach_m: np.float32
+    """The longest range; a ray that returns nothing reads it."""
+    clearance_m: np.float32
+    """How high above the sensor a return must be."""
+    margin_columns: int
+    margin_rows: int
+
+
+class RigTerms(NamedTuple):
+    """What enters the network and stays the same while the rig does."""
+
+    hidden: CellNumbers
+    """(N, h) what enters the hidden units."""
+    unmarked: CellNumbers
+    """(N,) the output of a cell without a mark."""
+
+
+class MarkWeights(NamedTuple):
+    """The weights into the hidden units of what a keyframe shows."""
+
+    by_code: CellNumbers
+    """(256, h) for every code of marks."""
+    by_size: CellNumbers
+    """(h,)"""
+    by_nearness: CellNumbers
+    """(h,)"""
+
+
+@compiled()
+def mark_sets(codes: Codes, sizes: CellNumbers, cells: Cells, ends: Cells, marks: Codes) -> None:
+    """Give the cells of sets the marks (s,) of their sets.
+
+    The sets lie one after the other in `cells` and end at `ends` (s,). `sizes` (N,) becomes log2 of
+    the cells of the smallest MARK_UNEXPLAINED set that a cell lies in, over 10. That set also
+    decides whether the cell is MARK_SMALL.
     """
     start = 0
     for n, end in enumerate(ends):
         size = np.float32(math.log2(end - start + 1) / 10)
         for cell in cells[start:end]:
             code = codes[cell]
+            # Only unexplained sets compete for a cell; all other marks add up.
             if not marks[n] & MARK_UNEXPLAINED:
                 codes[cell] = code | marks[n]
             elif not code & MARK_UNEXPLAINED or size < sizes[cell]:
+                # The smaller set replaces what the larger one said of its class.
                 codes[cell] = (code & ~MARK_SMALL) | marks[n]
                 sizes[cell] = size
         start = end
 
 
 @compiled()
-def mark_scan(codes, nearnesses, ranges, heights, limits, margins):  # type: ignore[no-untyped-def]
+def mark_scan(
+    codes: Codes,
+    nearnesses: CellNumbers,
+    ranges: CellNumbers,
+    heights: CellNumbers,
+    rules: ScanRules,
+) -> None:
     """Mark the cells that the last scan `ranges` (E, A) fired, what stood there, and its
-    surroundings; write the `nearnesses` (N,) of returns, 1 at the sensor and 0 at the reach.
+    surroundings. Write the `nearnesses` (N,) of returns, 1 at the sensor and 0 at the reach.
 
-    `limits` are the reach and how high above the sensor a return must be to stand; it does in no
-    hull. `heights` (N,) are those of unit rays, `margins` the columns and rows of the surroundings.
+    `heights` (N,) are those of unit rays. Nothing in a hull counts as standing, since its track
+    explains it: hulls are marked before the scan.
     """
     rows, columns = ranges.shape
-    reach, clearance = limits
-    aside, up = margins
     for row in range(rows):
         for column in range(columns):
             cell = row * columns + column
             distance = ranges[row, column]
             if distance <= 0:
                 continue
+            # A ray without a return reads the reach, and so has the nearness 0.
             codes[cell] |= MARK_FIRED
-            nearnesses[cell] = 1 - distance / reach
+            nearnesses[cell] = 1 - distance / rules.reach_m
             if (
-                distance < reach
-                and heights[cell] * distance >= clearance
+                distance < rules.reach_m
+                and heights[cell] * distance >= rules.clearance_m
                 and not codes[cell] & MARK_HULL
             ):
                 codes[cell] |= MARK_STANDING
-                for near in range(max(row - up, 0), min(row + up + 1, rows)):
-                    for by in range(column - aside, column + aside + 1):
+                # Columns go round the car, rows end at the top and at the bottom.
+                first = max(row - rules.margin_rows, 0)
+                last = min(row + rules.margin_rows + 1, rows)
+                for near in range(first, last):
+                    for by in range(
+                        column - rules.margin_columns, column + rules.margin_columns + 1
+                    ):
                         codes[near * columns + by % columns] |= MARK_NEAR_STANDING
 
 
 @compiled()
-def network_scores(seen, outlook, layers, out):  # type: ignore[no-untyped-def]
-    """(N,) the output for every cell.
+def network_scores(
+    codes: Codes,
+    sizes: CellNumbers,
+    nearnesses: CellNumbers,
+    rig: RigTerms,
+    weights: MarkWeights,
+    out: CellNumbers,
+) -> CellNumbers:
+    """(N,) the output of the network for every cell.
 
-    `seen` are codes, sizes and nearnesses (N,); they enter the h units through `layers`: (256, h)
-    by code, (h,) by size and (h,) by nearness. `outlook` is what else enters, (N, h), and (N,) the
-    output of a cell without a mark. Units are rectified and weighed by `out` (h,).
+    `codes`, `sizes` and `nearnesses` (N,) are what a keyframe shows. Hidden units are rectified and
+    weighed by `out` (h,).
     """
-    codes, sizes, nearnesses = seen
-    hidden, unseen = outlook
-    by_code, by_size, by_nearness = layers
-    scores = unseen.copy()
+    scores = rig.unmarked.copy()
     units = np.empty_like(out)
     for n, code in enumerate(codes):
+        # Most cells have no mark: theirs is the output that was computed with the rig.
         if code:
             size = sizes[n]
             near = nearnesses[n]
             for h in range(len(out)):
-                unit = hidden[n, h] + by_code[code, h] + size * by_size[h] + near * by_nearness[h]
+                unit = (
+                    rig.hidden[n, h]
+                    + weights.by_code[code, h]
+                    + size * weights.by_size[h]
+                    + near * weights.by_nearness[h]
+                )
                 units[h] = max(unit, np.float32(0)) * out[h]
+            # One sum over all units, in NumPy's order: published scores hang on it.
             scores[n] = units.sum()
     return scores

@@ -15,6 +15,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.perception.cluster.road import KERB_CLEARANCE_M
+from care_sim.policies.learned.block_kernels import LastScan, add_object_shares, add_returns
 from care_sim.policies.learned.tiling import Tiling
 
 CHANNELS = ("forecast", "residual", "explained", "nearness", "fired", "undetected")
@@ -64,17 +65,14 @@ class GridFeatures:
         return {"grid": np.minimum(out, 1, out=out).ravel(), "ego": self._ego(belief)}
 
     def _draw_objects(self, belief: Belief, out: NDArray[np.float32]) -> None:
-        from care_sim.policies.learned.block_kernels import add_object_shares
-
         groups = [self.rig.hulls(belief.tracks.boxes), *camera_layers(belief, self.rig)]
         cells = np.concatenate([np.empty(0, np.int64), *chain(*groups)])
         ends = np.cumsum([sum(map(len, group)) for group in groups])
         add_object_shares(cells, ends, self._blocks, self._marks, out)
 
     def _draw_returns(self, ranges: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        from care_sim.policies.learned.block_kernels import add_returns
-
-        scan = ranges, self._rises, self.rig.grid.range_m, self.rig.sensor_height_m, *STANDING_M
+        rig = self.rig
+        scan = LastScan(ranges, self._rises, rig.grid.range_m, rig.sensor_height_m, *STANDING_M)
         add_returns(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
 
     def _ego(self, belief: Belief) -> NDArray[np.float32]:

@@ -17,6 +17,7 @@ from care_sim.policies.learned.cell_inputs import (
     CellFeatures,
     CellInputs,
 )
+from care_sim.policies.learned.cell_kernels import MarkWeights, RigTerms, network_scores
 from care_sim.policies.learned.weights import Weights, load_weights, shipped_weights
 
 
@@ -58,20 +59,13 @@ class CellNetwork:
         units = layer.shape[1]
         self._out = weights.array("out", units)
         hidden = outlooks @ layer[SCAN_INPUTS:] + weights.array("bias", units)
-        self._outlook = hidden, np.maximum(hidden, 0) @ self._out
-        self._layers = (
-            _by_code(layer[: len(CELL_MARKS)]),
-            *np.ascontiguousarray(layer[len(CELL_MARKS) : SCAN_INPUTS]),
-        )
+        self._rig_terms = RigTerms(hidden, np.maximum(hidden, 0) @ self._out)
+        by_size, by_nearness = np.ascontiguousarray(layer[len(CELL_MARKS) : SCAN_INPUTS])
+        self._mark_weights = MarkWeights(_by_code(layer[: len(CELL_MARKS)]), by_size, by_nearness)
 
     def scores(self, seen: CellFeatures) -> NDArray[np.float32]:
         """(N,) of cells; higher where an object without a track is likelier."""
-        from care_sim.policies.learned.cell_kernels import network_scores
-
-        scores: NDArray[np.float32] = network_scores(
-            tuple(seen), self._outlook, self._layers, self._out
-        )
-        return scores
+        return network_scores(*seen, self._rig_terms, self._mark_weights, self._out)
 
 
 def _by_code(layer: NDArray[np.float32]) -> NDArray[np.float32]:
