@@ -1,5 +1,6 @@
-"""Wrappers: of some that make an environment one to learn in, each documents its action and observation in a table;
-others watch an episode.
+"""The wrappers. Some make an environment easier to learn in: `SectorReserve`, `SectorScores` and
+`GridObservation`, each with tables of its action and observation. The others watch an episode and
+leave it as it is: `RecordRerun` and `ExportScans`.
 """
 
 from care_sim.envs.wrappers.export_scans import ExportScans

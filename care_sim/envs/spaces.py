@@ -1,4 +1,4 @@
-"""The spaces of the environments, and the check of an action at their door."""
+"""The spaces of the environments, and the check of an action."""
 
 from typing import Any
 

@@ -121,7 +121,7 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
     given = {name: value for name, value in (options or {}).items() if value is not None}
     for name in given:
         if name not in {field.name for field in fields(RECORDING_KINDS[kind])}:
-            raise InvalidInput(f"{name} says nothing to {kind} recordings")
+            raise InvalidInput(f"{name} has no meaning for {kind} recordings")
     if "camera_detections" in given:
         check_path("camera_detections", given["camera_detections"])
         given["camera_detections"] = Path(str(given["camera_detections"]))

@@ -123,7 +123,7 @@ def source_of(text: str, **options: object) -> Source:
     given = {name: value for name, value in options.items() if value is not None}
     split = str(given.pop("split", "evaluation"))
     if given:
-        raise InvalidInput(f"{', '.join(given)} says nothing to streets")
+        raise InvalidInput(f"{', '.join(given)} has no meaning for streets")
     check_known("split of the streets", split, SPLITS)
     return Streets(split)
 

@@ -281,7 +281,7 @@ def test_the_command_plays_prints_and_resumes(folder, tmp_path, capsys):
         ),
         (["--source", "argoverse2:nowhere"], "source argoverse2:nowhere: nowhere is no folder"),
         (["--split", "val"], "unknown split of the streets 'val'; known: calibration, evaluation"),
-        (["--version", "v1.0-mini"], "version says nothing to streets"),
+        (["--version", "v1.0-mini"], "version has no meaning for streets"),
         (["--scenes", "151"], "scenes must be a number from 1 to 150 or names, got 151"),
         (["--scenes", "street-9"], "unknown scene 'street-9'"),
         (["--policies", "nobody"], "unknown policy 'nobody'"),

@@ -277,7 +277,7 @@ def test_what_the_open_loop_does_not_take_is_named(make, arguments, complaint):
         ),
         (
             {"source": "argoverse2:{drive}", "split": "val"},
-            "split says nothing to argoverse2 recordings",
+            "split has no meaning for argoverse2 recordings",
         ),
     ],
 )

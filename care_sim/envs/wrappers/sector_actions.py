@@ -1,4 +1,4 @@
-"""Actions of a few numbers instead of one a cell: scores of azimuth x elevation sectors."""
+"""Actions of a few numbers instead of one per cell: scores of azimuth x elevation sectors."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ from care_sim.policies.learned.tiling import Tiling
 
 
 class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):
-    """Scores a sector, from -1 to 1: the range in which learners are at home."""
+    """One score per sector, from -1 to 1: the range that learners are made for."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
         self._sensing = sensing(env)
@@ -37,13 +37,13 @@ class SectorReserve(_Sectors):
     """The action ranks sectors for the reserve; exploitation and floor stay those of the shared
     allocator.
 
-    A learner so competes with the rules on the reserve alone.
+    So a learner competes with the rules on the reserve alone.
 
     ### Action
-    `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest,
+    `Box(-1, 1, (elevations, azimuths), float32)`, one score per sector; elevation 0 is the highest,
     azimuth 0 begins straight behind.
 
-    | score | what becomes of the sector |
+    | score | what happens to the sector |
     |---|---|
     | above 0 | a layer of the reserve; highest score first, ties by ascending index |
     | 0 or less | left to the floor |
@@ -75,10 +75,10 @@ class SectorScores(_Sectors):
     budget.
 
     ### Action
-    `Box(-1, 1, (elevations, azimuths), float32)`, a score a sector; elevation 0 is the highest,
+    `Box(-1, 1, (elevations, azimuths), float32)`, one score per sector; elevation 0 is the highest,
     azimuth 0 begins straight behind.
 
-    | score | what becomes of the sector |
+    | score | what happens to the sector |
     |---|---|
     | above 0 | its cells fire, ascending; highest score first, ties by ascending index |
     | 0 or less | left to the floor |

@@ -17,8 +17,8 @@ from care_sim.policies.base import Policy
 
 
 class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
-    """Gathers the moments of the closed loop under it, around or inside wrappers that change the
-    action.
+    """Records the keyframes of the closed loop under it. It may stand around or inside wrappers
+    that change the action.
 
     With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions
     only what was chosen and what the floor filled up. Raises InvalidInput for an environment that

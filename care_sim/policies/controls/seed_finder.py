@@ -1,4 +1,4 @@
-"""A warning: it finds the seed by the car's first speed and plays by heart."""
+"""A warning: it finds the seed by the car's first speed and knows the episode from then on."""
 
 from contextlib import closing
 from functools import lru_cache
@@ -98,8 +98,8 @@ def _first_speeds(scenario: str, seeds: int) -> dict[float, int]:
 
 @lru_cache(maxsize=4)
 def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
-    """(k, 7) where the hidden actor is at every keyframe, in the world frame: what the ego does is
-    nothing to it.
+    """(k, 7) where the hidden actor is at every keyframe, in the world frame: it does not
+    react to the ego.
     """
     from care_sim.scenarios import SCENARIOS
 

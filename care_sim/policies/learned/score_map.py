@@ -7,7 +7,7 @@ too, and the car's own motion. Hidden layers are rectified, scores are hyperboli
     score.weight . relu(hidden.weight relu(window.weight * blocks + ego.weight ego + window.bias) +
     hidden.bias) + place
 
-with `place` one number a sector.
+with `place` one number per sector.
 """
 
 import numpy as np

@@ -24,7 +24,7 @@ class BeamReduce(Policy):
         self._rows = horizon_rows(rig.grid, rig.budget)
 
     def demand(self, belief: Belief) -> Demand:
-        """A layer a row; no exploitation."""
+        """One layer per row; no exploitation."""
         return Demand(layers=[[cells] for cells in self._rows])
 
 

@@ -46,7 +46,7 @@ class Lane:
     def log_curve(
         self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats
     ) -> None:
-        """Log a number a keyframe (n,) at once, which costs as much as logging one."""
+        """Log one number per keyframe (n,) at once, which costs as much as logging one."""
         times = (
             rr.TimeColumn(KEYFRAME, sequence=keyframes),
             rr.TimeColumn(SECONDS, duration=times_s),
