@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from care_sim.commands.shared.episode_studies import FixedStudy
-from care_sim.reports.tables.ablations import configurations
+from care_sim.study.designs.ablations import ablation_study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,4 +18,4 @@ class Ablate(FixedStudy):
 
     def __call__(self) -> int:
         """Run it."""
-        return self.play("ablate", configurations, self.out)
+        return self.play("ablate", ablation_study, self.out)

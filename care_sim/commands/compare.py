@@ -18,11 +18,11 @@ from care_sim.base.text import printable
 from care_sim.commands.shared.options import USUAL, Options
 from care_sim.commands.shared.running import DONE, FAILED, console, playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
-from care_sim.reports.episodes.clips import Film
+from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.timeline import text
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import Environment, answer, trace
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 from care_sim.viewer.pictures.comparison import draw_panel
 
 COLUMNS = {
@@ -82,7 +82,7 @@ def play(
     their outcomes. What was played is printed whatever happens to the others; a line for each that
     failed is printed too, and returned.
     """
-    film = Film(video, draw_panel)
+    film = Clip(video, draw_panel)
     answers: list[Row | str] = []
     try:
         with _recorded(configs, record) as wrapped:

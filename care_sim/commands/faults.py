@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from care_sim.commands.shared.episode_studies import FixedStudy
-from care_sim.reports.tables.faults import configurations
+from care_sim.study.designs.faults import fault_study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,4 +18,4 @@ class Faults(FixedStudy):
 
     def __call__(self) -> int:
         """Run it."""
-        return self.play("faults", configurations, self.out)
+        return self.play("faults", fault_study, self.out)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from care_sim.commands.shared.episode_studies import FixedStudy
-from care_sim.study.designs.paper import configurations
+from care_sim.study.designs.paper import paper_study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,4 +18,4 @@ class Reproduce(FixedStudy):
 
     def __call__(self) -> int:
         """Run it."""
-        return self.play("paper", configurations, self.out)
+        return self.play("paper", paper_study, self.out)

@@ -12,8 +12,8 @@ from care_sim.commands.shared.running import console
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
-from care_sim.reports.episodes.brake_photo import Photographer
-from care_sim.reports.episodes.clips import Film
+from care_sim.reports.episodes.brake_photo import BrakePhoto
+from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.timeline import print_timeline
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import Environment, trace
@@ -51,7 +51,7 @@ class Run:
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer, film = Photographer(self.picture), Film(self.video)
+        photographer, film = BrakePhoto(self.picture), Clip(self.video)
         print_timeline(
             config,
             *trace(config, photographer, film.episode(self.policy), wrap=self._watched),

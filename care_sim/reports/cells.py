@@ -6,10 +6,10 @@ from care_sim.reports.contrasts import DETECTION, Contrast, contrast
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.summary import Cell, summarise
 from care_sim.study.row_reading import Key, grouped, tags_of_row
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 
-class Played:
+class StudyCells:
     """What a study has played so far; cells without rows are None."""
 
     def __init__(self, rows: Sequence[Row]):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from care_sim.evaluation.censoring import Difference, Reading, difference
 from care_sim.study.row_reading import detection
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 GATE_M = 2.5
 """What the ego covers at 30 km/h (8.33 m/s) while the controller's brake builds up (0.3 s); an

@@ -2,7 +2,7 @@
 
 import re
 
-from care_sim.reports.table import Bold, Row, Table
+from care_sim.reports.table import Bold, Table, TableRow
 
 PREAMBLE = "% \\usepackage{booktabs,adjustbox}\n"
 FIT = "max width=\\textwidth,max totalheight=0.85\\textheight"
@@ -60,7 +60,7 @@ def latex(table: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _line(row: Row) -> str:
+def _line(row: TableRow) -> str:
     return " & ".join(map(_entry, row)) + r" \\"
 
 

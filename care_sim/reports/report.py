@@ -15,25 +15,25 @@ from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, Study, study_of
 from care_sim.reports.table import unmarked
 from care_sim.study.journal import JOURNAL
-from care_sim.study.results_files import kind_in
+from care_sim.study.results_formats import results_format_in
 from care_sim.study.rows import read_notes, read_rows
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 
 def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
     """The rows in a folder of results, their study, and what is missing. Raises InvalidInput where
     there are none.
     """
-    kind = kind_in(folder)
+    kind = results_format_in(folder)
     if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
         raise InvalidInput(
             f"{folder} holds an unfinished study; the command that began it goes on there"
         )
     path = folder / kind.file
     study = study_of(path)
-    if study.kind is not kind:
+    if study.results is not kind:
         raise InvalidInput(
-            f"{path} holds no rows of the study {study.name}, which are in {study.kind.file}"
+            f"{path} holds no rows of the study {study.name}, which are in {study.results.file}"
         )
     return read_rows(path, study.schema), study, read_notes(path)[1]
 

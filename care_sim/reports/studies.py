@@ -17,15 +17,16 @@ from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
-from care_sim.reports.tables.crowding import COLUMN, crowding_tables
+from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.reports.tables.sweep import sweep_tables
+from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.paper import NO_COLLISION
-from care_sim.study.results_files import EPISODES, PLAYS, Kind
+from care_sim.study.results_formats import EPISODES, PLAYS, ResultsFormat
 from care_sim.study.row_schema import COUNT, Column, Schema
 from care_sim.study.rows import read_notes
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Study:
 
     `title` names it to readers; `closing` are sentences after the tables; `figure_names` every
     figure that the study can draw, as patterns in which a * stands for any text; `caption` says how
-    to read its tables; `kind` is what it plays; `columns` are further ones that its tables need.
+    to read its tables; `results` is what it plays; `columns` are further ones that its tables need.
     """
 
     name: str
@@ -44,13 +45,13 @@ class Study:
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
     caption: str = CAPTION
-    kind: Kind = EPISODES
+    results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
 
     @property
     def schema(self) -> Schema:
         """The columns that its rows must have."""
-        return replace(self.kind.schema, needed={**self.kind.schema.needed, **self.columns})
+        return replace(self.results.schema, needed={**self.results.schema.needed, **self.columns})
 
 
 def collisions(rows: Sequence[Row]) -> str:
@@ -95,7 +96,7 @@ _ALL = (
         _sweep_closing,
         (crowding_figure.NAME,),
         COMPARED,
-        columns={COLUMN: COUNT},
+        columns={VEHICLES_COLUMN: COUNT},
     ),
     Study(
         "ablate",

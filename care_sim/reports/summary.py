@@ -19,7 +19,7 @@ from care_sim.study.row_reading import (
     grouped,
     tags_of_row,
 )
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from care_sim.base.text import printable
 
-Row = tuple[str, ...]
+TableRow = tuple[str, ...]
 _MARKS = re.compile(r"[\\`*|~]|(?<!\w)_|_(?!\w)|<(?=[A-Za-z/!?])|&(?=#?\w+;)|(?<=\])\(")
 """What Markdown reads as marks, tags, entities or links."""
 
@@ -33,8 +33,8 @@ class Table:
     """
 
     title: str
-    columns: Row
-    rows: tuple[Row, ...]
+    columns: TableRow
+    rows: tuple[TableRow, ...]
     notes: tuple[str, ...] = ()
     quotes: tuple[str, ...] = ()
     files_only: tuple[str, ...] = ()
@@ -88,7 +88,7 @@ class Table:
     def _is_used(self, column: int) -> bool:
         return any(row[column] for row in self.rows if len(row) > 1)
 
-    def _markdown_row(self, row: Row) -> Row:
+    def _markdown_row(self, row: TableRow) -> TableRow:
         if len(row) == 1:
             return (f"*{unmarked(row[0])}*", *("" for _ in self.columns[1:]))
         return tuple(
@@ -102,7 +102,7 @@ def unmarked(text: str) -> str:
     return _MARKS.sub(r"\\\g<0>", text)
 
 
-def _shown(texts: Row) -> Row:
+def _shown(texts: TableRow) -> TableRow:
     return tuple(text if text.isprintable() else type(text)(printable(text)) for text in texts)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from care_sim.policies import tags_of
 from care_sim.study.row_reading import Setting, detection, setting_of
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 Worlds = dict[tuple[Setting, int], Row]
 

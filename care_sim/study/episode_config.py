@@ -13,11 +13,11 @@ from care_sim.core.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario
 from care_sim.study.parameters import Parameters
-from care_sim.study.task import (
+from care_sim.study.run_config import (
     CONDITIONS,
     Likeness,
     Row,
-    Task,
+    RunConfig,
     check_size,
     collected,
     departures,
@@ -30,7 +30,7 @@ ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 
 
 @dataclass(frozen=True)
-class EpisodeConfig(Conditions, Task):
+class EpisodeConfig(Conditions, RunConfig):
     """Everything that decides an episode.
 
     The fields are the arguments of the environments (see

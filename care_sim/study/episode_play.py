@@ -21,7 +21,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 from care_sim.world.world import World
 
 Answer = TypeVar("Answer")
@@ -30,7 +30,7 @@ Environment = gymnasium.Env[Any, Any]
 KIB_MB = 1024 / 1e6
 
 
-def attempt(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
+def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
     """What a worker does: play episodes; of each its row, or in one line why there is none."""
     return [answer(run_episode, config) for config in batch]
 
@@ -69,17 +69,17 @@ def trace(
     that watch around the environment.
     """
     started = time.perf_counter()
-    seal = Seal()
-    bare = config.make_env()
-    policy = config.make_policy(bare)
-    with wrap(bare, policy) as env:
+    digest = EpisodeHash()
+    inner = config.make_env()
+    policy = config.make_policy(inner)
+    with wrap(inner, policy) as env:
         observation, info = env.reset(seed=config.seed)
         policy.reset()
         begin(env.unwrapped.loop)  # type: ignore[attr-defined]
         ended = False
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
-            seal.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
+            digest.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
             for watch in watchers:
                 watch(env.unwrapped.loop, env.unwrapped.keyframes[-1])  # type: ignore[attr-defined]
             ended = terminated or truncated
@@ -92,12 +92,12 @@ def trace(
         "keyframes": len(keyframes),
         "wall_s": time.perf_counter() - started,
         "peak_rss_mb": peak_rss_mb(),
-        "episode_hash": seal.hexdigest(),
+        "episode_hash": digest.hexdigest(),
     }
     return row, keyframes
 
 
-class Seal:
+class EpisodeHash:
     """A hash over all that happens in an episode."""
 
     def __init__(self) -> None:

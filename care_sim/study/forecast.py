@@ -4,18 +4,20 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 
-from care_sim.study.task import Likeness, Task
+from care_sim.study.run_config import Likeness, RunConfig
 
 
 class Forecast:
     """Predicts the time that the waiting tasks of a run still need.
 
-    A task is expected to take as long as the mean of those most like it (`Task.likenesses`). What
-    this run has measured comes before what an `earlier` run did, perhaps on another machine: pairs
-    of task and seconds.
+    A task is expected to take as long as the mean of those most like it (`RunConfig.likenesses`).
+    What this run has measured comes before what an `earlier` run did, perhaps on another machine:
+    pairs of task and seconds.
     """
 
-    def __init__(self, waiting: Iterable[Task], earlier: Iterable[tuple[Task, float]] = ()):
+    def __init__(
+        self, waiting: Iterable[RunConfig], earlier: Iterable[tuple[RunConfig, float]] = ()
+    ):
         self._waiting = Counter(task.likenesses for task in waiting)
         self._now = _Means()
         self._earlier = _Means()
@@ -27,7 +29,7 @@ class Forecast:
         """Tasks that have not ended."""
         return self._waiting.total()
 
-    def finished(self, task: Task, seconds: float) -> None:
+    def finished(self, task: RunConfig, seconds: float) -> None:
         """A task has ended after so many seconds; one that failed counts as 0."""
         self._waiting[task.likenesses] -= 1
         self._now.add(task.likenesses, seconds)

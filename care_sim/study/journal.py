@@ -14,7 +14,7 @@ from typing import Self
 from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import check_file_size, parsed
 from care_sim.study.rows import with_tuples
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 STUDY = "study"
 CHECK = "check"

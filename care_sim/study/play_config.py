@@ -17,12 +17,12 @@ from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest
-from care_sim.study.task import (
+from care_sim.study.run_config import (
     CONDITIONS,
     FULL,
     Likeness,
     Row,
-    Task,
+    RunConfig,
     check_size,
     collected,
     departures,
@@ -35,7 +35,7 @@ _FILMED = [name for name in CONDITIONS if name not in UNFILMED]
 
 
 @dataclass(frozen=True)
-class PlayConfig(Conditions, Task):
+class PlayConfig(Conditions, RunConfig):
     """Everything that decides a play: the scene of a source, the policy, the detector, who counts
     as present at scene start (`care_sim.evaluation.sightings`), the conditions.
 

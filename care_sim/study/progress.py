@@ -13,9 +13,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from care_sim.study.executors import ExecutorFactory
 from care_sim.study.forecast import Forecast
 from care_sim.study.journal import Journal
-from care_sim.study.results_files import Kind
+from care_sim.study.results_formats import ResultsFormat
+from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Audience, Failure, run_all
-from care_sim.study.task import Row, Task
 
 EARLY = 0.05
 """Share of the tasks after which the prediction is kept, and after which a line is due."""
@@ -27,11 +27,11 @@ Show = Callable[[int, str], None]
 
 
 def run_with_progress(
-    configs: Sequence[Task],
+    configs: Sequence[RunConfig],
     journal: Journal,
     workers: int,
     make_executor: ExecutorFactory,
-    kind: Kind,
+    kind: ResultsFormat,
 ) -> list[Failure]:
     """Run the tasks that the journal does not hold yet, and show on stderr how far they are.
 
@@ -46,7 +46,7 @@ def run_with_progress(
         else nullcontext(Lines(len(configs), unit)) as show
     ):
         reporter = Reporter(forecast, show, len(configs))
-        failures = run_all(configs, journal, workers, make_executor, reporter, kind.attempt)
+        failures = run_all(configs, journal, workers, make_executor, reporter, kind.play_batch)
     if len(found) < len(configs):
         print(reporter.summary(unit), file=sys.stderr)
     return failures
@@ -79,7 +79,7 @@ class Reporter(Audience):
             self._predict()
         self._tell()
 
-    def finished(self, config: Task, row: Row | None) -> None:
+    def finished(self, config: RunConfig, row: Row | None) -> None:
         """Learn how long a task took."""
         self._forecast.finished(config, row["wall_s"] if row else 0.0)
         self._predict()

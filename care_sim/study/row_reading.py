@@ -13,7 +13,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import CAMERA_FAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.evaluation.censoring import Reading
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 Conditions = tuple[tuple[str, Any], ...]
 

@@ -53,12 +53,13 @@ _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": p
 
 @dataclass(frozen=True)
 class Column:
-    """A column of one of `KINDS`, its numbers within `least` and `most`; `gaps` tells whether rows
-    may hold nothing.
+    """A column of one of `KINDS`, its numbers within `least` and `most`.
+
+    Where it is `optional`, rows may hold nothing in it.
     """
 
     kind: str
-    gaps: bool = False
+    optional: bool = False
     least: float = -MOST
     most: float = MOST
 
@@ -69,13 +70,13 @@ class Column:
 
     def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
         """What is wrong with the values of a file, if anything."""
-        if self.gaps and values.null_count == len(values):
+        if self.optional and values.null_count == len(values):
             # The type of an empty column carries no meaning: pandas and earlier versions write
             # numbers there.
             return
         if not KINDS[self.kind](values.type):
             yield f"must hold {self.kind}, got {values.type}"
-        elif values.null_count and not self.gaps:
+        elif values.null_count and not self.optional:
             yield f"must hold {self.kind} in every row, got nothing in {values.null_count}"
         else:
             yield from self._beyond(values)
@@ -103,7 +104,7 @@ COUNT = Column("whole numbers", least=0)
 SEED = Column("whole numbers", least=0, most=math.inf)
 SUM = Column("numbers", least=0)
 SHARE = Column("numbers", least=1e-9, most=1)
-PARAMETER = Column(_ANY, gaps=True)
+PARAMETER = Column(_ANY, optional=True)
 _OF_TYPES = {
     bool: "true or false",
     int: "whole numbers",
@@ -111,12 +112,14 @@ _OF_TYPES = {
     str: "text",
     tuple: "lists of whole numbers",
 }
-CONDITIONS = {name: Column(_OF_TYPES[type(value)], gaps=True) for name, value in DEFAULTS.items()}
+CONDITIONS = {
+    name: Column(_OF_TYPES[type(value)], optional=True) for name, value in DEFAULTS.items()
+}
 
 
-def with_gaps(column: Column) -> Column:
+def as_optional(column: Column) -> Column:
     """The same where rows may hold nothing."""
-    return replace(column, gaps=True)
+    return replace(column, optional=True)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing
 from care_sim.base.json_text import parsed
 from care_sim.study.row_schema import Schema
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 STUDY = b"care_sim.study"
 """Where the schema of a file names the study that its rows belong to."""

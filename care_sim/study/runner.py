@@ -7,13 +7,13 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.study.episode_play import attempt
+from care_sim.study.episode_play import play_episodes
 from care_sim.study.executors import ClusterLost, ExecutorFactory, places, processes
 from care_sim.study.journal import Journal
-from care_sim.study.task import Row, Task, batches
+from care_sim.study.run_config import Row, RunConfig, batches
 
-Batch = Sequence[Task]
-Attempt = Callable[[Any], list[Row | str]]
+Batch = Sequence[RunConfig]
+PlayBatch = Callable[[Any], list[Row | str]]
 """Plays a batch in a worker: of each task its row, or in one line why there is none."""
 Flying = dict[Future[list[Row | str]], Batch]
 """The batches in flight."""
@@ -33,7 +33,7 @@ PATIENCE_S = 2.0
 class Failure:
     """A task that did not finish, and why."""
 
-    config: Task
+    config: RunConfig
     reason: str
 
     def __str__(self) -> str:
@@ -46,7 +46,7 @@ class Audience:
     def playing(self, workers: int) -> None:
         """So many workers play now; told every few seconds at least."""
 
-    def finished(self, config: Task, row: Row | None) -> None:
+    def finished(self, config: RunConfig, row: Row | None) -> None:
         """A task has ended; None when it failed."""
 
     def interrupted(self) -> None:
@@ -54,12 +54,12 @@ class Audience:
 
 
 def run_all(
-    configs: Sequence[Task],
+    configs: Sequence[RunConfig],
     journal: Journal,
     workers: int,
     make_executor: ExecutorFactory = processes,
     audience: Audience | None = None,
-    attempt: Attempt = attempt,
+    play_batch: PlayBatch = play_episodes,
 ) -> list[Failure]:
     """Run every task that the journal does not hold yet, in their order; returns those that failed.
 
@@ -68,7 +68,7 @@ def run_all(
     only the guilty task fails; the rest of a policy that has killed DEADLY workers is not tried.
     Raises ClusterLost when a cluster's scheduler is gone.
     """
-    run = _Run(journal, workers, make_executor, audience or Audience(), attempt)
+    run = _Run(journal, workers, make_executor, audience or Audience(), play_batch)
     waiting = deque(batches([config for config in configs if config.key not in journal]))
     while waiting:
         for suspect in run.together(waiting):
@@ -83,17 +83,17 @@ class _Run:
         workers: int,
         make_executor: ExecutorFactory,
         audience: Audience,
-        attempt: Attempt,
+        play_batch: PlayBatch,
     ):
         self.failures: list[Failure] = []
         self._deaths: Counter[str] = Counter()
-        self._attempt = attempt
+        self._play_batch = play_batch
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
         self._audience = audience
 
-    def together(self, waiting: "deque[list[Task]]") -> list[Batch]:
+    def together(self, waiting: "deque[list[RunConfig]]") -> list[Batch]:
         """Run until nothing waits or a worker dies; returns the batches in flight at a death.
 
         No more are in flight than there are workers, so that few are suspected.
@@ -131,7 +131,7 @@ class _Run:
         for half in (batch[: len(batch) // 2], batch[len(batch) // 2 :]):
             self.alone(half)
 
-    def _tried(self, batch: Batch) -> list[Task]:
+    def _tried(self, batch: Batch) -> list[RunConfig]:
         """The tasks of a batch but for those of deadly policies, which fail."""
         self._fail(
             [task for task in batch if self._deaths[task.policy] >= DEADLY],
@@ -139,7 +139,9 @@ class _Run:
         )
         return [task for task in batch if self._deaths[task.policy] < DEADLY]
 
-    def _launch(self, executor: Executor, waiting: "deque[list[Task]]", flying: Flying) -> None:
+    def _launch(
+        self, executor: Executor, waiting: "deque[list[RunConfig]]", flying: Flying
+    ) -> None:
         """Fill the places; a cluster without any gets one batch, which waits for a worker."""
         workers = places(executor, self._workers)
         self._audience.playing(workers)
@@ -170,7 +172,7 @@ class _Run:
             self._fail(batch, " ".join(f"{type(error).__name__}: {error}".split()))
         return True
 
-    def _record(self, config: Task, ending: Row | str) -> None:
+    def _record(self, config: RunConfig, ending: Row | str) -> None:
         if isinstance(ending, str):
             self._fail([config], ending)
         elif ending["digest"] != config.key:
@@ -190,10 +192,10 @@ class _Run:
         """
         for patience_s in (0.5, 2.0):
             try:
-                return executor.submit(self._attempt, batch)
+                return executor.submit(self._play_batch, batch)
             except (ConnectionError, EOFError):
                 time.sleep(patience_s)
-        return executor.submit(self._attempt, batch)
+        return executor.submit(self._play_batch, batch)
 
 
 def _is_cut_off(future: Future[list[Row | str]]) -> bool:

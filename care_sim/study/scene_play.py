@@ -19,7 +19,7 @@ from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoopKeyframe
 from care_sim.study.episode_play import answer, peak_rss_mb
 from care_sim.study.play_config import PlayConfig
-from care_sim.study.task import FULL, REFERENCE, Row
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
 SUMS = tuple(field.name for field in fields(Tally))
 EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
@@ -37,18 +37,18 @@ _NAMES = (
 """Columns by which an event finds its play."""
 
 
-def attempt(batch: Sequence[PlayConfig]) -> list[Row | str]:
+def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
     """What a worker does: the plays of one scene; of each its row, or in one line why there is
     none.
     """
-    scene = answer(PlayedScene, batch[0])
+    scene = answer(ScenePlayer, batch[0])
     if isinstance(scene, str):
         return [scene] * len(batch)
     return [answer(scene.row, config, len(batch)) for config in batch]
 
 
 @dataclass(frozen=True)
-class Playback:
+class PlayRecord:
     """What happened in a play. `tracks` and `explained` are means a keyframe: tracks held, and
     camera detections that a forecast explains.
     """
@@ -65,7 +65,7 @@ class Playback:
         return [record.fired for record in self.keyframes]
 
 
-class PlayedScene:
+class ScenePlayer:
     """Plays policies in one scene; those of the reference are kept, since the others are compared
     with them.
 
@@ -77,7 +77,7 @@ class PlayedScene:
         self._film = config.source.film(config.scene)
         self._film_s = time.perf_counter() - started
         self._film_hash = film_hash(self._film)
-        self._references: dict[PlayConfig, Playback] = {}
+        self._references: dict[PlayConfig, PlayRecord] = {}
 
     def row(self, config: PlayConfig, sharers: int = 1) -> Row:
         """The row of a play.
@@ -90,45 +90,45 @@ class PlayedScene:
         `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s` with the
         share of the film's that falls to one of so many plays.
         """
-        playback = self._playback(config)
-        score = playback.score
+        record = self._record(config)
+        score = record.score
         return {
             **config.row(),
             "version": care_sim.__version__,
             "digest": config.digest(),
             "film_hash": self._film_hash,
-            "episode_hash": _episode_hash(playback.keyframes),
-            "keyframes": len(playback.keyframes),
+            "episode_hash": _episode_hash(record.keyframes),
+            "keyframes": len(record.keyframes),
             **asdict(score.tally()),
             **_strata(score),
             "ttfds": tuple(score.delays.tolist()),
             "sightings": _sightings(score),
             "emerging": len(score.sightings.emerging),
-            "tracks": playback.tracks,
-            "explained": playback.explained,
-            **self._difference(config, playback),
-            "wall_s": playback.wall_s + self._film_s / sharers,
+            "tracks": record.tracks,
+            "explained": record.explained,
+            **self._difference(config, record),
+            "wall_s": record.wall_s + self._film_s / sharers,
             "peak_rss_mb": peak_rss_mb(),
         }
 
-    def _playback(self, config: PlayConfig) -> Playback:
+    def _record(self, config: PlayConfig) -> PlayRecord:
         if config != _reference(config):
             return play(config, self._film)
         if config not in self._references:
             self._references[config] = play(config, self._film)
         return self._references[config]
 
-    def _difference(self, config: PlayConfig, playback: Playback) -> Row:
+    def _difference(self, config: PlayConfig, record: PlayRecord) -> Row:
         reference = _reference(config)
         if config.policy == FULL or config == reference:
             return {"differing_keyframes": None, "differing_cells": None}
         moved: AllocationDifference = allocation_difference(
-            playback.fired, self._playback(reference).fired
+            record.fired, self._record(reference).fired
         )
         return {"differing_keyframes": moved.differing, "differing_cells": moved.cells}
 
 
-def play(config: PlayConfig, film: Film) -> Playback:
+def play(config: PlayConfig, film: Film) -> PlayRecord:
     """Play a policy through the film of its scene."""
     started = time.perf_counter()
     with config.make_env(film) as env:
@@ -149,7 +149,7 @@ def play(config: PlayConfig, film: Film) -> Playback:
         score = env.score
         keyframes = env.keyframes
     tracks, explanations = np.mean(counts, axis=0).tolist()
-    return Playback(score, keyframes, tracks, explanations, time.perf_counter() - started)
+    return PlayRecord(score, keyframes, tracks, explanations, time.perf_counter() - started)
 
 
 def without_events(row: Row) -> Row:

@@ -14,7 +14,7 @@ from care_sim.study import provenance
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
 from care_sim.study.provenance import file_digest, policy_digest
-from care_sim.study.task import files_in
+from care_sim.study.run_config import files_in
 
 HEAD = """
 import os

@@ -15,16 +15,16 @@ from care_sim.cli import main
 from care_sim.commands.shared.conduct import conduct
 from care_sim.core.conditions import Conditions
 from care_sim.evaluation.recall import Tally
-from care_sim.reports.protocol.rows import plays_of
+from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.report import reported
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.scenes import Scene, Streets, chosen_scenes, source_of
 from care_sim.study import scene_play as plays
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
-from care_sim.study.results_files import PLAYS
+from care_sim.study.results_formats import PLAYS
 from care_sim.study.runner import run_all
-from care_sim.study.task import batches
+from care_sim.study.run_config import batches
 from tests.helpers.av2_log import at, box, write
 
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -167,7 +167,7 @@ def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rul
         == (by_sight["frames"], by_sight["found"])
         == (3.0, 3.0)
     )
-    assert [plays_of([row])[0].setting.label for row in (by_rule, by_sight)] == [
+    assert [plays_by_setting([row])[0].setting.label for row in (by_rule, by_sight)] == [
         "Argoverse 2, detector returns",
         "Argoverse 2, detector returns, presence visible",
     ]
@@ -229,7 +229,7 @@ def test_a_policy_that_joins_later_is_all_that_is_played(source, tmp_path):
 def test_workers_get_whole_scenes_and_equal_what_is_played_at_home(source, tmp_path):
     configs = small(source, scenes=("a", "b"))
     with Journal(tmp_path / JOURNAL) as journal:
-        assert run_all(configs, journal, 2, attempt=PLAYS.attempt) == []
+        assert run_all(configs, journal, 2, play_batch=PLAYS.play_batch) == []
         kept = [journal[config.digest()] for config in configs]
     at_home = [
         row
@@ -369,7 +369,7 @@ def test_a_bad_policy_costs_only_its_own_plays(third_party, source, tmp_path):
     """
     configs = small(source, ["history", "dies", "care", "raises"], floors=(0, 1), scenes=("a", "b"))
     with Journal(tmp_path / JOURNAL) as journal:
-        failures = run_all(configs, journal, 2, attempt=PLAYS.attempt)
+        failures = run_all(configs, journal, 2, play_batch=PLAYS.play_batch)
         kept = [config.policy for config in configs if config.digest() in journal]
     assert sorted(kept) == ["care"] * 4 + ["history"] * 4
     reasons = sorted((failure.config.policy, failure.reason) for failure in failures)

@@ -16,7 +16,7 @@ from care_sim.sources.scenes import source_of
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid
-from care_sim.study.results_files import _PARAMETERS, EPISODES, KINDS, PLAYS
+from care_sim.study.results_formats import _PARAMETERS, EPISODES, RESULTS_FORMATS, PLAYS
 from care_sim.study.rows import read_notes, read_rows, write_rows
 from tests.helpers.made_rows import STUDY, rows
 
@@ -91,7 +91,7 @@ def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_
         conduct(short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), tmp_path, workers=1)
         == []
     )
-    monkeypatch.setattr("care_sim.study.task.code_digest", lambda: "edited")
+    monkeypatch.setattr("care_sim.study.run_config.code_digest", lambda: "edited")
     check_results(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), SWEEP)
     with pytest.raises(InvalidInput, match=r"; 1 of them, the first dartout care 0\.1 seed 1"):
         check_results(
@@ -293,6 +293,6 @@ def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tm
 
 def test_every_parameter_is_a_column_that_is_read():
     """What a reader drops is no part of what a row was asked with."""
-    known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in KINDS}
+    known = {kind.file: {*kind.schema.needed, *kind.schema.further} for kind in RESULTS_FORMATS}
     assert {*PLAIN_FIELDS} <= known[EPISODES.file]
     assert {*PLAY_FIELDS} | (_PARAMETERS - {*PLAIN_FIELDS}) <= known[PLAYS.file]

@@ -107,12 +107,12 @@ def test_the_web_viewer_is_served_and_ends_with_its_children(recording, end):
 
 
 def fetched(url):
-    for attempt in range(200):
+    for play_batch in range(200):
         try:
             with urlopen(url, timeout=10) as page:
                 return page.read()
         except URLError:
-            if attempt == 199:
+            if play_batch == 199:
                 raise
             time.sleep(0.1)
     raise AssertionError

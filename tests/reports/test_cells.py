@@ -1,4 +1,4 @@
-from care_sim.reports.cells import Played
+from care_sim.reports.cells import StudyCells
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.row_reading import key_of
 from tests.helpers.made_rows import rows
@@ -14,21 +14,21 @@ def key(policy, **fields):
 
 
 def test_cells_and_differences_are_found_by_key():
-    played = Played(ROWS)
+    played = StudyCells(ROWS)
     assert played.cell(key("care")).detection.median == 15.5
     assert played.difference(key("care"), key("history-oracle")).mean == 5.0
     assert played.policies == ["care", "history-oracle"]
 
 
 def test_what_was_not_played_is_none():
-    played = Played(ROWS)
+    played = StudyCells(ROWS)
     assert not played.has(key("care", camera_latency=1))
     assert played.cell(key("history")) is None
     assert played.difference(key("care"), key("history")) is None
 
 
 def test_policies_that_no_car_can_have_are_marked():
-    played = Played(ROWS)
+    played = StudyCells(ROWS)
     assert [played.marked(policy) for policy in played.policies] == ["care", "history-oracle †"]
     assert played.notes(["care"]) == ()
     assert played.notes(played.policies) == ("† knows the truth: no policy of a car.",)

@@ -29,12 +29,12 @@ DEEP = b"[" * 100_000
 
 
 def table(name, folder):
-    write_rows(ROWS[name], folder / STUDIES[name].kind.file, name)
-    return pq.read_table(folder / STUDIES[name].kind.file)
+    write_rows(ROWS[name], folder / STUDIES[name].results.file, name)
+    return pq.read_table(folder / STUDIES[name].results.file)
 
 
 def put(content, name, folder):
-    pq.write_table(content, folder / STUDIES[name].kind.file)
+    pq.write_table(content, folder / STUDIES[name].results.file)
 
 
 def of_value(content, column, value):
@@ -176,7 +176,7 @@ def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_p
 
 def test_names_and_texts_of_broken_characters_are_damage(tmp_path):
     table("protocol", tmp_path)
-    path = tmp_path / STUDIES["protocol"].kind.file
+    path = tmp_path / STUDIES["protocol"].results.file
     content = path.read_bytes()
     for text in (b"differing_cells", b"film of scene 000"):
         assert text in content
@@ -269,7 +269,7 @@ def test_a_name_of_signs_is_shown_everywhere(tmp_path, name, capsys):
     rows = [
         row | {"policy": odd if row["policy"] == "history" else row["policy"]} for row in ROWS[name]
     ]
-    write_rows(rows, tmp_path / STUDIES[name].kind.file, name, ["what \x1b[31m failed"])
+    write_rows(rows, tmp_path / STUDIES[name].results.file, name, ["what \x1b[31m failed"])
     (tmp_path / "config.json").write_text('{"machine": {"system": "\\ud800"}}')
     for command in (
         ["report", str(tmp_path)],

@@ -66,10 +66,10 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     Parquet changed.
     """
     played = {
-        "ablate": ablations.configurations(range(2)),
-        "faults": faults.configurations(range(2)),
-        "crowding": crowding.configurations(range(2)),
-        "paper": paper.configurations(range(2)),
+        "ablate": ablations.paper_study(range(2)),
+        "faults": faults.paper_study(range(2)),
+        "crowding": crowding.paper_study(range(2)),
+        "paper": paper.paper_study(range(2)),
     }
     for name, configs in played.items():
         rows = annotated([row(config, 10.0 + number % 7) for number, config in enumerate(configs)])

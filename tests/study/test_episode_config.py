@@ -90,7 +90,7 @@ def test_the_digest_tells_every_parameter_apart():
 
 def test_the_digest_covers_the_code(monkeypatch):
     before = GOOD.digest()
-    monkeypatch.setattr("care_sim.study.task.code_digest", lambda: "edited")
+    monkeypatch.setattr("care_sim.study.run_config.code_digest", lambda: "edited")
     assert GOOD.digest() != before
     assert len(provenance.code_digest()) == 16
 
@@ -135,7 +135,7 @@ def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers
     )
     ours = EpisodeConfig("dense", "near")
     before = ours.digest()
-    monkeypatch.setattr("care_sim.study.task.SESSION", "another run")
+    monkeypatch.setattr("care_sim.study.run_config.SESSION", "another run")
     assert EpisodeConfig("dense", "near").digest() != before
     assert pickle.loads(pickle.dumps(ours)).digest() == before
 

@@ -5,7 +5,7 @@ from care_sim.study.designs import paper
 
 
 def test_the_study_has_245_episodes_in_the_stated_split():
-    configs = paper.configurations(range(5))
+    configs = paper.paper_study(range(5))
     assert len(configs) == len(set(configs)) == 245
     assert Counter(config.seed for config in configs) == dict.fromkeys(range(5), 49)
     faultless = [c for c in configs if not (c.false_negative_rate or c.camera_latency)]
@@ -22,7 +22,7 @@ def test_the_study_has_245_episodes_in_the_stated_split():
 def test_every_published_figure_belongs_to_a_cell_that_is_run():
     cells = {
         (c.scenario, c.policy, c.budget, bool(c.false_negative_rate or c.camera_latency))
-        for c in paper.configurations([0])
+        for c in paper.paper_study([0])
     }
     for entry in paper.PUBLISHED:
         assert any(entry.covers(*cell) for cell in cells), entry
@@ -31,6 +31,6 @@ def test_every_published_figure_belongs_to_a_cell_that_is_run():
 
 
 def test_crowding_varies_the_vehicles_from_none_to_all():
-    configs = crowding.configurations([0])
+    configs = crowding.paper_study([0])
     assert {dict(c.scenario_parameters)["vehicles"] for c in configs} == set(range(13))
     assert len(configs) == 13 * (2 * 8 + 1)

@@ -17,7 +17,7 @@ from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import answer, run_episode, trace
 from care_sim.study.journal import JOURNAL, Journal
-from care_sim.study.results_files import EPISODES
+from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows import read_rows
 from care_sim.study.runner import Audience, run_all
 

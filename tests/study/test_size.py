@@ -60,7 +60,7 @@ def test_axes_are_counted_before_they_are_multiplied(monkeypatch):
     source = source_of("streets")
     with pytest.raises(InvalidInput, match="at most 100,000"):
         play_grid(source, source.scenes(), ["care"] * 1000, many, range(1000), range(1000))
-    monkeypatch.setattr("care_sim.study.task.MOST_TASKS", 12)
+    monkeypatch.setattr("care_sim.study.run_config.MOST_TASKS", 12)
     assert len(grid(["dartout"], ["care", "full"], [0.1, 0.2], range(4))) == 12
     with pytest.raises(InvalidInput, match="at most 12, got 15"):
         grid(["dartout"], ["care", "full"], [0.1, 0.2], range(5))
@@ -69,5 +69,5 @@ def test_axes_are_counted_before_they_are_multiplied(monkeypatch):
 @pytest.mark.parametrize("study", [paper, ablations, crowding, faults])
 def test_a_study_of_several_seeds_is_that_of_one_with_each(study, monkeypatch):
     monkeypatch.setattr(config.EpisodeConfig, "__post_init__", lambda self: None)
-    whole = study.configurations((3, 1, 4), ["random"])
-    assert of_seeds(study.configurations((3,), ["random"]), (3, 1, 4)) == whole
+    whole = study.paper_study((3, 1, 4), ["random"])
+    assert of_seeds(study.paper_study((3,), ["random"]), (3, 1, 4)) == whole

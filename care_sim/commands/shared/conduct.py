@@ -18,11 +18,11 @@ from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import check_columns, write_columns, write_rows
 from care_sim.study.runner import Failure
-from care_sim.study.task import Row, Task
+from care_sim.study.run_config import Row, RunConfig
 
 
 def conduct(
-    configs: Sequence[Task],
+    configs: Sequence[RunConfig],
     folder: Path,
     workers: int,
     make_executor: ExecutorFactory = processes,
@@ -43,7 +43,7 @@ def conduct(
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
     check_whole("workers", workers, 1)
-    configs, kind = [config.changed() for config in configs], study.kind
+    configs, kind = [config.changed() for config in configs], study.results
     check_columns(config.row() for config in configs)
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
@@ -70,18 +70,18 @@ def summary(failures: Sequence[Failure], unit: str) -> list[str]:
     ]
 
 
-def _description(configs: Sequence[Task], study: Study, failures: Sequence[Failure]) -> str:
+def _description(configs: Sequence[RunConfig], study: Study, failures: Sequence[Failure]) -> str:
     settings = {
         "study": study.name,
         "versions": versions(),
         "machine": machine(),
         "failed": [*map(str, failures)],
     }
-    return json.dumps(settings | study.kind.listed(configs), indent=1) + "\n"
+    return json.dumps(settings | study.results.listed(configs), indent=1) + "\n"
 
 
 def _check(
-    folder: Path, configs: Sequence[Task], study: Study, force: bool, journal: Journal | None = None
+    folder: Path, configs: Sequence[RunConfig], study: Study, force: bool, journal: Journal | None = None
 ) -> None:
     """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves
     a file there, and after.
@@ -102,7 +102,7 @@ def _journal(folder: Path, study: Study) -> Journal:
         raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
 
 
-def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, unit: str) -> None:
+def _say_what_is_found(configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str) -> None:
     """One line when tasks will not be played again, or others share the journal; one for what is
     damaged there.
     """
@@ -123,13 +123,13 @@ def _say_what_is_found(configs: Sequence[Task], journal: Journal, folder: Path, 
 
 def _write(
     rows: Sequence[Row],
-    configs: Sequence[Task],
+    configs: Sequence[RunConfig],
     folder: Path,
     study: Study,
     failures: Sequence[Failure],
 ) -> None:
     """Write the results of a study: everything is made before the first file is replaced."""
-    kind = study.kind
+    kind = study.results
     left_out, finished, aside = summary(failures, kind.unit), kind.finish(rows), kind.aside(rows)
     report = Report.of(finished, study, left_out)
     write_text(folder / "config.json", _description(configs, study, failures))

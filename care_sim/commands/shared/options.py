@@ -10,7 +10,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.text import shown
 from care_sim.core.conditions import Conditions
 from care_sim.study.parameters import parameters
-from care_sim.study.task import MOST_TASKS
+from care_sim.study.run_config import MOST_TASKS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ from care_sim.reports.report import print_report, reported
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
 from care_sim.study.executors import CORES, MOST_WORKERS
-from care_sim.study.task import Task
+from care_sim.study.run_config import RunConfig
 
 DONE, FAILED = 0, 1
 PIPE_WIDTH = 180
@@ -46,7 +46,7 @@ class Running:
         check_fields(self)
 
     def conduct(
-        self, study: str, configs: Sequence[Task], out: Path, left_out: Sequence[str] = ()
+        self, study: str, configs: Sequence[RunConfig], out: Path, left_out: Sequence[str] = ()
     ) -> int:
         """Play the tasks, print their tables, name those that failed and the policies that were
         left out.
@@ -59,7 +59,7 @@ class Running:
             print(f"Results are in {out}")
         report_problems(
             [
-                *(f"failed: {line}" for line in summary(failures, STUDIES[study].kind.unit)),
+                *(f"failed: {line}" for line in summary(failures, STUDIES[study].results.unit)),
                 *left_out,
             ]
         )

@@ -11,9 +11,9 @@ from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.reports.studies import SWEEP, Study
 from care_sim.study.journal import Journal
-from care_sim.study.results_files import KINDS, is_parameter
+from care_sim.study.results_formats import RESULTS_FORMATS, is_parameter
 from care_sim.study.rows import read_notes, read_rows
-from care_sim.study.task import Row, Task
+from care_sim.study.run_config import Row, RunConfig
 
 WAYS_OUT = "give another --out, or --force to replace it"
 _USUAL = DEFAULTS | {"presence": ANNOTATED}
@@ -26,8 +26,8 @@ _MOST_TOLD = 3
 
 def check_kind(folder: Path, study: Study) -> None:
     """Raise InvalidInput where the other kind of results lies, which have files of their own."""
-    kind = study.kind
-    for other in KINDS:
+    kind = study.results
+    for other in RESULTS_FORMATS:
         if other is not kind and (folder / other.file).exists():
             raise InvalidInput(
                 f"{folder} holds {other.unit} of another study; the {kind.unit} of the study "
@@ -36,17 +36,17 @@ def check_kind(folder: Path, study: Study) -> None:
             )
 
 
-def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
+def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> None:
     """Raise InvalidInput where the results of another study lie, or rows of this one that were
     asked with parameters that nobody asks for now: they would be gone. Damaged results are told as
     they are read.
     """
-    path = folder / study.kind.file
+    path = folder / study.results.file
     if not path.is_file():
         return
     there = read_notes(path)[0] or SWEEP.name
     rows, gone = _rows_and_gone(path, configs, study)
-    unit = study.kind.unit.removesuffix("s")
+    unit = study.results.unit.removesuffix("s")
     here, wanted = counted(len(rows), unit), counted(len(configs), unit)
     if there != study.name:
         raise InvalidInput(
@@ -63,13 +63,13 @@ def check_results(folder: Path, configs: Sequence[Task], study: Study) -> None:
         )
 
 
-def lost(folder: Path, played: Sequence[Task], study: Study) -> str:
+def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
     """In one line, which rows of the folder are not among those played, where others failed; empty
     for none.
     """
-    path = folder / study.kind.file
+    path = folder / study.results.file
     rows, gone = _rows_and_gone(path, played, study) if path.is_file() else ([], [])
-    unit = study.kind.unit.removesuffix("s")
+    unit = study.results.unit.removesuffix("s")
     if not gone:
         return ""
     return (
@@ -81,12 +81,12 @@ def lost(folder: Path, played: Sequence[Task], study: Study) -> str:
     )
 
 
-def check_journal(folder: Path, configs: Sequence[Task], journal: Journal, study: Study) -> None:
+def check_journal(folder: Path, configs: Sequence[RunConfig], journal: Journal, study: Study) -> None:
     """Raise InvalidInput where an interrupted study is to go on that has another name, or rows that
     nobody asks for now: once other results lie there, its own command is refused. A row counts by
     its parameters, whatever code played it, so that a command goes on after a change of the code.
     """
-    if not len(journal) or (folder / study.kind.file).is_file():
+    if not len(journal) or (folder / study.results.file).is_file():
         return
     rows = counted(len(journal), "row")
     if study.name not in journal.studies:
@@ -105,14 +105,14 @@ def check_journal(folder: Path, configs: Sequence[Task], journal: Journal, study
 
 
 def _rows_and_gone(
-    path: Path, configs: Sequence[Task], study: Study
+    path: Path, configs: Sequence[RunConfig], study: Study
 ) -> tuple[list[Row], list[Row]]:
     """The rows of a file, and those that are none of `configs`."""
-    rows = read_rows(path, study.kind.schema.lenient)
+    rows = read_rows(path, study.results.schema.lenient)
     return rows, _gone(rows, configs)
 
 
-def _gone(rows: Sequence[Row], configs: Sequence[Task]) -> list[Row]:
+def _gone(rows: Sequence[Row], configs: Sequence[RunConfig]) -> list[Row]:
     own = {_identity(config.row()) for config in configs}
     return [row for row in rows if _identity(row) not in own]
 
@@ -136,7 +136,7 @@ def _label(row: Row) -> str:
     return " ".join([*main, *(f"{name} {row[name]}" for name in _SEEDS if row.get(name))])
 
 
-def _differing(row: Row, configs: Sequence[Task]) -> str:
+def _differing(row: Row, configs: Sequence[RunConfig]) -> str:
     """In brackets, what tells a row from the task nearest to it, where their labels are the
     same.
     """

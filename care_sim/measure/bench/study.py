@@ -2,8 +2,8 @@
 
 import time
 
-from care_sim.study.designs.paper import configurations
-from care_sim.study.episode_play import attempt
+from care_sim.study.designs.paper import paper_study
+from care_sim.study.episode_play import play_episodes
 from care_sim.study.executors import processes
 
 WORKERS = 2
@@ -13,12 +13,12 @@ def study(seeds: int) -> dict[str, float]:
     """`episodes` of that many seeds, and the `seconds` that two workers take. Raises RuntimeError
     when one fails.
     """
-    configs = configurations(range(seeds))
+    configs = paper_study(range(seeds))
     started = time.perf_counter()
     with processes(WORKERS) as pool:
         answers = [
             answer
-            for batch in pool.map(attempt, [[config] for config in configs])
+            for batch in pool.map(play_episodes, [[config] for config in configs])
             for answer in batch
         ]
     seconds = time.perf_counter() - started

@@ -11,7 +11,7 @@ import numpy as np
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.records import Keyframe
 from care_sim.measure.parity.exact import exactly
-from care_sim.study.designs.paper import configurations
+from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
 
@@ -50,7 +50,7 @@ def outcomes(seeds: int, done: Callable[[int], None]) -> Outcomes:
     """The paper's 49 configurations with seeds from 0; `done` hears how many seeds are compared."""
     compared = Outcomes()
     for seed in range(seeds):
-        for config in configurations([seed]):
+        for config in paper_study([seed]):
             compared.compare(config)
         done(seed + 1)
     return compared

@@ -11,7 +11,7 @@ from care_sim.loops.records import Keyframe
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 
 
-class Photographer:
+class BrakePhoto:
     """Watches an episode and writes one picture to `path`; without a path it does nothing.
 
     Raises InvalidInput and OSError at once where no picture can be written:

@@ -28,7 +28,7 @@ def whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Ima
     return Image.fromarray(draw_keyframe(loop, frames[-1]))
 
 
-class Film:
+class Clip:
     """Episodes side by side on one film at `path`, drawn by `draw`; without a path it does nothing.
 
     Raises InvalidInput for a folder and for an ending that no clip has, MissingExtra for one whose

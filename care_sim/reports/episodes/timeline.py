@@ -9,7 +9,7 @@ from rich.text import Text
 from care_sim.base.text import printable
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 COLUMNS = (
     "time\ns",

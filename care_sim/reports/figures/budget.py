@@ -14,7 +14,7 @@ from care_sim.reports.figures.styles import FULL, Style, styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.summary import Cell, summarise
 from care_sim.scenarios import SCENARIOS
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 NAMES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
 """Every figure that a sweep can draw."""

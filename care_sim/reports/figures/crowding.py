@@ -13,7 +13,7 @@ from care_sim.base.text import percent
 from care_sim.reports.formatting import mean
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 NAME = "crowding"
 PALE = 0.55
@@ -76,7 +76,7 @@ def _finish(axes: Axes, crowd: Crowd) -> None:
     axes.set_yticks(range(len(crowd.counts)), [str(n) for n in crowd.counts])
     axes.set_xlabel("budget (share of cells fired)")
     axes.set_ylabel("standing vehicles")
-    seeds = len({row["seed"] for row in crowd.played.rows})
+    seeds = len({row["seed"] for row in crowd.study.rows})
     title = (
         f"dense, {seeds} seeds. Bold: interval without zero; asterisk: gate met; frame: collapsed"
     )

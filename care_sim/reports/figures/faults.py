@@ -9,19 +9,20 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from care_sim.reports.cells import Played
+from care_sim.reports.cells import StudyCells
 from care_sim.reports.figures.styles import FULL, Style, styles
 from care_sim.reports.summary import Cell
-from care_sim.reports.tables.faults import FAULTS, PLACES, Fault, policies_of
-from care_sim.study.designs.levels import Place
-from care_sim.study.task import Row
+from care_sim.reports.tables.faults import policies_of
+from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, Fault
+from care_sim.study.designs.variants import Place
+from care_sim.study.run_config import Row
 
 COLUMNS = 5
 """Panels side by side; a place at least stays free for the legend."""
 
 
 @dataclass(frozen=True)
-class Measure:
+class CurveMeasure:
     """What a figure shows of a cell; `read` gives None where there is nothing to show."""
 
     name: str
@@ -37,27 +38,32 @@ class Measure:
 
 
 MEASURES = (
-    Measure("detection", "first detection, median, m", lambda cell: cell.detection.median),
-    Measure("braked", "episodes with braking, %", lambda cell: 100.0 * cell.braked / cell.episodes),
-    Measure(
+    CurveMeasure("detection", "first detection, median, m", lambda cell: cell.detection.median),
+    CurveMeasure(
+        "braked", "episodes with braking, %", lambda cell: 100.0 * cell.braked / cell.episodes
+    ),
+    CurveMeasure(
         "clearance",
         "clearance, median, m",
         lambda cell: cell.clearance.median if cell.clearance else None,
     ),
 )
-NAMES = tuple(f"faults-{place.scenario}-{measure.name}" for place in PLACES for measure in MEASURES)
+NAMES = tuple(
+    f"faults-{place.scenario}-{measure.name}" for place in FAULT_PLACES for measure in MEASURES
+)
 """Every figure that the study can draw."""
 
 
 def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """A figure for every place and measure, by name."""
-    played = Played(rows)
+    study = StudyCells(rows)
     drawn = styles(
-        (policy, played.tags.get(policy, ())) for policy in policies_of(played) if policy != "full"
+        (policy, study.tags.get(policy, ())) for policy in policies_of(study) if policy != "full"
     )
-    curves = Curves(played, drawn | {"full": FULL})
+    curves = Curves(study, drawn | {"full": FULL})
     return {
-        f"faults-{p.scenario}-{m.name}": curves.figure(p, m) for p, m in product(PLACES, MEASURES)
+        f"faults-{p.scenario}-{m.name}": curves.figure(p, m)
+        for p, m in product(FAULT_PLACES, MEASURES)
     }
 
 
@@ -65,10 +71,10 @@ def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 class Curves:
     """Draws what was played, in the styles of the policies."""
 
-    played: Played
+    study: StudyCells
     drawn: dict[str, Style]
 
-    def figure(self, place: Place, measure: Measure) -> Figure:
+    def figure(self, place: Place, measure: CurveMeasure) -> Figure:
         """All faults in one place: an open marker at the bottom stands for a median that there is
         not.
         """
@@ -83,15 +89,15 @@ class Curves:
         handles, names = panels[0].get_legend_handles_labels()
         panels[len(FAULTS)].legend(handles, names, loc="center left", frameon=False, fontsize=9)
         figure.supylabel(measure.label, fontsize=10)
-        seeds = len({row["seed"] for row in self.played.rows})
-        notes = "; ".join(["open, at the bottom: not detected", *self.played.notes(self.drawn)])
+        seeds = len({row["seed"] for row in self.study.rows})
+        notes = "; ".join(["open, at the bottom: not detected", *self.study.notes(self.drawn)])
         figure.suptitle(f"{place}, {seeds} seeds ({notes})", x=0.01, ha="left", fontsize=10)
         return figure
 
-    def _panel(self, axes: Axes, fault: Fault, place: Place, measure: Measure) -> None:
+    def _panel(self, axes: Axes, fault: Fault, place: Place, measure: CurveMeasure) -> None:
         for policy, style in self.drawn.items():
             keys = [level.key(place, policy) for level in fault.levels]
-            self._curve(axes, policy, style, [measure.value(self.played.cell(key)) for key in keys])
+            self._curve(axes, policy, style, [measure.value(self.study.cell(key)) for key in keys])
         axes.set_title(fault.title, loc="left", fontsize=9)
         axes.set_xlabel(fault.unit, fontsize=8)
         axes.set_xticks(range(len(fault.levels)), [level.label for level in fault.levels])
@@ -104,8 +110,8 @@ class Curves:
         self, axes: Axes, policy: str, style: Style, heights: Sequence[float | None]
     ) -> None:
         """Draw a policy over the strengths; None was not played, nan has no median."""
-        played = [(place, height) for place, height in enumerate(heights) if height is not None]
-        if not played:
+        study = [(place, height) for place, height in enumerate(heights) if height is not None]
+        if not study:
             return
         look: dict[str, Any] = {
             "color": style.colour,
@@ -113,11 +119,11 @@ class Curves:
             "markersize": 4,
             "alpha": 0.85,
         }
-        label = self.played.marked(policy)
+        label = self.study.marked(policy)
         axes.plot(
-            *zip(*played, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label
+            *zip(*study, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label
         )
-        missing = [place for place, height in played if math.isnan(height)]
+        missing = [place for place, height in study if math.isnan(height)]
         if missing:
             axes.plot(
                 missing,

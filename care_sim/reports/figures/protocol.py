@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from care_sim.reports.figures.protocol_budgets import levels_figure
 from care_sim.reports.figures.protocol_frontier import pareto_figure
-from care_sim.reports.protocol.rows import SOURCES, plays_of
-from care_sim.study.task import Row
+from care_sim.reports.protocol.rows import SOURCES, plays_by_setting
+from care_sim.study.run_config import Row
 
 KINDS = ("pareto", "levels")
 FIGURE_NAMES = tuple(
@@ -21,7 +21,7 @@ conditions is not usual.
 def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """Figures 2 and 3 of the paper for each setting, by name; Figure 3 needs two budgets."""
     figures = {}
-    for plays in plays_of(rows):
+    for plays in plays_by_setting(rows):
         if plays.policies:
             figures[f"pareto-{plays.setting.slug}"] = pareto_figure(plays)
         if len(plays.budgets) > 1:

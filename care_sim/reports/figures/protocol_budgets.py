@@ -9,8 +9,8 @@ from care_sim.reports.figures.styles import FULL as FULL_STYLE
 from care_sim.reports.figures.styles import styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.paper import published_level
-from care_sim.reports.protocol.rows import Plays
-from care_sim.study.task import FULL, REFERENCE
+from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.study.run_config import FULL, REFERENCE
 
 DODGE = 0.025
 """Share of a budget by which neighbouring policies are moved apart, so that equal lines stay
@@ -21,7 +21,7 @@ SPREAD = 0.1
 APART = "policies are drawn a little apart sideways, so that equal points stay visible"
 
 
-def levels_figure(plays: Plays) -> Figure:
+def levels_figure(plays: SettingPlays) -> Figure:
     """Recalls in % of all policies at all budgets; the full scan as a dashed line; what the paper
     gives of both, hollow and dotted.
     """
@@ -50,7 +50,7 @@ def levels_figure(plays: Plays) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, plays: Plays, ratio: Ratio) -> None:
+def _draw(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
     ceiling = plays.level(ratio, FULL, 1.0).by_event if plays.full else None
     if ceiling is not None:
         axes.axhline(
@@ -77,7 +77,7 @@ def _draw(axes: Axes, plays: Plays, ratio: Ratio) -> None:
         line[0].set_label(marked(policy, plays.tags[policy]))
 
 
-def _draw_published(axes: Axes, plays: Plays, ratio: Ratio) -> None:
+def _draw_published(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
     """The levels that the paper gives, of nuScenes and its own detectors."""
     ceiling = published_level(ratio, FULL, 1.0)
     if ceiling is not None:

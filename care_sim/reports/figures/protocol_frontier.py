@@ -12,14 +12,14 @@ from care_sim.base.text import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.figures.styles import Style, styles
 from care_sim.reports.formatting import MARKS, marked, tag_notes
-from care_sim.reports.protocol.rows import Plays
-from care_sim.study.task import FULL, REFERENCE
+from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.study.run_config import FULL, REFERENCE
 
 Point = tuple[float, float]
 """Overall and first-sighting recall in %."""
 
 
-def pareto_figure(plays: Plays) -> Figure:
+def pareto_figure(plays: SettingPlays) -> Figure:
     """Markers of all policies, and in grey the Pareto frontier of those that a car can have.
 
     What lies below and left of the staircase is beaten in one recall and not better in the other.
@@ -55,7 +55,7 @@ def _beats(other: Point, point: Point) -> bool:
     return other != point and all(theirs >= ours for theirs, ours in zip(other, point, strict=True))
 
 
-def recalls(plays: Plays, policy: str, budget: float) -> Point | None:
+def recalls(plays: SettingPlays, policy: str, budget: float) -> Point | None:
     """Where a policy stands at a budget; None where a recall is not known."""
     overall, first = (
         plays.level(ratio, policy, budget).by_event for ratio in (OVERALL, FIRST_SIGHTING)
@@ -64,7 +64,7 @@ def recalls(plays: Plays, policy: str, budget: float) -> Point | None:
 
 
 def _draw(
-    axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: Plays
+    axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: SettingPlays
 ) -> None:
     for policy, (overall, first) in points.items():
         look = drawn[policy]
@@ -99,7 +99,7 @@ def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
     axes.set(xlim=(left, right), ylim=(low, high))
 
 
-def _name(figure: Figure, axes: Axes, plays: Plays) -> None:
+def _name(figure: Figure, axes: Axes, plays: SettingPlays) -> None:
     """The title, the markers by policy, what the full scan reaches, and what the grey line is."""
     figure.suptitle(
         f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10

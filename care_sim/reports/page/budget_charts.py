@@ -11,7 +11,7 @@ from care_sim.reports.formatting import marked, spread, tag_notes
 from care_sim.reports.page.chart import (
     FULL_SCAN,
     Chart,
-    Look,
+    Encoding,
     apart,
     budget_axis,
     budgets_text,
@@ -19,7 +19,7 @@ from care_sim.reports.page.chart import (
     specification,
 )
 from care_sim.reports.summary import Cell, summarise
-from care_sim.study.task import FULL, Row
+from care_sim.study.run_config import FULL, Row
 
 NOTES = (
     "Median over the seeds; bars are quartiles. Hollow, at the bottom: the median is an actor "
@@ -39,11 +39,11 @@ def budget_charts(rows: Sequence[Row]) -> list[Chart]:
 def _chart(cells: Sequence[Cell]) -> Chart:
     tags = dict.fromkeys((cell.policy, cell.tags) for cell in cells if cell.policy != FULL)
     full = [cell for cell in cells if cell.policy == FULL and cell.detection.median is not None]
-    look = Look.of(tags, bool(full))
+    encoding = Encoding.of(tags, bool(full))
     values = _values(cells, [policy for policy, _ in tags])
     height = alt.Y("median:Q", title="first detection (m)", scale=alt.Scale(zero=True))
     base = alt.Chart(inline(values)).encode(
-        x=budget_axis(_budgets(cells)), y=height, color=look.colour, opacity=look.opacity
+        x=budget_axis(_budgets(cells)), y=height, color=encoding.colour, opacity=encoding.opacity
     )
     missed = base.transform_filter("datum.median == null").encode(y=alt.datum(0))
     about = [
@@ -56,15 +56,15 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         base.mark_rule(strokeWidth=1.5)
         .encode(y="low:Q", y2="high:Q")
         .transform_filter("datum.median != null"),
-        base.mark_line(strokeWidth=1.8).encode(strokeDash=look.dash),
-        base.mark_point(filled=True, size=55).encode(shape=look.shape, tooltip=about),
-        missed.mark_point(filled=False, size=55).encode(shape=look.shape, tooltip=about),
+        base.mark_line(strokeWidth=1.8).encode(strokeDash=encoding.dash),
+        base.mark_point(filled=True, size=55).encode(shape=encoding.shape, tooltip=about),
+        missed.mark_point(filled=False, size=55).encode(shape=encoding.shape, tooltip=about),
     ]
     if full:
         line = [{"policy": FULL_SCAN, "median": cell.detection.median} for cell in full[:1]]
         rule = alt.Chart(inline(line)).mark_rule(strokeWidth=1.5, strokeDash=[5, 3])
-        layers.append(rule.encode(y=height, color=look.colour, opacity=look.opacity))
-    chart = alt.layer(*layers).add_params(look.chosen).properties(width="container", height=300)
+        layers.append(rule.encode(y=height, color=encoding.colour, opacity=encoding.opacity))
+    chart = alt.layer(*layers).add_params(encoding.chosen).properties(width="container", height=300)
     scenario = cells[0].setting.scenario
     budgets = _budgets(cells)
     counts = sorted({cell.episodes for cell in cells})

@@ -23,14 +23,14 @@ from care_sim.reports.page.episodes import Episode, chosen, played_again
 from care_sim.reports.page.fault_charts import fault_charts
 from care_sim.reports.page.listing import Group, groups, reel
 from care_sim.reports.page.protocol_charts import protocol_charts
-from care_sim.reports.page.provenance import Origin, origin
+from care_sim.reports.page.provenance import Provenance, provenance_of
 from care_sim.reports.page.tables import blocks
 from care_sim.reports.report import reported
 from care_sim.reports.studies import Study
 from care_sim.reports.table import Table
 from care_sim.study.executors import ExecutorFactory, processes
-from care_sim.study.results_files import EPISODES
-from care_sim.study.task import Row
+from care_sim.study.results_formats import EPISODES
+from care_sim.study.run_config import Row
 
 CHARTS: dict[str, Callable[[Sequence[Row]], list[Chart]]] = {
     "sweep": budget_charts,
@@ -65,13 +65,13 @@ class Page:
     study: Study
     rows: Sequence[Row]
     findings: Findings
-    origin: Origin
+    provenance: Provenance
     episodes: Sequence[Episode]
 
     @property
     def closed_loop(self) -> bool:
         """Whether there are episodes to watch: in the open loop nothing reacts."""
-        return self.study.kind is EPISODES
+        return self.study.results is EPISODES
 
     def html(self) -> str:
         """The page as one file."""
@@ -111,7 +111,7 @@ class Page:
             "Episodes that end otherwise when played again here, which are marked: "
             f"{self.differing}."
         ]
-        return [*self.origin.missing, *unplayable, *(otherwise if self.differing else [])]
+        return [*self.provenance.missing, *unplayable, *(otherwise if self.differing else [])]
 
     @property
     def watchable(self) -> int:
@@ -139,8 +139,8 @@ def write_page(
     rows, study, left_out = reported(folder)
     with replacing(path, HTML) as unfinished:
         findings = Findings.of(study, rows)
-        about = origin(folder, rows, study.kind, left_out)
-        watched = chosen(rows, most) if study.kind is EPISODES else []
+        about = provenance_of(folder, rows, study.results, left_out)
+        watched = chosen(rows, most) if study.results is EPISODES else []
         if watched:
             print(
                 f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr

@@ -48,7 +48,7 @@ def specification(chart: Any) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Look:
+class Encoding:
     """Colour, shape and line of every name in the legend, and the selection by a click there."""
 
     colour: alt.Color
@@ -58,7 +58,7 @@ class Look:
     chosen: alt.Parameter
 
     @classmethod
-    def of(cls, tags: Iterable[tuple[str, tuple[str, ...]]], full: bool) -> "Look":
+    def of(cls, tags: Iterable[tuple[str, tuple[str, ...]]], full: bool) -> "Encoding":
         """The look of policies, given with their tags, and of the full scan."""
         tags = list(tags)
         drawn = {
@@ -68,7 +68,7 @@ class Look:
         return cls.of_styles(drawn | ({FULL_SCAN: FULL} if full else {}))
 
     @classmethod
-    def of_styles(cls, drawn: Mapping[str, Style]) -> "Look":
+    def of_styles(cls, drawn: Mapping[str, Style]) -> "Encoding":
         """The look of names with these styles."""
         names = list(drawn)
         chosen = alt.selection_point(fields=["policy"], bind="legend")

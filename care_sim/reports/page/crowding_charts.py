@@ -11,7 +11,7 @@ from care_sim.reports.figures.crowding import PALE
 from care_sim.reports.formatting import interval, mean
 from care_sim.reports.page.chart import Chart, inline, specification
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 NOTES = (
     "Asterisk: the interval excludes zero and the gate is met. Frame: all-camera has collapsed.",

@@ -13,8 +13,8 @@ from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.episode_play import answer
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.parameters import Parameters
+from care_sim.study.run_config import Row
 from care_sim.study.runner import DIED
-from care_sim.study.task import Row
 
 TOLERANCE = 1e-6
 """Machines of different kinds may differ in the last bits."""

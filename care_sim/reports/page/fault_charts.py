@@ -8,13 +8,14 @@ from typing import Any
 import altair as alt
 
 from care_sim.base.text import counted
-from care_sim.reports.cells import Played
-from care_sim.reports.figures.faults import MEASURES, Measure
+from care_sim.reports.cells import StudyCells
+from care_sim.reports.figures.faults import MEASURES, CurveMeasure
 from care_sim.reports.figures.styles import FULL, styles
-from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Look, inline, specification
-from care_sim.reports.tables.faults import FAULTS, PLACES, policies_of
-from care_sim.study.designs.levels import Place
-from care_sim.study.task import Row
+from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Encoding, inline, specification
+from care_sim.reports.tables.faults import policies_of
+from care_sim.study.designs.faults import FAULT_PLACES, FAULTS
+from care_sim.study.designs.variants import Place
+from care_sim.study.run_config import Row
 
 LARGEST = 220.0
 """Area of the marks of the first policy, in square pixels."""
@@ -24,29 +25,29 @@ LEAST = 15.0
 
 def fault_charts(rows: Sequence[Row]) -> list[Chart]:
     """A chart for every place and measure."""
-    played = Played(rows)
-    return [_chart(played, place, measure) for place, measure in product(PLACES, MEASURES)]
+    study = StudyCells(rows)
+    return [_chart(study, place, measure) for place, measure in product(FAULT_PLACES, MEASURES)]
 
 
-def _chart(played: Played, place: Place, measure: Measure) -> Chart:
-    names = policies_of(played)
-    known = styles(
-        (policy, played.tags.get(policy, ())) for policy in names if policy != "full"
-    ) | {"full": FULL}
-    drawn = {played.marked(policy): style for policy, style in known.items()}
-    look = Look.of_styles(drawn)
+def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
+    names = policies_of(study)
+    known = styles((policy, study.tags.get(policy, ())) for policy in names if policy != "full") | {
+        "full": FULL
+    }
+    drawn = {study.marked(policy): style for policy, style in known.items()}
+    encoding = Encoding.of_styles(drawn)
     ratio = (LEAST / LARGEST) ** (1 / len(names))
     values = [
         value | {"area": round(LARGEST * ratio**number, 1)}
         for number, policy in enumerate(names)
-        for value in _values(played, place, measure, policy)
+        for value in _values(study, place, measure, policy)
     ]
     strengths = sorted({value["level"] for value in values}, key=float)
     base = alt.Chart().encode(
         x=alt.X("level:O", sort=strengths, title=None, axis=alt.Axis(labelAngle=0)),
         y=alt.Y("value:Q", title=None),
-        color=look.colour,
-        opacity=look.opacity,
+        color=encoding.colour,
+        opacity=encoding.opacity,
     )
     missed = base.transform_filter("datum.value == null").encode(y=alt.datum(0))
     nested = alt.Size("area:Q", scale=None, legend=None)
@@ -54,9 +55,9 @@ def _chart(played: Played, place: Place, measure: Measure) -> Chart:
         alt.Tooltip("text:N", title="value")
     ]
     layers = alt.layer(
-        base.mark_line(strokeWidth=1.5).encode(strokeDash=look.dash),
-        base.mark_point(filled=True).encode(shape=look.shape, size=nested, tooltip=about),
-        missed.mark_point(filled=False).encode(shape=look.shape, size=nested, tooltip=about),
+        base.mark_line(strokeWidth=1.5).encode(strokeDash=encoding.dash),
+        base.mark_point(filled=True).encode(shape=encoding.shape, size=nested, tooltip=about),
+        missed.mark_point(filled=False).encode(shape=encoding.shape, size=nested, tooltip=about),
     ).properties(width=PANEL_WIDTH, height=110)
     header = alt.Header(
         title=None, labelAnchor="start", labelExpr="split(datum.value, ', ')", labelFontSize=11
@@ -65,7 +66,7 @@ def _chart(played: Played, place: Place, measure: Measure) -> Chart:
     chart = layers.facet(
         facet=alt.Facet("fault:N", sort=faults, header=header), columns=5, data=inline(values)
     ).resolve_scale(x="independent")
-    seeds = counted(len({row["seed"] for row in played.rows}), "seed")
+    seeds = counted(len({row["seed"] for row in study.rows}), "seed")
     apart = "Marks of later policies are smaller, so that equal ones stay visible."
     hollow = "Hollow, at the bottom: the median is an actor that was not detected."
     return Chart(
@@ -75,22 +76,24 @@ def _chart(played: Played, place: Place, measure: Measure) -> Chart:
         (
             apart,
             *([hollow] if any(value["value"] is None for value in values) else []),
-            *played.notes(played.policies),
+            *study.notes(study.policies),
         ),
-        specification(chart.add_params(look.chosen)),
+        specification(chart.add_params(encoding.chosen)),
     )
 
 
-def _values(played: Played, place: Place, measure: Measure, policy: str) -> list[dict[str, Any]]:
+def _values(
+    study: StudyCells, place: Place, measure: CurveMeasure, policy: str
+) -> list[dict[str, Any]]:
     """The points of a policy at every strength that was played."""
     found = [
-        (fault, level.label, measure.value(played.cell(level.key(place, policy))))
+        (fault, level.label, measure.value(study.cell(level.key(place, policy))))
         for fault in FAULTS
         for level in fault.levels
     ]
     return [
         {
-            "policy": played.marked(policy),
+            "policy": study.marked(policy),
             "fault": fault.label,
             "level": label,
             "value": None if math.isnan(value) else round(value, 3),

@@ -11,7 +11,7 @@ from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode
 from care_sim.reports.page.replay import packed
 from care_sim.study.row_reading import Setting, policy_of, setting_of, tags_of_row
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,15 @@ from care_sim.reports.page.chart import (
     FULL_SCAN,
     PANEL_WIDTH,
     Chart,
-    Look,
+    Encoding,
     apart,
     budget_axis,
     inline,
     specification,
 )
 from care_sim.reports.protocol.paper import published_level
-from care_sim.reports.protocol.rows import Plays, plays_of
-from care_sim.study.task import FULL, Row
+from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
+from care_sim.study.run_config import FULL, Row
 
 RECALLS = (FIRST_SIGHTING, OVERALL)
 Values = list[dict[str, Any]]
@@ -31,7 +31,7 @@ Values = list[dict[str, Any]]
 def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
     """Figures 2 and 3 of the paper for each setting; Figure 3 needs two budgets."""
     charts = []
-    for plays in plays_of(rows):
+    for plays in plays_by_setting(rows):
         if plays.policies:
             charts.append(_pareto(plays))
         if len(plays.budgets) > 1:
@@ -39,11 +39,11 @@ def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
     return charts
 
 
-def _pareto(plays: Plays) -> Chart:
+def _pareto(plays: SettingPlays) -> Chart:
     """First-sighting against overall recall, a panel a budget, and the frontier of what a car can
     have.
     """
-    look = Look.of(plays.tags.items(), full=False)
+    encoding = Encoding.of(plays.tags.items(), full=False)
     values = [value for budget in plays.budgets for value in _points(plays, budget)]
     about = [
         alt.Tooltip("overall:Q", format=".1f"),
@@ -67,9 +67,9 @@ def _pareto(plays: Plays) -> Chart:
         .mark_point(size=90, strokeWidth=2)
         .encode(
             **place,
-            color=look.colour,
-            shape=look.shape,
-            opacity=look.opacity,
+            color=encoding.colour,
+            shape=encoding.shape,
+            opacity=encoding.opacity,
             tooltip=["policy:N", *about],
         )
     )
@@ -81,7 +81,7 @@ def _pareto(plays: Plays) -> Chart:
     chart = (
         _faceted(panels, values, order)
         .resolve_scale(x="independent", y="independent")
-        .add_params(look.chosen)
+        .add_params(encoding.chosen)
     )
     ceiling = recalls(plays, FULL, 1.0) if plays.full else None
     reached = (
@@ -103,7 +103,7 @@ def _pareto(plays: Plays) -> Chart:
     )
 
 
-def _points(plays: Plays, budget: float) -> Values:
+def _points(plays: SettingPlays, budget: float) -> Values:
     """The policies at a budget; then the corners of the frontier, without a policy."""
     points = {
         policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))
@@ -132,12 +132,12 @@ def _points(plays: Plays, budget: float) -> Values:
     ]
 
 
-def _levels(plays: Plays) -> Chart:
+def _levels(plays: SettingPlays) -> Chart:
     """Both recalls against the budget; hollow: what the paper gives."""
-    look = Look.of(plays.tags.items(), full=bool(plays.full))
+    encoding = Encoding.of(plays.tags.items(), full=bool(plays.full))
     values = [value for ratio in RECALLS for value in _curves(plays, ratio)]
     height = alt.Y("value:Q", title="recall (%)", scale=alt.Scale(zero=False))
-    base = alt.Chart().encode(y=height, color=look.colour, opacity=look.opacity)
+    base = alt.Chart().encode(y=height, color=encoding.colour, opacity=encoding.opacity)
     curves = base.encode(x=budget_axis(plays.budgets))
     about = [
         "policy:N",
@@ -148,12 +148,12 @@ def _levels(plays: Plays) -> Chart:
     ours, papers = (f"datum.place != null && datum.by == '{by}'" for by in ("here", "paper"))
     panels = alt.layer(
         base.mark_rule(strokeWidth=1.5, strokeDash=[5, 3]).transform_filter("datum.place == null"),
-        curves.mark_line(strokeWidth=1.8).encode(strokeDash=look.dash).transform_filter(ours),
+        curves.mark_line(strokeWidth=1.8).encode(strokeDash=encoding.dash).transform_filter(ours),
         curves.mark_point(filled=True, size=50)
-        .encode(shape=look.shape, tooltip=about)
+        .encode(shape=encoding.shape, tooltip=about)
         .transform_filter(ours),
         curves.mark_point(filled=False, size=60)
-        .encode(shape=look.shape, tooltip=about)
+        .encode(shape=encoding.shape, tooltip=about)
         .transform_filter(papers),
     ).properties(width=PANEL_WIDTH + 140, height=260)
     chart = _faceted(panels, values, [ratio.name for ratio in RECALLS]).resolve_scale(
@@ -170,11 +170,11 @@ def _levels(plays: Plays) -> Chart:
         f"{_title(plays)}: recall against the budget",
         description,
         notes,
-        specification(chart.add_params(look.chosen)),
+        specification(chart.add_params(encoding.chosen)),
     )
 
 
-def _curves(plays: Plays, ratio: Ratio) -> Values:
+def _curves(plays: SettingPlays, ratio: Ratio) -> Values:
     """Our levels, moved apart, and the paper's; without a place the full scan."""
     values: Values = []
     for number, (policy, tags) in enumerate(plays.tags.items()):
@@ -217,5 +217,5 @@ def _panel(budget: float) -> str:
     return f"budget {percent(budget)}"
 
 
-def _title(plays: Plays) -> str:
+def _title(plays: SettingPlays) -> str:
     return f"{plays.setting.label}: {counted(len(plays.scenes), 'scene')}"

@@ -10,8 +10,8 @@ from typing import Any
 from care_sim.base.json_text import json_content
 from care_sim.core.conditions import DEFAULTS
 from care_sim.study.provenance import code_digest
-from care_sim.study.results_files import Kind, is_parameter
-from care_sim.study.task import Row
+from care_sim.study.results_formats import ResultsFormat, is_parameter
+from care_sim.study.run_config import Row
 
 CONFIG = "config.json"
 MANY = 12
@@ -19,7 +19,7 @@ MANY = 12
 
 
 @dataclass(frozen=True)
-class Origin:
+class Provenance:
     """`machine` and `versions` as the study wrote them; `missing` are sentences about what is not
     there.
 
@@ -43,7 +43,9 @@ class Origin:
         return code_digest()
 
 
-def origin(folder: Path, rows: Sequence[Row], kind: Kind, left_out: Sequence[str]) -> Origin:
+def provenance_of(
+    folder: Path, rows: Sequence[Row], kind: ResultsFormat, left_out: Sequence[str]
+) -> Provenance:
     """What the folder of a study tells about its rows."""
     description, trouble = _description(folder / CONFIG)
     missing = [
@@ -52,7 +54,7 @@ def origin(folder: Path, rows: Sequence[Row], kind: Kind, left_out: Sequence[str
         *(f"Left out: {what}." for what in left_out),
     ]
     machine, versions = (_mapping(description, name) for name in ("machine", "versions"))
-    return Origin(machine, versions, settings(rows), tuple(missing))
+    return Provenance(machine, versions, settings(rows), tuple(missing))
 
 
 def settings(rows: Sequence[Row]) -> dict[str, str]:
@@ -100,7 +102,9 @@ def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
     return description, []
 
 
-def _unplayed(description: Mapping[str, Any], rows: Sequence[Row], kind: Kind) -> list[str]:
+def _unplayed(
+    description: Mapping[str, Any], rows: Sequence[Row], kind: ResultsFormat
+) -> list[str]:
     """What the configurations ask for and the rows do not hold; what failed is told as left out."""
     try:
         asked = sum(

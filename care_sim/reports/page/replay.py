@@ -25,7 +25,7 @@ from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 from care_sim.world.world import Actor
 
 SECTORS = 128

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from care_sim.base.text import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.reports.contrasts import GATE_POINTS
-from care_sim.reports.protocol.differences import Gap, Pair
+from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import whole
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals
 from care_sim.reports.protocol.paper import BUDGETS, GATE
-from care_sim.reports.protocol.rows import HISTORY, Plays, Setting, plays_of
-from care_sim.study.task import REFERENCE, Row
+from care_sim.reports.protocol.rows import HISTORY, Setting, SettingPlays, plays_by_setting
+from care_sim.study.run_config import REFERENCE, Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:
@@ -20,13 +20,17 @@ def protocol_closing(rows: Sequence[Row]) -> list[str]:
     setting.
     """
     gains = {
-        plays.setting: _gains(plays) for plays in plays_of(rows) if not plays.setting.conditions
+        plays.setting: _gains(plays)
+        for plays in plays_by_setting(rows)
+        if not plays.setting.conditions
     }
-    gates = [_gate(setting, gaps) for setting, gaps in gains.items() if gaps]
+    gates = [_gate(setting, differences) for setting, differences in gains.items() if differences]
     return [
         _size(rows),
         *gates,
-        *on_intervals(gap for gaps in gains.values() for gap in gaps.values()),
+        *on_intervals(
+            difference for differences in gains.values() for difference in differences.values()
+        ),
     ]
 
 
@@ -41,23 +45,23 @@ def _size(rows: Sequence[Row]) -> str:
     )
 
 
-def _gains(plays: Plays) -> dict[float, Gap]:
+def _gains(plays: SettingPlays) -> dict[float, MeasuredDifference]:
     """CARE over history at the paper's budgets."""
-    pair = Pair(REFERENCE, HISTORY, FIRST_SIGHTING)
+    pair = PolicyPair(REFERENCE, HISTORY, FIRST_SIGHTING)
     return {
-        budget: gap
+        budget: difference
         for budget in plays.budgets
-        if budget in BUDGETS and (gap := pair.gap(plays, budget))
+        if budget in BUDGETS and (difference := pair.measured(plays, budget))
     }
 
 
-def _gate(setting: Setting, gaps: Mapping[float, Gap]) -> str:
+def _gate(setting: Setting, differences: Mapping[float, MeasuredDifference]) -> str:
     measured = (
-        f"{whole(gap)} at {percent(budget)} ({'met' if _is_met(gap.mean, gap.sign) else 'not met'})"
-        for budget, gap in gaps.items()
+        f"{whole(difference)} at {percent(budget)} ({'met' if _is_met(difference) else 'not met'})"
+        for budget, difference in differences.items()
     )
     return f'Paper: "{GATE}" Here, {setting.label}: {", ".join(measured)}.'
 
 
-def _is_met(mean: float, sign: int) -> bool:
-    return sign > 0 and mean >= GATE_POINTS
+def _is_met(difference: MeasuredDifference) -> bool:
+    return difference.sign > 0 and difference.mean >= GATE_POINTS

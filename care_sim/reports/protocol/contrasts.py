@@ -7,30 +7,30 @@ from typing import NamedTuple
 
 from care_sim.base.text import percent
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.protocol.differences import RATIOS, Gap, Pair
+from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import PAPER, whole
 from care_sim.reports.protocol.notes import UNITS, left_out, on_intervals, papers, played
 from care_sim.reports.protocol.paper import statements_about
-from care_sim.reports.protocol.rows import HISTORY, Plays
+from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
-from care_sim.study.task import REFERENCE
+from care_sim.study.run_config import REFERENCE
 
 TITLES = {REFERENCE: f"{REFERENCE} minus each policy", HISTORY: f"each policy minus {HISTORY}"}
 HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}
 """What stands above the names of the policies that the base is compared with."""
 
 
-class Contrast(NamedTuple):
+class ContrastLine(NamedTuple):
     """A pair, named by the one of its policies that is not the base, and its differences at every
     budget.
     """
 
     policy: str
-    pair: Pair
-    gaps: list[Gap | None]
+    pair: PolicyPair
+    differences: list[MeasuredDifference | None]
 
 
-def contrast_tables(plays: Plays) -> list[Table]:
+def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
     """CARE less every other policy, every policy less history, and CARE's with equal weight to
     every scene; none of a base that was not played, or alone.
     """
@@ -38,10 +38,12 @@ def contrast_tables(plays: Plays) -> list[Table]:
     return [_table(plays, base, alike) for base, alike in wanted if plays.other_than(base)]
 
 
-def _table(plays: Plays, base: str, alike: bool) -> Table:
+def _table(plays: SettingPlays, base: str, alike: bool) -> Table:
     contrasts = list(_contrasts(plays, base, alike))
     said = statements_about(plays.setting)
-    intervals = on_intervals(gap for contrast in contrasts for gap in contrast.gaps)
+    intervals = on_intervals(
+        difference for contrast in contrasts for difference in contrast.differences
+    )
     weights = ", equal scene weights" if alike else ""
     return Table(
         f"{plays.setting.label}: {TITLES[base]}{weights}",
@@ -57,26 +59,28 @@ def _table(plays: Plays, base: str, alike: bool) -> Table:
     )
 
 
-def _contrasts(plays: Plays, base: str, alike: bool) -> Iterator[Contrast]:
+def _contrasts(plays: SettingPlays, base: str, alike: bool) -> Iterator[ContrastLine]:
     """CARE stands first in its pairs, history last."""
     for ratio in RATIOS:
         for policy in plays.other_than(base):
             first, second = (base, policy) if base == REFERENCE else (policy, base)
-            pair = Pair(first, second, ratio, alike=alike)
-            yield Contrast(policy, pair, [pair.gap(plays, budget) for budget in plays.budgets])
+            pair = PolicyPair(first, second, ratio, alike=alike)
+            yield ContrastLine(
+                policy, pair, [pair.measured(plays, budget) for budget in plays.budgets]
+            )
 
 
-def _lines(plays: Plays, contrasts: Iterable[Contrast]) -> Iterator[tuple[str, ...]]:
+def _lines(plays: SettingPlays, contrasts: Iterable[ContrastLine]) -> Iterator[tuple[str, ...]]:
     """The differences at every budget, and under them the paper's, below the headings of the
     measures.
     """
     heading = ""
-    for policy, pair, gaps in contrasts:
+    for policy, pair, differences in contrasts:
         if pair.heading != heading:
             heading = pair.heading
             yield (heading,)
-        if any(gaps):
-            yield (marked(policy, plays.tags[policy]), *map(whole, gaps))
+        if any(differences):
+            yield (marked(policy, plays.tags[policy]), *map(whole, differences))
             said = statements_about(plays.setting).get(pair)
             if said and (entries := said.among(plays.budgets)):
                 yield (PAPER, *entries)

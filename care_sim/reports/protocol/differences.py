@@ -21,8 +21,8 @@ from care_sim.evaluation.scene_contrasts import (
     contrast_gap,
     scene_contrast,
 )
-from care_sim.reports.protocol.rows import Plays
-from care_sim.study.task import REFERENCE
+from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.study.run_config import REFERENCE
 
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
 HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
@@ -30,11 +30,11 @@ RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
 """What the columns by which scenes are ranked count, a keyframe."""
 FEWEST_SCENES = 9
 """Three in each third: of fewer, a third says nothing of crowded scenes but of one or two."""
-GAP = "dense minus sparse"
+DENSE_LESS_SPARSE = "dense minus sparse"
 
 
 @dataclass(frozen=True)
-class Gap:
+class MeasuredDifference:
     """A difference in the unit of `ratio`; `interval` is None where too little was played for one.
 
     The interval comes from resampling scenes, or `over_events` from resampling the events of the
@@ -54,7 +54,7 @@ class Gap:
         )
 
 
-class Compared(Protocol):
+class Comparison(Protocol):
     """Anything that can be measured of a setting at a budget and set beside what the paper says of
     it.
     """
@@ -74,13 +74,13 @@ class Compared(Protocol):
         """The policies that it takes."""
         ...
 
-    def gap(self, plays: Plays, budget: float) -> Gap | None:
+    def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
         """What was measured, None without plays."""
         ...
 
 
 @dataclass(frozen=True)
-class Pair:
+class PolicyPair:
     """`first` less `second`, of all or `within` one stratum; with `alike` every scene weighs the
     same.
     """
@@ -107,24 +107,24 @@ class Pair:
         """The two policies."""
         return self.first, self.second
 
-    def gap(self, plays: Plays, budget: float) -> Gap | None:
+    def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
         """Paired by scene, on the scenes that both policies have."""
         found = self._contrast(plays, budget)
         if found is None:
             return None
         by = found.by_scene if self.alike else found.by_event
         if found.scenes >= FEWEST_PAIRS:
-            return Gap(self.ratio, by.mean, by)
+            return MeasuredDifference(self.ratio, by.mean, by)
         by_events = None if self.within or self.alike else _by_events(self, plays, budget)
-        return Gap(self.ratio, by.mean, by_events, over_events=by_events is not None)
+        return MeasuredDifference(self.ratio, by.mean, by_events, over_events=by_events is not None)
 
-    def _contrast(self, plays: Plays, budget: float) -> SceneContrast | None:
+    def _contrast(self, plays: SettingPlays, budget: float) -> SceneContrast | None:
         ours, theirs = (plays.tallies(policy, budget, self.within) for policy in self.policies)
         return scene_contrast(self.ratio, ours, theirs)
 
 
 @dataclass(frozen=True)
-class Third:
+class SceneThird:
     """CARE less all-camera in a third of the scenes (paper, Sec. 5.2), or in the dense third less
     the sparse.
 
@@ -144,29 +144,31 @@ class Third:
     @property
     def label(self) -> str:
         """The third."""
-        return self.which if self.which == GAP else f"{self.which} third"
+        return self.which if self.which == DENSE_LESS_SPARSE else f"{self.which} third"
 
-    def gap(self, plays: Plays, budget: float) -> Gap | None:
+    def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
         """None with fewer than three scenes a third."""
         groups = plays.thirds(self.ranked_by, budget)
         if sum(map(len, groups.values())) < FEWEST_SCENES:
             return None
         ours, theirs = (plays.tallies(policy, budget) for policy in self.policies)
-        if self.which != GAP:
+        if self.which != DENSE_LESS_SPARSE:
             return _among(self.ratio, {name: ours[name] for name in groups[self.which]}, theirs)
         return _dense_less_sparse(self.ratio, ours, theirs, groups)
 
 
-def _among(ratio: Ratio, ours: Tallies, theirs: Tallies) -> Gap | None:
+def _among(ratio: Ratio, ours: Tallies, theirs: Tallies) -> MeasuredDifference | None:
     found = scene_contrast(ratio, ours, theirs)
     if found is None:
         return None
-    return Gap(ratio, found.by_event.mean, found.by_event if found.scenes >= FEWEST_PAIRS else None)
+    return MeasuredDifference(
+        ratio, found.by_event.mean, found.by_event if found.scenes >= FEWEST_PAIRS else None
+    )
 
 
 def _dense_less_sparse(
     ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Mapping[str, Sequence[str]]
-) -> Gap | None:
+) -> MeasuredDifference | None:
     interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
     if interval is None:
         return None
@@ -175,10 +177,10 @@ def _dense_less_sparse(
         for which in ("dense", "sparse")
     ]
     enough = all(end and end.interval for end in ends)
-    return Gap(ratio, interval.mean, interval if enough else None)
+    return MeasuredDifference(ratio, interval.mean, interval if enough else None)
 
 
-def _by_events(pair: Pair, plays: Plays, budget: float) -> Interval | None:
+def _by_events(pair: PolicyPair, plays: SettingPlays, budget: float) -> Interval | None:
     """The interval from resampling events, paired and averaged over floor seeds; overall recall has
     none.
     """

@@ -2,7 +2,7 @@
 
 from care_sim.evaluation.scene_contrasts import TTFD, Ratio
 from care_sim.reports.formatting import bounds
-from care_sim.reports.protocol.differences import Gap
+from care_sim.reports.protocol.differences import MeasuredDifference
 from care_sim.reports.table import Bold
 
 PAPER = "(paper)"
@@ -19,53 +19,62 @@ def written(ratio: Ratio, value: float | None) -> str:
     return "" if value is None else f"{value:.{_decimals(ratio)}f}"
 
 
-def mean(gap: Gap | None) -> str:
+def mean(difference: MeasuredDifference | None) -> str:
     """A difference without its interval, bold where that excludes zero."""
-    return _weighed(gap, f"{_mean(gap)}{_mark(gap)}") if gap else ""
+    return _weighed(difference, f"{_mean(difference)}{_mark(difference)}") if difference else ""
 
 
-def interval(gap: Gap | None) -> str:
+def interval(difference: MeasuredDifference | None) -> str:
     """The interval alone."""
     return (
-        f"{bounds(gap.interval, _decimals(gap.ratio))}{_mark(gap)}" if gap and gap.interval else ""
+        f"{bounds(difference.interval, _decimals(difference.ratio))}{_mark(difference)}"
+        if difference and difference.interval
+        else ""
     )
 
 
-def whole(gap: Gap | None) -> str:
+def whole(difference: MeasuredDifference | None) -> str:
     """A difference with its interval, bold where that excludes zero."""
-    return _weighed(gap, f"{_mean(gap)} {interval(gap)}".rstrip()) if gap else ""
+    return (
+        _weighed(difference, f"{_mean(difference)} {interval(difference)}".rstrip())
+        if difference
+        else ""
+    )
 
 
-def verdict(gap: Gap, claimed: int) -> str:
+def verdict(difference: MeasuredDifference, claimed: int) -> str:
     """Whether a claim holds: 1 or -1 for a sign, 0 for a tie."""
-    if gap.interval is None:
+    if difference.interval is None:
         return UNDECIDED
-    if gap.sign == claimed:
+    if difference.sign == claimed:
         return MET
-    return NOT_MET if gap.sign else UNDECIDED
+    return NOT_MET if difference.sign else UNDECIDED
 
 
-def judged(gap: Gap | None, claimed: int | None, paper: str) -> str:
+def judged(difference: MeasuredDifference | None, claimed: int | None, paper: str) -> str:
     """A difference, whether it bears a claim out, and the claim as the paper has it; bold as `mean`
     is.
     """
-    if gap is None:
+    if difference is None:
         return ""
     if claimed is None:
-        return mean(gap)
-    return _weighed(gap, f"{_mean(gap)} {verdict(gap, claimed)}{_mark(gap)} ({paper})")
+        return mean(difference)
+    return _weighed(
+        difference,
+        f"{_mean(difference)} {verdict(difference, claimed)}{_mark(difference)} ({paper})",
+    )
 
 
-def _mean(gap: Gap) -> str:
-    return f"{gap.mean:+z.{_decimals(gap.ratio)}f}"
+def _mean(difference: MeasuredDifference) -> str:
+    return f"{difference.mean:+z.{_decimals(difference.ratio)}f}"
 
 
-def _mark(gap: Gap) -> str:
-    return OVER_EVENTS if gap.over_events else ""
+def _mark(difference: MeasuredDifference) -> str:
+    return OVER_EVENTS if difference.over_events else ""
 
 
-def _weighed(gap: Gap, text: str) -> str:
-    return Bold(text) if gap.sign else text
+def _weighed(difference: MeasuredDifference, text: str) -> str:
+    return Bold(text) if difference.sign else text
 
 
 def _decimals(ratio: Ratio) -> int:

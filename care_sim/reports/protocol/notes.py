@@ -8,10 +8,10 @@ from care_sim.base.text import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
-from care_sim.reports.protocol.differences import Gap
+from care_sim.reports.protocol.differences import MeasuredDifference
 from care_sim.reports.protocol.formatting import OVER_EVENTS
-from care_sim.reports.protocol.rows import Plays
-from care_sim.study.task import FULL, Row
+from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.study.run_config import FULL, Row
 
 UNITS = "Recall in points; TTFD in keyframes, where less is better."
 BY_EVENTS = (
@@ -27,7 +27,7 @@ NO_INTERVAL = (
 )
 
 
-def played(plays: Plays) -> str:
+def played(plays: SettingPlays) -> str:
     """Scenes, events, object frames and floor seeds."""
     total = counts(plays.scenes.values())
     seeds = {
@@ -64,16 +64,20 @@ def counts(scenes: Iterable[Row]) -> Tally:
     return sum((Tally(events=row["events"], frames=row["frames"]) for row in scenes), Tally())
 
 
-def on_intervals(gaps: Iterable[Gap | None]) -> tuple[str, ...]:
+def on_intervals(differences: Iterable[MeasuredDifference | None]) -> tuple[str, ...]:
     """What to know of the intervals of the differences shown: which are over events, and why some
     have none.
     """
-    shown = [gap for gap in gaps if gap]
-    by_events = (BY_EVENTS,) if any(gap.over_events for gap in shown) else ()
-    return (*by_events, NO_INTERVAL) if any(gap.interval is None for gap in shown) else by_events
+    shown = [difference for difference in differences if difference]
+    by_events = (BY_EVENTS,) if any(difference.over_events for difference in shown) else ()
+    return (
+        (*by_events, NO_INTERVAL)
+        if any(difference.interval is None for difference in shown)
+        else by_events
+    )
 
 
-def left_out(plays: Plays) -> tuple[str, ...]:
+def left_out(plays: SettingPlays) -> tuple[str, ...]:
     """How many scenes lack a play of a policy; they are left out of its levels and contrasts."""
     missing = list(_missing(plays))
     if not missing:
@@ -89,7 +93,7 @@ def papers(sources: Iterable[str]) -> tuple[str, ...]:
     return tuple(f'Paper: "{source}"' for source in dict.fromkeys(sources))
 
 
-def _missing(plays: Plays) -> Iterator[str]:
+def _missing(plays: SettingPlays) -> Iterator[str]:
     for policy in plays.policies:
         lacking = {
             budget: len(plays.scenes) - len(plays.tallies(policy, budget))

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
-from care_sim.reports.protocol.differences import GAP, Compared, Pair, Third
+from care_sim.reports.protocol.differences import (
+    DENSE_LESS_SPARSE,
+    Comparison,
+    PolicyPair,
+    SceneThird,
+)
 from care_sim.reports.protocol.rows import Setting
 
 BUDGETS = (0.10, 0.20, 0.35)
@@ -45,7 +50,7 @@ class Said:
         return next((sign for start, sign in _SIGNS.items() if entry.startswith(start)), None)
 
 
-class Level(NamedTuple):
+class PublishedLevel(NamedTuple):
     """What the paper says of one policy: recalls and their shares of the full scan's in %, TTFD in
     keyframes.
     """
@@ -141,60 +146,66 @@ GATE = (
 )
 _TIED = ("tied", "tied", "tied")
 
-_PLAIN: dict[Compared, Said] = {
-    Pair("care", "history", FIRST_SIGHTING): Said(
+_PLAIN: dict[Comparison, Said] = {
+    PolicyPair("care", "history", FIRST_SIGHTING): Said(
         ("+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"), _TABLE_1
     ),
-    Pair("care", "uncertainty", FIRST_SIGHTING): Said(
+    PolicyPair("care", "uncertainty", FIRST_SIGHTING): Said(
         ("+3.5 [2.6,4.4]", "+2.7 [1.7,3.8]", "+2.1 [1.1,3.1]"), _TABLE_1
     ),
-    Pair("care", "beam-reduce", FIRST_SIGHTING): Said(("+2.0", "tied", "tied"), _BEAMS),
-    Pair("care", "all-camera", FIRST_SIGHTING): Said(_TIED, _CAMERA),
-    Pair("care", "learned-scorer", FIRST_SIGHTING): Said(_TIED, _LEARNED),
-    Pair("care", "history-oracle", FIRST_SIGHTING): Said(("+3.7 to 4.7",) * 3, _ORACLE),
-    Pair("history-oracle", "history", FIRST_SIGHTING): Said(("tied, at most 0.5",) * 3, _ORACLE),
-    Pair("history-uniform", "history", FIRST_SIGHTING): Said(("below",) * 3, _UNIFORM),
-    Pair("care-priority", "care", FIRST_SIGHTING): Said(("tied, at most 0.2",) * 3, _PRIORITY),
-    Pair("care", "history", FIRST_SIGHTING, alike=True): Said(("+5.3", "+5.2", "+4.2"), _ALIKE),
-    Pair("care", "history", OVERALL): Said(("-0.8", "-0.5", "+0.6"), _HISTORY),
-    Pair("care", "uncertainty", OVERALL): Said(("-1.0", "-2.2", "-0.5"), _UNCERTAINTY),
-    Pair("care", "beam-reduce", OVERALL): Said(
+    PolicyPair("care", "beam-reduce", FIRST_SIGHTING): Said(("+2.0", "tied", "tied"), _BEAMS),
+    PolicyPair("care", "all-camera", FIRST_SIGHTING): Said(_TIED, _CAMERA),
+    PolicyPair("care", "learned-scorer", FIRST_SIGHTING): Said(_TIED, _LEARNED),
+    PolicyPair("care", "history-oracle", FIRST_SIGHTING): Said(("+3.7 to 4.7",) * 3, _ORACLE),
+    PolicyPair("history-oracle", "history", FIRST_SIGHTING): Said(
+        ("tied, at most 0.5",) * 3, _ORACLE
+    ),
+    PolicyPair("history-uniform", "history", FIRST_SIGHTING): Said(("below",) * 3, _UNIFORM),
+    PolicyPair("care-priority", "care", FIRST_SIGHTING): Said(
+        ("tied, at most 0.2",) * 3, _PRIORITY
+    ),
+    PolicyPair("care", "history", FIRST_SIGHTING, alike=True): Said(
+        ("+5.3", "+5.2", "+4.2"), _ALIKE
+    ),
+    PolicyPair("care", "history", OVERALL): Said(("-0.8", "-0.5", "+0.6"), _HISTORY),
+    PolicyPair("care", "uncertainty", OVERALL): Said(("-1.0", "-2.2", "-0.5"), _UNCERTAINTY),
+    PolicyPair("care", "beam-reduce", OVERALL): Said(
         ("+17.4 [15.9,19.0]", "+11.5 [10.4,12.7]", "+6.4 [5.4,7.5]"), _TABLE_1
     ),
-    Pair("care", "learned-scorer", OVERALL): Said(
+    PolicyPair("care", "learned-scorer", OVERALL): Said(
         ("+2.4 [1.9,3.0]", "+0.7 [0.4,1.0]", "+0.6 [0.3,0.9]"), _TABLE_1
     ),
-    Pair("care", "all-camera", OVERALL): Said(
+    PolicyPair("care", "all-camera", OVERALL): Said(
         ("-0.13 [-0.26,-0.01]", "+0.5 [0.3,0.8]", "+0.7 [0.4,1.0]"), _TABLE_1
     ),
-    Pair("history-oracle", "history", OVERALL): Said(("+0.5 to 0.7",) * 3, _ORACLE),
-    Pair("history-uniform", "history", OVERALL): Said(("below",) * 3, _UNIFORM),
-    Pair("care-sbf", "care", OVERALL, "range/below 20 m"): Said(
+    PolicyPair("history-oracle", "history", OVERALL): Said(("+0.5 to 0.7",) * 3, _ORACLE),
+    PolicyPair("history-uniform", "history", OVERALL): Said(("below",) * 3, _UNIFORM),
+    PolicyPair("care-sbf", "care", OVERALL, "range/below 20 m"): Said(
         ("tied, -0.5 [-1.7,0.4]", "-3.1 [-4.7,-1.5]", ""), _GUARD
     ),
-    Pair("care", "history", TTFD): Said(("-0.12", "-0.13", "-0.12"), _TTFD),
-    Third("dense", "tracks", OVERALL): Said(("", "+0.7", "+1.0"), _DENSE),
-    Third("sparse", "tracks", OVERALL): Said(("", "tied", "tied"), _DENSE),
-    Third(GAP, "tracks", OVERALL): Said(("", "+0.7", "+1.3"), _DENSE),
-    Third("dense", "tracks", FIRST_SIGHTING): Said(_TIED, _DENSE),
-    Third("middle", "tracks", FIRST_SIGHTING): Said(("tied", "-1.3", "tied"), _DENSE),
-    Third("sparse", "tracks", FIRST_SIGHTING): Said(_TIED, _DENSE),
-    Third(GAP, "explained", OVERALL): Said(("", "above", "above"), _DENSE),
+    PolicyPair("care", "history", TTFD): Said(("-0.12", "-0.13", "-0.12"), _TTFD),
+    SceneThird("dense", "tracks", OVERALL): Said(("", "+0.7", "+1.0"), _DENSE),
+    SceneThird("sparse", "tracks", OVERALL): Said(("", "tied", "tied"), _DENSE),
+    SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL): Said(("", "+0.7", "+1.3"), _DENSE),
+    SceneThird("dense", "tracks", FIRST_SIGHTING): Said(_TIED, _DENSE),
+    SceneThird("middle", "tracks", FIRST_SIGHTING): Said(("tied", "-1.3", "tied"), _DENSE),
+    SceneThird("sparse", "tracks", FIRST_SIGHTING): Said(_TIED, _DENSE),
+    SceneThird(DENSE_LESS_SPARSE, "explained", OVERALL): Said(("", "above", "above"), _DENSE),
 }
-_STRICT_CAUSAL: dict[Compared, Said] = {
-    Pair("care", "history", FIRST_SIGHTING): Said(("+4.6", "+5.3", "+2.6"), _CAUSAL)
+_STRICT_CAUSAL: dict[Comparison, Said] = {
+    PolicyPair("care", "history", FIRST_SIGHTING): Said(("+4.6", "+5.3", "+2.6"), _CAUSAL)
 }
 LEVELS = {
-    ("full", 1.0): Level("24.5", "100", "49.4", "100"),
-    ("care", 0.10): Level(ttfd="3.64"),
-    ("care", 0.20): Level(ttfd="3.47"),
-    ("care", 0.35): Level(first_of_full="88", overall_of_full="94", ttfd="3.33"),
-    ("history", 0.10): Level(ttfd="3.76"),
-    ("history", 0.20): Level(ttfd="3.60"),
-    ("history", 0.35): Level(first_of_full="70", overall_of_full="93", ttfd="3.45"),
-    ("care-priority", 0.10): Level(overall="38.0"),
-    ("care-priority", 0.20): Level(overall="41.8"),
-    ("care-priority", 0.35): Level(overall="45.7"),
+    ("full", 1.0): PublishedLevel("24.5", "100", "49.4", "100"),
+    ("care", 0.10): PublishedLevel(ttfd="3.64"),
+    ("care", 0.20): PublishedLevel(ttfd="3.47"),
+    ("care", 0.35): PublishedLevel(first_of_full="88", overall_of_full="94", ttfd="3.33"),
+    ("history", 0.10): PublishedLevel(ttfd="3.76"),
+    ("history", 0.20): PublishedLevel(ttfd="3.60"),
+    ("history", 0.35): PublishedLevel(first_of_full="70", overall_of_full="93", ttfd="3.45"),
+    ("care-priority", 0.10): PublishedLevel(overall="38.0"),
+    ("care-priority", 0.20): PublishedLevel(overall="41.8"),
+    ("care-priority", 0.35): PublishedLevel(overall="45.7"),
 }
 LEVELS_SAID = (_CEILING, _TTFD, _PRIORITY)
 ALLOCATIONS = {"all-camera": Said(("17%", "", "68%"), _MECHANICAL)}
@@ -204,7 +215,7 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
     """A recall in % that the paper gives of a policy, itself or as a share of the full scan's; None
     without.
     """
-    said = LEVELS.get((policy, budget), Level())
+    said = LEVELS.get((policy, budget), PublishedLevel())
     full = LEVELS["full", 1.0]
     if ratio is FIRST_SIGHTING:
         own = said.first
@@ -221,7 +232,7 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
     return float(share) * float(ceiling) / 100 if share else None
 
 
-def statements_about(setting: Setting) -> Mapping[Compared, Said]:
+def statements_about(setting: Setting) -> Mapping[Comparison, Said]:
     """What the paper says under these conditions, whatever the films and the detector are."""
     if setting.strict_causal:
         return _STRICT_CAUSAL

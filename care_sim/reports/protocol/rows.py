@@ -18,7 +18,7 @@ from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.evaluation.strata import thirds
 from care_sim.perception.detectors import PROXY
 from care_sim.study.row_reading import policy_of, tags_of_row, with_parameters
-from care_sim.study.task import FULL, REFERENCE, Row
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 HISTORY = "history"
@@ -69,7 +69,7 @@ class Setting:
         return Setting(self.source, self.detector, tuple(felt))
 
 
-class Plays:
+class SettingPlays:
     """The plays of one setting, floor seeds averaged per scene. Policies are named with their
     parameters.
 
@@ -145,7 +145,7 @@ class Plays:
                 values[row["scene"]].append(row[column])
         return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
 
-    def difference(self, policy: str, budget: float) -> AllocationDifference:
+    def allocation_difference(self, policy: str, budget: float) -> AllocationDifference:
         """How its allocations differ from those of the reference, over all plays for which that is
         known.
         """
@@ -165,7 +165,7 @@ class Plays:
         return kinds
 
 
-def plays_of(rows: Sequence[Row]) -> list[Plays]:
+def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
     """The plays of every setting in the order of their first rows; the full scan alone makes none
     where others do.
 
@@ -180,7 +180,7 @@ def plays_of(rows: Sequence[Row]) -> list[Plays]:
         setting: [row for row in own if row["policy"] == FULL] for setting, own in groups.items()
     }
     plays = [
-        Plays(setting, own, full[setting] or full.get(setting.for_full(), ()))
+        SettingPlays(setting, own, full[setting] or full.get(setting.for_full(), ()))
         for setting, own in groups.items()
     ]
     return [each for each in plays if each.tags] or plays

@@ -9,13 +9,19 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import SCENE_THIRDS
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.protocol.differences import FEWEST_SCENES, GAP, RANKINGS, Pair, Third
+from care_sim.reports.protocol.differences import (
+    DENSE_LESS_SPARSE,
+    FEWEST_SCENES,
+    RANKINGS,
+    PolicyPair,
+    SceneThird,
+)
 from care_sim.reports.protocol.formatting import PAPER, whole, written
 from care_sim.reports.protocol.notes import UNITS, papers
 from care_sim.reports.protocol.paper import ALLOCATIONS, statements_about
-from care_sim.reports.protocol.rows import HISTORY, Plays
+from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
-from care_sim.study.task import REFERENCE
+from care_sim.study.run_config import REFERENCE
 
 BASES = (HISTORY, "all-camera")
 """The policies that strata compare CARE with."""
@@ -33,7 +39,7 @@ DIFFERING = (
 )
 
 
-def strata_tables(plays: Plays) -> list[Table]:
+def strata_tables(plays: SettingPlays) -> list[Table]:
     """Recall by range, azimuth and class: the level of every policy, and CARE less the others in
     `BASES`.
     """
@@ -60,11 +66,13 @@ def strata_tables(plays: Plays) -> list[Table]:
     ]
 
 
-def _pairs(plays: Plays, ratio: Ratio = FIRST_SIGHTING, within: str = "") -> list[Pair]:
-    return [Pair(REFERENCE, base, ratio, within) for base in BASES if base in plays.others]
+def _pairs(
+    plays: SettingPlays, ratio: Ratio = FIRST_SIGHTING, within: str = ""
+) -> list[PolicyPair]:
+    return [PolicyPair(REFERENCE, base, ratio, within) for base in BASES if base in plays.others]
 
 
-def _on_strata(plays: Plays) -> tuple[str, ...]:
+def _on_strata(plays: SettingPlays) -> tuple[str, ...]:
     intervals = (
         "Intervals over scenes that have anything in the stratum, none of fewer than "
         f"{FEWEST_PAIRS}."
@@ -72,7 +80,7 @@ def _on_strata(plays: Plays) -> tuple[str, ...]:
     return ("Levels in %.", *((intervals,) if _pairs(plays) else ()))
 
 
-def _strata_lines(plays: Plays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
+def _strata_lines(plays: SettingPlays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
     for kind, labels in plays.strata().items():
         yield (kind,)
         for label in labels:
@@ -80,7 +88,7 @@ def _strata_lines(plays: Plays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
                 yield _stratum_line(plays, ratio, f"{kind}/{label}", budget)
 
 
-def _stratum_line(plays: Plays, ratio: Ratio, within: str, budget: float) -> tuple[str, ...]:
+def _stratum_line(plays: SettingPlays, ratio: Ratio, within: str, budget: float) -> tuple[str, ...]:
     column = "events" if ratio is FIRST_SIGHTING else "frames"
     levels = (plays.level(ratio, policy, budget, within).by_event for policy in plays.policies)
     return (
@@ -88,11 +96,11 @@ def _stratum_line(plays: Plays, ratio: Ratio, within: str, budget: float) -> tup
         percent(budget),
         f"{sum(row[f'{within}/{column}'] for row in plays.scenes.values()):,.0f}",
         *(written(ratio, value) for value in levels),
-        *(whole(pair.gap(plays, budget)) for pair in _pairs(plays, ratio, within)),
+        *(whole(pair.measured(plays, budget)) for pair in _pairs(plays, ratio, within)),
     )
 
 
-def thirds_tables(plays: Plays) -> list[Table]:
+def thirds_tables(plays: SettingPlays) -> list[Table]:
     """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every
     budget.
     """
@@ -108,20 +116,20 @@ def thirds_tables(plays: Plays) -> list[Table]:
             papers(
                 text.source
                 for each, text in said.items()
-                if isinstance(each, Third) and text.among(plays.budgets)
+                if isinstance(each, SceneThird) and text.among(plays.budgets)
             ),
             terminal=False,
         )
     ]
 
 
-def _has_thirds(plays: Plays) -> bool:
-    third = Third(GAP, "tracks", OVERALL)
+def _has_thirds(plays: SettingPlays) -> bool:
+    third = SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL)
     played = {*third.policies} <= {*plays.policies}
-    return played and all(third.gap(plays, budget) for budget in plays.budgets)
+    return played and all(third.measured(plays, budget) for budget in plays.budgets)
 
 
-def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
+def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[tuple[str, ...]]:
     yield (f"{RANKINGS[column]} a keyframe",)
     for name in reversed(SCENE_THIRDS):
         yield (
@@ -129,26 +137,29 @@ def _ranking_lines(plays: Plays, column: str) -> Iterator[tuple[str, ...]]:
             *(_mean_count(plays, column, name, budget) for budget in plays.budgets),
         )
     for ratio in (OVERALL, FIRST_SIGHTING):
-        thirds = [Third(which, column, ratio) for which in (*reversed(SCENE_THIRDS), GAP)]
+        thirds = [
+            SceneThird(which, column, ratio)
+            for which in (*reversed(SCENE_THIRDS), DENSE_LESS_SPARSE)
+        ]
         yield (thirds[0].heading,)
         for third in thirds:
             yield from _third_lines(plays, third)
 
 
-def _third_lines(plays: Plays, third: Third) -> Iterator[tuple[str, ...]]:
-    yield (third.label, *(whole(third.gap(plays, budget)) for budget in plays.budgets))
+def _third_lines(plays: SettingPlays, third: SceneThird) -> Iterator[tuple[str, ...]]:
+    yield (third.label, *(whole(third.measured(plays, budget)) for budget in plays.budgets))
     said = statements_about(plays.setting).get(third)
     if said and (entries := said.among(plays.budgets)):
         yield (PAPER, *entries)
 
 
-def _mean_count(plays: Plays, column: str, third: str, budget: float) -> str:
+def _mean_count(plays: SettingPlays, column: str, third: str, budget: float) -> str:
     counts = plays.means(column, budget)
     held = [counts[scene] for scene in plays.thirds(column, budget)[third]]
     return f"{sum(held) / len(held):.1f}"
 
 
-def allocation_tables(plays: Plays) -> list[Table]:
+def allocation_tables(plays: SettingPlays) -> list[Table]:
     """How often every policy fires other cells than CARE, and how many; none without CARE."""
     if not plays.others:
         return []
@@ -180,8 +191,8 @@ def allocation_tables(plays: Plays) -> list[Table]:
     ]
 
 
-def _differing(plays: Plays, policy: str, budget: float) -> str:
-    found = plays.difference(policy, budget)
+def _differing(plays: SettingPlays, policy: str, budget: float) -> str:
+    found = plays.allocation_difference(policy, budget)
     return (
         f"{100 * found.share:.0f}%, {found.cells_where_differing:.0f} cells"
         if found.keyframes

@@ -12,16 +12,16 @@ from care_sim.evaluation.scene_contrasts import (
     ratio_level,
 )
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.protocol.contrasts import contrast_tables
+from care_sim.reports.protocol.contrasts import protocol_contrast_tables
 from care_sim.reports.protocol.differences import RATIOS
 from care_sim.reports.protocol.formatting import PAPER, written
 from care_sim.reports.protocol.notes import left_out, papers
-from care_sim.reports.protocol.paper import LEVELS, LEVELS_SAID, Level
-from care_sim.reports.protocol.rows import Plays, plays_of
+from care_sim.reports.protocol.paper import LEVELS, LEVELS_SAID, PublishedLevel
+from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.protocol.statements import statements_tables
 from care_sim.reports.protocol.strata import allocation_tables, strata_tables, thirds_tables
 from care_sim.reports.table import Table
-from care_sim.study.task import FULL, Row
+from care_sim.study.run_config import FULL, Row
 
 LEVEL_COLUMNS = (
     "budget",
@@ -44,18 +44,18 @@ LEVEL_WHOLE = tuple(name for name in LEVEL_COLUMNS if name != "policy")
 
 def protocol_tables(rows: Sequence[Row]) -> list[Table]:
     """All tables, one setting after the other."""
-    made: list[Callable[[Plays], list[Table]]] = [
-        contrast_tables,
+    made: list[Callable[[SettingPlays], list[Table]]] = [
+        protocol_contrast_tables,
         levels_tables,
         statements_tables,
         strata_tables,
         thirds_tables,
         allocation_tables,
     ]
-    return [table for plays in plays_of(rows) for make in made for table in make(plays)]
+    return [table for plays in plays_by_setting(rows) for make in made for table in make(plays)]
 
 
-def levels_tables(plays: Plays) -> list[Table]:
+def levels_tables(plays: SettingPlays) -> list[Table]:
     """Recall and TTFD of every policy and of the full scan, one line a policy and budget."""
     ceiling = ((FULL, 1.0),) if plays.full else ()
     budgeted = ((policy, budget) for budget in plays.budgets for policy in plays.policies)
@@ -75,7 +75,7 @@ def levels_tables(plays: Plays) -> list[Table]:
     ]
 
 
-def _level_lines(plays: Plays, policy: str, budget: float) -> list[tuple[str, ...]]:
+def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[str, ...]]:
     first, overall, ttfd = (plays.level(ratio, policy, budget) for ratio in RATIOS)
     line = (
         percent(budget),
@@ -96,11 +96,11 @@ def _level_lines(plays: Plays, policy: str, budget: float) -> list[tuple[str, ..
     return [line, *([_said_line(said)] if said else [])]
 
 
-def _said_line(said: Level) -> tuple[str, ...]:
+def _said_line(said: PublishedLevel) -> tuple[str, ...]:
     return ("", PAPER, *said, *("" for _ in LEVEL_FILES_ONLY))
 
 
-def _of_full(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
+def _of_full(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
     """Share of the ceiling in %, of the scenes that the policy and the full scan have."""
     ours = plays.tallies(policy, budget)
     full = plays.tallies(FULL, 1.0)
@@ -112,7 +112,7 @@ def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | No
     return ratio_level(ratio, {scene: tallies[scene] for scene in scenes}).by_event
 
 
-def _deviation(plays: Plays, ratio: Ratio, policy: str, budget: float) -> str:
+def _deviation(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
     """The most by which one floor seed differs from the mean, of the scenes that all seeds have."""
     mean = plays.tallies(policy, budget)
     seeds = [_over(ratio, seed, mean) for seed in plays.seeds(policy, budget)]

@@ -5,20 +5,14 @@ grows.
 from collections.abc import Sequence
 
 from care_sim.base.text import percent
-from care_sim.reports.cells import Played
+from care_sim.reports.cells import StudyCells
 from care_sim.reports.contrasts import Contrast
 from care_sim.reports.formatting import interval, mean, median
 from care_sim.reports.table import Table
-from care_sim.scenarios.dense import VEHICLE_PLACES
-from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.designs.crowding import CROWDING_POLICIES, VEHICLES_COLUMN
 from care_sim.study.row_reading import Key, key_of
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
-BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
-VEHICLES = range(len(VEHICLE_PLACES) + 1)
-POLICIES = ("all-camera", "care", "full")
-COLUMN = "scenario.vehicles"
-"""The column of the rows that the study varies."""
 TITLE = "dense, by standing vehicles: "
 COLLAPSE_M = 3.0
 """All-camera counts as collapsed where CARE detects this much earlier and the interval excludes
@@ -26,49 +20,35 @@ zero.
 """
 
 
-def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """The dense street with 0 to 12 standing vehicles, at eight budgets from 1 to 35%: 221
-    configurations a seed.
-
-    `also` are further policies.
-    """
-    policies = list(dict.fromkeys([*POLICIES, *also]))
-    return [
-        config
-        for vehicles in VEHICLES
-        for config in grid(
-            ["dense"], policies, BUDGETS, seeds, scenario_parameters=(("vehicles", vehicles),)
-        )
-    ]
-
-
 class Crowd:
     """The rows of a crowding study by standing vehicles and budget."""
 
     def __init__(self, rows: Sequence[Row]):
-        self.played = Played(rows)
-        self.counts = sorted({row[COLUMN] for row in rows})
+        self.study = StudyCells(rows)
+        self.counts = sorted({row[VEHICLES_COLUMN] for row in rows})
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != "full"})
         self.others = [
             "all-camera",
-            *(policy for policy in self.played.policies if policy not in POLICIES),
+            *(policy for policy in self.study.policies if policy not in CROWDING_POLICIES),
         ]
 
     def key(self, vehicles: int, policy: str, budget: float) -> Key:
         """Where the rows are found."""
-        return key_of({"scenario": "dense", "policy": policy, "budget": budget, COLUMN: vehicles})
+        return key_of(
+            {"scenario": "dense", "policy": policy, "budget": budget, VEHICLES_COLUMN: vehicles}
+        )
 
     def gap(self, vehicles: int, budget: float, other: str = "all-camera") -> Contrast | None:
         """First detection of another policy minus that of CARE, metres; negative where the other is
         later.
         """
-        return self.played.difference(
+        return self.study.difference(
             self.key(vehicles, other, budget), self.key(vehicles, "care", budget)
         )
 
     def median(self, vehicles: int, policy: str, budget: float) -> str:
         """A median first detection, as text."""
-        cell = self.played.cell(self.key(vehicles, policy, budget))
+        cell = self.study.cell(self.key(vehicles, policy, budget))
         return median(cell.detection if cell else None)
 
     def collapsed(self, budget: float) -> list[int]:
@@ -100,11 +80,11 @@ def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
         (str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets))
         for n in crowd.counts
     ]
-    title = f"{TITLE}first detection of {crowd.played.marked(other)} minus care, m{more}"
+    title = f"{TITLE}first detection of {crowd.study.marked(other)} minus care, m{more}"
     notes = (
         (_collapse_note(crowd),)
         if other == "all-camera" and not intervals
-        else crowd.played.notes([other])
+        else crowd.study.notes([other])
     )
     return Table(
         title,
@@ -125,13 +105,13 @@ def _medians_table(crowd: Crowd) -> Table:
         )
         for n in crowd.counts
     ]
-    title = f"{TITLE}median first detection, {'/'.join(map(crowd.played.marked, policies))}, m"
+    title = f"{TITLE}median first detection, {'/'.join(map(crowd.study.marked, policies))}, m"
     columns = ("vehicles", *map(percent, crowd.budgets), "full")
     return Table(
         title,
         columns,
         tuple(lines),
-        ("n.d.: not detected.", *crowd.played.notes(policies)),
+        ("n.d.: not detected.", *crowd.study.notes(policies)),
         terminal=False,
     )
 

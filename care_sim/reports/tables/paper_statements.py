@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from care_sim.reports.formatting import median
 from care_sim.reports.summary import Cell, summarise
 from care_sim.study.designs.paper import CAMERA_POLICIES, paper_cells
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
-Cells = dict[tuple[str, str, float, str], Cell]
+CellsByName = dict[tuple[str, str, float, str], Cell]
 """By scenario, policy, budget and camera fault ('' without one)."""
 
 
@@ -52,7 +52,7 @@ def _key(cell: Cell) -> tuple[str, str, float, str]:
     return cell.setting.scenario, cell.policy, cell.budget, fault
 
 
-def _dartout(cells: Cells) -> list[Statement]:
+def _dartout(cells: CellsByName) -> list[Statement]:
     camera = [cells["dartout", policy, 0.1, ""] for policy in CAMERA_POLICIES]
     history = cells["dartout", "history", 0.1, ""]
     full = cells["dartout", "full", 1.0, ""]
@@ -94,7 +94,7 @@ def _dartout(cells: Cells) -> list[Statement]:
     ]
 
 
-def _dense(cells: Cells) -> list[Statement]:
+def _dense(cells: CellsByName) -> list[Statement]:
     care, camera, full = (
         cells["dense", p, b, ""] for p, b in (("care", 0.03), ("all-camera", 0.03), ("full", 1.0))
     )
@@ -126,7 +126,7 @@ def _dense(cells: Cells) -> list[Statement]:
     ]
 
 
-def _cutin(cells: Cells) -> Statement:
+def _cutin(cells: CellsByName) -> Statement:
     group = [cell for cell in cells.values() if cell.setting.scenario == "cutin"]
     first = max(group, key=_median)
     last = min(group, key=_median)
@@ -135,7 +135,7 @@ def _cutin(cells: Cells) -> Statement:
     )
 
 
-def _faults(cells: Cells) -> list[Statement]:
+def _faults(cells: CellsByName) -> list[Statement]:
     """A camera policy may not fall behind history, which asks no camera and so is its faultless
     self under latency.
     """
@@ -158,11 +158,11 @@ def _faults(cells: Cells) -> list[Statement]:
     return made
 
 
-def _slowest(cells: Cells, fault: str) -> Cell:
+def _slowest(cells: CellsByName, fault: str) -> Cell:
     return min((cells["dartout", policy, 0.1, fault] for policy in CAMERA_POLICIES), key=_median)
 
 
-def _history(cells: Cells) -> Cell:
+def _history(cells: CellsByName) -> Cell:
     return cells["dartout", "history", 0.1, ""]
 
 

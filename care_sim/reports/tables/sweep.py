@@ -12,7 +12,7 @@ from care_sim.reports.summary import Cell, summarise
 from care_sim.reports.table import Table
 from care_sim.study.designs.paper import Published, paper_cells, published
 from care_sim.study.row_reading import Groups, Key, Setting, full_of, grouped
-from care_sim.study.task import FULL, REFERENCE, Row
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
 COLUMNS = (
     "budget",
@@ -40,7 +40,7 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     tables = []
     for setting in dict.fromkeys(cell.setting for cell in cells):
         own = [cell for cell in cells if cell.setting == setting]
-        tables += [levels_table(setting.label, own), *contrast_tables(setting, own, groups)]
+        tables += [levels_table(setting.label, own), *sweep_contrast_tables(setting, own, groups)]
     return tables
 
 
@@ -56,7 +56,7 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     return Table(title, COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, WHOLE)
 
 
-def contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
+def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:
     """CARE minus every other policy, then the same of every learned one; none for a policy that ran
     alone.
     """

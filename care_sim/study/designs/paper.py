@@ -14,7 +14,7 @@ BUDGETED = ("history", *CAMERA_POLICIES)
 ALL = (*BUDGETED, "full")
 
 
-def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
+def paper_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
     """The episodes of the study, 49 a seed; five seeds give the paper's 245. `also` are further
     policies.
 
@@ -37,7 +37,7 @@ def configurations(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
 @cache
 def paper_cells() -> frozenset[Key]:
     """Setting, policy and budget of every cell of the study."""
-    return frozenset(key_of(config.row()) for config in configurations([0]))
+    return frozenset(key_of(config.row()) for config in paper_study([0]))
 
 
 @dataclass(frozen=True)

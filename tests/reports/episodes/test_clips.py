@@ -17,7 +17,7 @@ from care_sim.cli import main
 from care_sim.commands.compare import play
 from care_sim.loops.records import Keyframe
 from care_sim.policies.paper.care import Care
-from care_sim.reports.episodes.clips import Film
+from care_sim.reports.episodes.clips import Clip
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.pictures import comparison as panel
@@ -67,15 +67,15 @@ def test_a_clip_that_cannot_be_written_is_refused_before_an_episode_is_played(
     with pytest.raises(
         InvalidInput, match=r"unknown ending of a clip '\.avi'; known: \.gif, \.mp4, \.png, \.webp"
     ):
-        Film(tmp_path / "clip.avi")
+        Clip(tmp_path / "clip.avi")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtra, match=r"extra 'video': pip install 'care-sim\[video\]'"):
-        Film(tmp_path / "clip.mp4")
+        Clip(tmp_path / "clip.mp4")
 
 
 def test_filming_leaves_the_episode_as_it_was(tmp_path):
     config = EpisodeConfig("dartout", "care", scenario_parameters=SHORT)
-    film = Film(tmp_path / "clip.png")
+    film = Clip(tmp_path / "clip.png")
     filmed, _ = trace(config, film.episode("care"))
     film.write()
     assert filmed["episode_hash"] == trace(config)[0]["episode_hash"]
@@ -86,7 +86,7 @@ def test_filming_leaves_the_episode_as_it_was(tmp_path):
 def test_a_folder_is_no_clip_and_what_was_there_stays_until_the_new_one_is_whole(tmp_path):
     (tmp_path / "clip.mp4").mkdir()
     with pytest.raises(InvalidInput, match="is a folder"):
-        Film(tmp_path / "clip.mp4")
+        Clip(tmp_path / "clip.mp4")
     path = tmp_path / "clip.gif"
     path.write_text("GIF8 old")
     with pytest.raises(ZeroDivisionError):

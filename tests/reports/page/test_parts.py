@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.reports.page.listing import groups
-from care_sim.reports.page.provenance import origin, settings
+from care_sim.reports.page.provenance import provenance_of, settings
 from care_sim.reports.page.tables import blocks, sort_key
 from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.table import Bold, Table
-from care_sim.study.results_files import EPISODES, PLAYS
+from care_sim.study.results_formats import EPISODES, PLAYS
 from tests.helpers.made_rows import STUDY, rows
 
 
@@ -99,7 +99,7 @@ def test_a_whole_folder_lacks_nothing(tmp_path):
     describe(
         tmp_path, {"machine": {"cores": 2}, "versions": versions, "configurations": CONFIGURATIONS}
     )
-    about = origin(tmp_path, STUDY, EPISODES, [])
+    about = provenance_of(tmp_path, STUDY, EPISODES, [])
     assert (about.missing, about.machine, about.code) == ((), {"cores": 2}, "abc")
 
 
@@ -119,13 +119,13 @@ def test_a_whole_folder_lacks_nothing(tmp_path):
 def test_what_is_missing_is_said(content, says, tmp_path):
     if content is not None:
         describe(tmp_path, content)
-    (sentence,) = origin(tmp_path, STUDY, EPISODES, []).missing
+    (sentence,) = provenance_of(tmp_path, STUDY, EPISODES, []).missing
     assert sentence.startswith(says)
 
 
 def test_plays_are_counted_by_scene_and_floor(tmp_path):
     describe(tmp_path, {"scenes": ["a", "b"], "configurations": [{"floor_seeds": [0, 1, 2]}]})
-    about = origin(tmp_path, STUDY[:5], PLAYS, ["scene c: damaged"])
+    about = provenance_of(tmp_path, STUDY[:5], PLAYS, ["scene c: damaged"])
     assert about.missing == (
         "1 of 6 plays are missing from plays.parquet.",
         "Left out: scene c: damaged.",
@@ -135,9 +135,9 @@ def test_plays_are_counted_by_scene_and_floor(tmp_path):
 def test_what_failed_is_told_once(tmp_path):
     failed = ["care 3% seed 7: the worker process died"]
     describe(tmp_path, {"failed": failed, "configurations": [*CONFIGURATIONS, {"seeds": [7]}]})
-    assert origin(tmp_path, STUDY, EPISODES, failed).missing == (f"Left out: {failed[0]}.",)
+    assert provenance_of(tmp_path, STUDY, EPISODES, failed).missing == (f"Left out: {failed[0]}.",)
     describe(tmp_path, {"failed": failed, "configurations": [*CONFIGURATIONS, {"seeds": [7, 8]}]})
-    lost, left_out = origin(tmp_path, STUDY, EPISODES, failed).missing
+    lost, left_out = provenance_of(tmp_path, STUDY, EPISODES, failed).missing
     assert lost == "1 of 22 episodes are missing from episodes.parquet."
     assert left_out == f"Left out: {failed[0]}."
 

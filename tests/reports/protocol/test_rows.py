@@ -6,7 +6,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
-from care_sim.reports.protocol.rows import Setting, plays_of, setting_of
+from care_sim.reports.protocol.rows import Setting, plays_by_setting, setting_of
 from tests.helpers.made_plays import FRAMES, found, play, study
 
 
@@ -43,7 +43,7 @@ def test_settings_stay_apart_and_policies_carry_their_parameters():
         play("a", "care", [0], [1], **{"policy.margin": 2.0}),
         play("a", "care", [0], [1], detector="cluster"),
     ]
-    plain, cluster = plays_of(rows)
+    plain, cluster = plays_by_setting(rows)
     assert plain.policies == ("care", "care margin=2")
     assert plain.others == ("care margin=2",)
     assert cluster.policies == ("care",)
@@ -55,10 +55,10 @@ def test_a_full_scan_serves_every_setting_that_it_does_not_feel():
         play("a", "care", [0], [1], **more)
         for more in ({"camera_latency": 1}, {"lidar_dropout": 0.5})
     )
-    delayed, dropped = plays_of([full, late, broken])
+    delayed, dropped = plays_by_setting([full, late, broken])
     assert delayed.full == (full,)
     assert dropped.full == ()
-    (alone,) = plays_of([full])
+    (alone,) = plays_by_setting([full])
     assert (alone.policies, alone.full) == ((), (full,))
 
 
@@ -66,7 +66,7 @@ def test_only_full_scans_of_the_scenes_that_were_played_are_borrowed():
     rows = [play(scene, "full", [0], [1]) for scene in "ab"] + [
         play("a", "care", [0], [1], camera_latency=1)
     ]
-    (plays,) = plays_of(rows)
+    (plays,) = plays_by_setting(rows)
     assert list(plays.scenes) == list(plays.tallies("full", 1.0)) == ["a"]
 
 
@@ -75,7 +75,7 @@ def test_floor_seeds_are_averaged_per_scene():
         play("a", "care", found(4, sighted), [sighted] * 4, floor_seed=n)
         for n, sighted in enumerate((1, 2, 3))
     ]
-    (plays,) = plays_of(rows)
+    (plays,) = plays_by_setting(rows)
     assert plays.tallies("care", 0.1) == {"a": Tally(4, 2, 6 * 2, 4 * FRAMES, 8)}
     assert np.mean(plays.delays("care", 0.1, "a") == 0, axis=0) == pytest.approx(
         [1, 2 / 3, 1 / 3, 0]
@@ -88,12 +88,12 @@ def test_a_scene_that_one_seed_lacks_is_left_out():
         for row in study({"care": (4, 5)}, scenes=3)
         if (row["scene"], row["floor_seed"]) != ("scene 001", 2)
     ]
-    (plays,) = plays_of(rows)
+    (plays,) = plays_by_setting(rows)
     assert sorted(plays.tallies("care", 0.1)) == ["scene 000", "scene 002"]
 
 
 def test_a_stratum_is_read_by_its_name():
-    (plays,) = plays_of([play("a", "care", [0, 6, 6, 0], [5, 0, 0, 5])])
+    (plays,) = plays_by_setting([play("a", "care", [0, 6, 6, 0], [5, 0, 0, 5])])
     assert list(plays.strata()) == ["range", "azimuth", "class"]
     assert plays.strata()["range"] == ["below 20 m", "20 to 35 m", "from 35 m"]
     assert plays.tallies("care", 0.1, "range/below 20 m")["a"] == Tally(2, 2, 0, 2 * FRAMES, 10)
@@ -102,7 +102,7 @@ def test_a_stratum_is_read_by_its_name():
 
 def test_a_scene_without_an_event_has_no_delays():
     rows = [play("a", "care", [], [], floor_seed=seed) for seed in range(3)]
-    (plays,) = plays_of(rows)
+    (plays,) = plays_by_setting(rows)
     assert plays.delays("care", 0.1, "a").shape == (3, 0)
     assert plays.level(FIRST_SIGHTING, "care", 0.1).by_event is None
 
@@ -114,15 +114,15 @@ def test_counts_and_differing_allocations_are_read_from_the_plays():
         for n in (1, 2)
     ]
     rows += [play("b", "history", [0], [1], differing_keyframes=None, differing_cells=None)]
-    (plays,) = plays_of(rows)
+    (plays,) = plays_by_setting(rows)
     assert plays.means("tracks", 0.1) == {"a": 1.0}
-    difference = plays.difference("history", 0.1)
+    difference = plays.allocation_difference("history", 0.1)
     assert (difference.share, difference.cells_where_differing) == (3 / 80, 10.0)
 
 
 def test_seeds_that_count_other_events_are_refused():
     rows = [play("a", "care", found(n, 1), [1] * n, floor_seed=n) for n in (3, 4)]
-    (plays,) = plays_of(rows)
+    (plays,) = plays_by_setting(rows)
     with pytest.raises(InvalidInput, match=r"scene a: .* must be of one film"):
         plays.tallies("care", 0.1)
 
@@ -130,8 +130,8 @@ def test_seeds_that_count_other_events_are_refused():
 def test_plays_of_two_films_of_a_scene_are_refused_and_two_camera_detectors_are_two_settings():
     rows = study({"care": (5, 5), "history": (4, 5)}, scenes=2)
     with pytest.raises(InvalidInput, match="scene scene 001 are of two films"):
-        plays_of([*rows[:-1], rows[-1] | {"film_hash": "another"}])
+        plays_by_setting([*rows[:-1], rows[-1] | {"film_hash": "another"}])
     seen = [row | {"camera_detections": "1f", "film_hash": "another"} for row in rows]
-    plain, detected = plays_of([*rows, *seen])
+    plain, detected = plays_by_setting([*rows, *seen])
     assert detected.setting.label == "generated streets, detector returns, camera detections 1f"
     assert len(plain.scenes) == len(detected.scenes) == 2

@@ -7,7 +7,7 @@ from rich.console import Console
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.protocol.closing import protocol_closing
-from care_sim.reports.protocol.differences import Gap
+from care_sim.reports.protocol.differences import MeasuredDifference
 from care_sim.reports.protocol.formatting import verdict
 from care_sim.reports.protocol.paper import BUDGETS, LEVELS, statements_about
 from care_sim.reports.protocol.rows import Setting
@@ -181,24 +181,30 @@ GAPS = {
 
 
 @pytest.mark.parametrize(
-    ("gap", "claimed", "says"),
+    ("difference", "claimed", "says"),
     [
         *(
-            (gap, 1, says)
-            for gap, says in zip(GAPS, ("met", "not met", "undecided", "undecided"), strict=True)
+            (difference, 1, says)
+            for difference, says in zip(
+                GAPS, ("met", "not met", "undecided", "undecided"), strict=True
+            )
         ),
         *(
-            (gap, -1, says)
-            for gap, says in zip(GAPS, ("not met", "met", "undecided", "undecided"), strict=True)
+            (difference, -1, says)
+            for difference, says in zip(
+                GAPS, ("not met", "met", "undecided", "undecided"), strict=True
+            )
         ),
         *(
-            (gap, 0, says)
-            for gap, says in zip(GAPS, ("not met", "not met", "met", "undecided"), strict=True)
+            (difference, 0, says)
+            for difference, says in zip(
+                GAPS, ("not met", "not met", "met", "undecided"), strict=True
+            )
         ),
     ],
 )
-def test_the_rule_of_met(gap, claimed, says):
-    assert verdict(Gap(OVERALL, 1.0, GAPS[gap]), claimed) == says
+def test_the_rule_of_met(difference, claimed, says):
+    assert verdict(MeasuredDifference(OVERALL, 1.0, GAPS[difference]), claimed) == says
 
 
 def test_every_entry_of_the_paper_says_a_sign_or_nothing():

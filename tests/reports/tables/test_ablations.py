@@ -2,7 +2,8 @@ import pytest
 
 from care_sim.core.forgetting import ForgettingRules
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.ablations import ABLATIONS, PLACES, ablation_tables, configurations
+from care_sim.reports.tables.ablations import ablation_tables
+from care_sim.study.designs.ablations import ABLATION_PLACES, ABLATIONS, ablation_study
 from tests.helpers.made_rows import row
 
 SEEDS = range(5)
@@ -20,18 +21,18 @@ def distance(config):
 
 @pytest.fixture(scope="module")
 def tables():
-    rows = [row(config, distance(config)) for config in configurations(SEEDS)]
+    rows = [row(config, distance(config)) for config in ablation_study(SEEDS)]
     return {table.title: table for table in ablation_tables(rows)}
 
 
 def test_every_ablation_has_its_table_filled_in_every_place(tables):
     assert len(tables) == len(ABLATIONS) == 9
     for table, ablation in zip(tables.values(), ABLATIONS, strict=True):
-        assert sum(len(line) == 1 for line in table.rows) == len(PLACES)
+        assert sum(len(line) == 1 for line in table.rows) == len(ABLATION_PLACES)
         lines = [line for line in table.rows if len(line) > 1]
-        assert len(lines) == len(PLACES) * len(ablation.levels)
+        assert len(lines) == len(ABLATION_PLACES) * len(ablation.levels)
         assert all(line[1] for line in lines)
-        assert sum("(usual)" in line[0] for line in lines) == len(PLACES)
+        assert sum("(usual)" in line[0] for line in lines) == len(ABLATION_PLACES)
         assert all(entry for line in lines for entry in line[5:])
         assert all(bool(line[4]) != ("(usual)" in line[0]) for line in lines)
 
@@ -71,7 +72,7 @@ def test_the_levels_are_the_papers():
 
 
 def test_every_level_is_played_once_and_the_defaults_without_parameters():
-    configs = configurations([3])
+    configs = ablation_study([3])
     assert len(configs) == len(set(configs)) == 162
     guards = {
         dict(c.policy_parameters)["k_safe"]
@@ -84,7 +85,7 @@ def test_every_level_is_played_once_and_the_defaults_without_parameters():
 
 
 def test_a_further_policy_stands_beside_the_papers_in_conditions_that_it_feels():
-    configs = configurations(SEEDS, ["uncertainty", "care"])
+    configs = ablation_study(SEEDS, ["uncertainty", "care"])
     assert len(configs) == len(set(configs))
     tables = ablation_tables([row(config, distance(config)) for config in configs])
     columns = [table.columns for table in tables]
@@ -95,7 +96,7 @@ def test_a_further_policy_stands_beside_the_papers_in_conditions_that_it_feels()
 
 @pytest.mark.parametrize("policy", ["care-sbf", "history-oracle"])
 def test_every_further_policy_that_is_played_is_shown_and_marked(policy):
-    rows = [row(config, distance(config)) for config in configurations(range(2), [policy])]
+    rows = [row(config, distance(config)) for config in ablation_study(range(2), [policy])]
     tags = {"history-oracle": "privileged"}
     table = ablation_tables([each | {"tags": tags.get(each["policy"], "causal")} for each in rows])[
         0

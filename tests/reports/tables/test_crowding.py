@@ -1,5 +1,6 @@
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.crowding import Crowd, configurations, crowding_tables
+from care_sim.reports.tables.crowding import Crowd, crowding_tables
+from care_sim.study.designs.crowding import crowding_study
 from tests.helpers.made_rows import CROWD, rows
 
 
@@ -37,5 +38,5 @@ def test_a_further_policy_is_compared_with_care_too():
     ]
     assert tables[2].rows[1] == ("5", "-6.0*")
     assert tables[4].rows[1] == ("5", "15.0/14.5/9.0", "15.0")
-    played = {config.policy for config in configurations([0], ["uncertainty"])}
+    played = {config.policy for config in crowding_study([0], ["uncertainty"])}
     assert played == {"all-camera", "care", "full", "uncertainty"}

@@ -3,19 +3,13 @@ import pytest
 from care_sim.core.conditions import Sensing
 from care_sim.reports.figures.faults import NAMES, fault_figures
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.faults import (
-    FAULTS,
-    PLACES,
-    Played,
-    configurations,
-    fault_tables,
-    order,
-)
+from care_sim.reports.tables.faults import StudyCells, fault_tables, order
+from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, fault_study
 from tests.helpers.made_rows import row
 
 SEEDS = range(5)
 BY_TITLE = {fault.title: fault for fault in FAULTS}
-DARTOUT, DENSE = PLACES
+DARTOUT, DENSE = FAULT_PLACES
 
 
 def distance(config):
@@ -32,17 +26,17 @@ def distance(config):
 def rows():
     return [
         row(config, distance(config), braked=config.policy != "history")
-        for config in configurations(SEEDS)
+        for config in fault_study(SEEDS)
     ]
 
 
 def test_the_strength_at_which_the_order_changes_is_found(rows):
-    played = Played(rows)
+    study = StudyCells(rows)
     missed = BY_TITLE["missed objects"]
-    assert order(("care", "history"), missed, DARTOUT, played) == ">, < from 1"
-    assert order(("care", "all-camera"), missed, DARTOUT, played) == "=, < from 0.6"
-    assert isinstance(order(("care", "all-camera"), missed, DARTOUT, played), Bold)
-    unchanged = order(("all-camera", "history"), missed, DENSE, played)
+    assert order(("care", "history"), missed, DARTOUT, study) == ">, < from 1"
+    assert order(("care", "all-camera"), missed, DARTOUT, study) == "=, < from 0.6"
+    assert isinstance(order(("care", "all-camera"), missed, DARTOUT, study), Bold)
+    unchanged = order(("all-camera", "history"), missed, DENSE, study)
     assert unchanged == ">"
     assert not isinstance(unchanged, Bold)
 
@@ -50,11 +44,11 @@ def test_the_strength_at_which_the_order_changes_is_found(rows):
 def test_the_tables_hold_every_fault_place_policy_and_strength(rows):
     orders, *tables = fault_tables(rows)
     assert [table.title for table in tables] == [fault.title for fault in FAULTS]
-    assert sum(len(line) > 1 for line in orders.rows) == len(PLACES) * len(FAULTS)
+    assert sum(len(line) > 1 for line in orders.rows) == len(FAULT_PLACES) * len(FAULTS)
     for table, fault in zip(tables, FAULTS, strict=True):
         assert table.columns[1:] == tuple(level.label for level in fault.levels)
         lines = [line for line in table.rows if len(line) > 1]
-        assert len(lines) == len(PLACES) * (3 * 4 + 3)
+        assert len(lines) == len(FAULT_PLACES) * (3 * 4 + 3)
         assert all(all(line) for line in lines)
     detections, braked = tables[0].rows[1:5], tables[0].rows[6:10]
     assert detections[2] == ("care", "16.0", "16.0", "16.0", "11.0", "11.0", "not detected")
@@ -71,19 +65,19 @@ def test_one_miss_in_thirty_does_not_change_the_order():
     missed = BY_TITLE["missed objects"]
     made = [
         row(config, distance(config))
-        for config in configurations(range(30))
+        for config in fault_study(range(30))
         if config.scenario == "dartout"
     ]
     for each in made:
         if (each["policy"], each["seed"], each["false_negative_rate"]) == ("care", 3, 0.4):
             each |= {"detection_distance_m": None, "undetected_to_m": 3.0}
-    assert order(("care", "history"), missed, DARTOUT, Played(made)) == ">, < from 1"
+    assert order(("care", "history"), missed, DARTOUT, StudyCells(made)) == ">, < from 1"
 
 
 def test_strengths_that_were_not_played_are_passed_over(rows):
     def without(*rates):
         kept = [r for r in rows if r["policy"] != "care" or r["false_negative_rate"] not in rates]
-        return order(("care", "history"), BY_TITLE["missed objects"], DARTOUT, Played(kept))
+        return order(("care", "history"), BY_TITLE["missed objects"], DARTOUT, StudyCells(kept))
 
     assert without(0.4) == ">, < from 1"
     assert without(0.0) == ">, < from 1"
@@ -102,7 +96,7 @@ def test_every_fault_of_the_sensing_grows_from_none_in_some_panel():
 
 
 def test_the_full_scan_is_played_only_where_it_feels_the_fault():
-    full = [config for config in configurations([0]) if config.policy == "full"]
+    full = [config for config in fault_study([0]) if config.policy == "full"]
     assert len(full) == len(set(full)) == 2 * (1 + 4 + 3 + 4 + 3)
 
 
@@ -125,7 +119,7 @@ def test_a_figure_for_every_place_and_measure(rows):
 
 
 def test_a_further_policy_is_played_shown_and_ordered():
-    rows = [row(config, distance(config)) for config in configurations(SEEDS, ["care-sbf"])]
+    rows = [row(config, distance(config)) for config in fault_study(SEEDS, ["care-sbf"])]
     orders, first, *_ = fault_tables(rows)
     assert orders.columns[-1] == "care : care-sbf"
-    assert sum(line[0] == "care-sbf" for line in first.rows) == 4 * len(PLACES)
+    assert sum(line[0] == "care-sbf" for line in first.rows) == 4 * len(FAULT_PLACES)

@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.reports.tables.paper_statements import statements
-from care_sim.study.designs.paper import configurations
+from care_sim.study.designs.paper import paper_study
 
 
 def distance(config):
@@ -29,7 +29,7 @@ def outcome(config):
     }
 
 
-STUDY = [config.row() | outcome(config) for config in configurations(range(5))]
+STUDY = [config.row() | outcome(config) for config in paper_study(range(5))]
 
 
 def differing(rows):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from care_sim.base.text import percent
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.row_reading import Key, key_of
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
 
 
 class Place(NamedTuple):
@@ -21,7 +21,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Level:
+class Variant:
     """One value of what is varied: fields of `EpisodeConfig` that depart from the usual, or
     parameters of the policy.
 
@@ -46,9 +46,9 @@ class Level:
             **given,
         )
 
-    def for_others(self) -> "Level":
+    def for_others(self) -> "Variant":
         """The same conditions for policies that lack the parameters."""
-        return Level(self.label, self.changes)
+        return Variant(self.label, self.changes)
 
     def key(self, place: Place, policy: str) -> Key:
         """Where `care_sim.reports.summary` keeps the rows of a policy at this level."""
@@ -65,4 +65,4 @@ class Level:
         return (key[0].for_full(), "full", 1.0) if policy == "full" else key
 
 
-USUAL = Level("usual")
+USUAL = Variant("usual")

@@ -36,7 +36,7 @@ FULL = "full"
 """The policy that scans everything."""
 
 
-class Task(ABC):
+class RunConfig(ABC):
     """Everything that decides a row of a study. Subclasses are frozen dataclasses."""
 
     policy: str
@@ -129,7 +129,7 @@ class Task(ABC):
             object.__setattr__(self, name, settled(pairs, name.removesuffix("_parameters")))
 
 
-def departures(task: Task, without: Sequence[str]) -> list[str]:
+def departures(task: RunConfig, without: Sequence[str]) -> list[str]:
     """What of a task's row departs from the default conditions, as NAME=VALUE."""
     return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != DEFAULTS.get(n)]
 
@@ -183,9 +183,9 @@ def check_size(tasks: int) -> None:
         )
 
 
-def batches(tasks: Sequence[Task]) -> list[list[Task]]:
+def batches(tasks: Sequence[RunConfig]) -> list[list[RunConfig]]:
     """The tasks in the order in which they are played, those of a batch together."""
-    together: dict[Hashable, list[Task]] = {}
+    together: dict[Hashable, list[RunConfig]] = {}
     for task in sorted(tasks, key=lambda task: task.order):
         together.setdefault(task.batch, []).append(task)
     return list(together.values())

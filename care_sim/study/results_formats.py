@@ -24,22 +24,22 @@ from care_sim.study.row_schema import (
     TEXT,
     Column,
     Schema,
-    with_gaps,
+    as_optional,
 )
-from care_sim.study.runner import Attempt
-from care_sim.study.task import Row
+from care_sim.study.run_config import Row
+from care_sim.study.runner import PlayBatch
 
 
 @dataclass(frozen=True)
-class Kind:
-    """`unit` is what its tasks are called. `attempt` plays a batch; `finish` makes rows side by
+class ResultsFormat:
+    """`unit` is what its tasks are called. `play_batch` plays a batch; `finish` makes rows side by
     side into those that are kept; `file` holds them, in columns of the `schema`; `listed` are
     configurations as plain data. `aside` are further files, as columns by name, made of the rows as
     they were played.
     """
 
     unit: str
-    attempt: Attempt
+    play_batch: PlayBatch
     finish: Callable[[Sequence[Row]], list[Row]]
     file: str
     schema: Schema
@@ -47,16 +47,16 @@ class Kind:
     aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
 
 
-_ORIGIN = dict.fromkeys(("version", "digest", "episode_hash", "tags"), with_gaps(TEXT))
+_WRITER_COLUMNS = dict.fromkeys(("version", "digest", "episode_hash", "tags"), as_optional(TEXT))
 _EPISODES = Schema(
     {name: CONDITIONS.get(name, TEXT) for name in config.PLAIN_FIELDS}
     | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
     | {
-        name: with_gaps(SUM)
+        name: as_optional(SUM)
         for name, kind in Outcome.__annotations__.items()
         if kind == float | None
     },
-    _ORIGIN,
+    _WRITER_COLUMNS,
 )
 _PLAYS = Schema(
     {name: CONDITIONS.get(name, TEXT) for name in (*play_config.PLAY_FIELDS, "film_hash")}
@@ -67,35 +67,35 @@ _PLAYS = Schema(
         "ttfds": Column("lists of whole numbers", least=0),
     }
     | dict.fromkeys((*plays.SUMS, "tracks", "explained"), SUM)
-    | dict.fromkeys(("differing_keyframes", "differing_cells"), with_gaps(COUNT)),
-    _ORIGIN
-    | dict.fromkeys(("recording", "camera_detections", "presence"), with_gaps(TEXT))
-    | {"emerging": with_gaps(COUNT)},
+    | dict.fromkeys(("differing_keyframes", "differing_cells"), as_optional(COUNT)),
+    _WRITER_COLUMNS
+    | dict.fromkeys(("recording", "camera_detections", "presence"), as_optional(TEXT))
+    | {"emerging": as_optional(COUNT)},
     plays.SUMS,
 )
-EPISODES = Kind(
+EPISODES = ResultsFormat(
     "episodes",
-    episode.attempt,
+    episode.play_episodes,
     annotated,
     "episodes.parquet",
     _EPISODES,
     config.listed,
 )
-PLAYS = Kind(
+PLAYS = ResultsFormat(
     "plays",
-    plays.attempt,
+    plays.play_scene,
     lambda rows: [plays.without_events(row) for row in tagged(rows)],
     "plays.parquet",
     _PLAYS,
     play_config.listed,
     lambda rows: {"events.parquet": plays.event_columns(rows)},
 )
-KINDS = (EPISODES, PLAYS)
+RESULTS_FORMATS = (EPISODES, PLAYS)
 
 
-def kind_in(folder: Path) -> Kind:
+def results_format_in(folder: Path) -> ResultsFormat:
     """The kind of the results in a folder; episodes where there are none."""
-    return next((kind for kind in KINDS if (folder / kind.file).is_file()), EPISODES)
+    return next((kind for kind in RESULTS_FORMATS if (folder / kind.file).is_file()), EPISODES)
 
 
 def is_parameter(name: str) -> bool:

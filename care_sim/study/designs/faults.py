@@ -1,0 +1,103 @@
+"""The study of faults: every fault of camera, LiDAR and odometry grows from none of it to much."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from care_sim.study.designs.variants import Place, Variant
+from care_sim.study.episode_config import EpisodeConfig
+
+FAULT_PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
+"""The paper's own: the budget at which it injects faults, and the one at which it tells the
+reserves apart.
+"""
+FAULT_POLICIES = ("history", "all-camera", "care", "full")
+BLACKOUT_START_S = 2.0
+"""The person comes into the camera's view 2.4 to 2.9 s after the start."""
+DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
+"""Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees
+below the horizon.
+"""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault from none of it (the first level) to much of it; the labels of the levels are its
+    strength in `unit`.
+    """
+
+    title: str
+    unit: str
+    levels: tuple[Variant, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Title and unit."""
+        return f"{self.title}, {self.unit}"
+
+
+def _growing(parameter: str, *values: float, start: float = 0, **given: Any) -> tuple[Variant, ...]:
+    first = Variant(f"{start:g}", given if start else {})
+    return (first, *(Variant(f"{value:g}", {parameter: value, **given}) for value in values))
+
+
+FAULTS = (
+    Fault("missed objects", "share", _growing("false_negative_rate", 0.2, 0.4, 0.6, 0.8, 1.0)),
+    Fault(
+        "misses in bursts",
+        "keyframes, at a share of 0.4",
+        _growing("false_negative_burst", 5, 10, 20, start=1, false_negative_rate=0.4),
+    ),
+    Fault(
+        "misses growing with distance",
+        "share a metre",
+        _growing("false_negative_per_m", 0.01, 0.02, 0.04),
+    ),
+    Fault(
+        "false detections",
+        "boxes a picture",
+        _growing("false_positive_rate", 1.0, 2.0, 4.0, 8.0, 16.0),
+    ),
+    Fault("latency", "keyframes", _growing("camera_latency", 1, 2, 3, 5)),
+    Fault("jitter of the latency", "most keyframes", _growing("camera_jitter", 1, 2, 4)),
+    Fault(
+        f"blackout from {BLACKOUT_START_S:.1f} s",
+        "s",
+        _growing("blackout_s", 0.5, 1.0, 2.0, blackout_start_s=BLACKOUT_START_S),
+    ),
+    Fault(
+        "camera turned",
+        "sigma in degrees",
+        _growing("camera_rotation_sigma_deg", 0.5, 1.0, 2.0, 4.0),
+    ),
+    Fault("camera shifted", "sigma in m", _growing("camera_position_sigma_m", 0.05, 0.1, 0.2)),
+    Fault("lost returns", "share", _growing("lidar_dropout", 0.1, 0.2, 0.4, 0.6)),
+    Fault(
+        "range noise",
+        "sigma in m",
+        _growing("lidar_range_sigma", 0.02, 0.1, 0.5),
+        (
+            "The proxy detector's boxes are true whatever the ranges; of the study's policies "
+            "none reads ranges.",
+        ),
+    ),
+    Fault(
+        "dead rows",
+        "rows",
+        (Variant("0"), *(Variant(f"{len(rows)}", {"lidar_dead_rows": rows}) for rows in DEAD_ROWS)),
+    ),
+    Fault("noise of the car's speed", "sigma in m/s", _growing("ego_speed_sigma", 0.25, 0.5, 1.0)),
+)
+
+
+def fault_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
+    """Every policy at every strength of every fault in both places; `also` are further policies."""
+    made = [
+        config
+        for place, fault in product(FAULT_PLACES, FAULTS)
+        for level in fault.levels
+        for config in level.configurations(place, [*FAULT_POLICIES, *also], seeds)
+    ]
+    return list(dict.fromkeys(made))
