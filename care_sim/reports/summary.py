@@ -10,16 +10,9 @@ from dataclasses import dataclass
 
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.reports.contrasts import DETECTION, Contrast, contrast
-from care_sim.study.row_reading import (
-    Groups,
-    Key,
-    Setting,
-    detection,
-    full_of,
-    grouped,
-    tags_of_row,
-)
+from care_sim.study.row_reading import Groups, Key, detection, full_of, grouped, tags_of_row
 from care_sim.study.run_config import Row
+from care_sim.study.settings import Setting
 
 
 @dataclass(frozen=True)

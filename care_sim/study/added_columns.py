@@ -5,8 +5,9 @@ policies, tell.
 from collections.abc import Sequence
 
 from care_sim.policies import tags_of
-from care_sim.study.row_reading import Setting, detection, setting_of
+from care_sim.study.row_reading import detection, setting_of
 from care_sim.study.run_config import Row
+from care_sim.study.settings import Setting
 
 Worlds = dict[tuple[Setting, int], Row]
 

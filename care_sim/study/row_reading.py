@@ -1,57 +1,28 @@
-"""What a row of the closed loop says: its setting, its policy, its first detection.
+"""What a row says: its setting, its policy, and in the closed loop its first detection.
 
-Rows of one scenario under the same conditions form a setting; in it, the rows of a policy at a
+Rows of one world under the same conditions form a setting; in it, the rows of a policy at a
 budget form a cell.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 from care_sim.base.checks import is_number
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import CAMERA_FAULTS, UNUSED_BY_FULL_SCAN
+from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.censoring import Reading
+from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.run_config import Row
-
-Conditions = tuple[tuple[str, Any], ...]
-
+from care_sim.study.settings import Setting
 
 _AXES = ("scenario", "policy", "budget", "seed")
-
-
-_USUAL = {field.name: field.default for field in fields(EpisodeConfig)}
-
-
-@dataclass(frozen=True, order=True)
-class Setting:
-    """A scenario and the conditions in which it departs from the defaults."""
-
-    scenario: str
-    conditions: Conditions = ()
-
-    @property
-    def faults(self) -> bool:
-        """Whether the camera is impaired."""
-        return any(name in CAMERA_FAULTS for name, _ in self.conditions)
-
-    @property
-    def label(self) -> str:
-        """A heading."""
-        return ", ".join(
-            [
-                self.scenario,
-                *(f"{name.replace('_', ' ')} {value}" for name, value in self.conditions),
-            ]
-        )
-
-    def for_full(self) -> "Setting":
-        """The setting in which the full scan of the same world is found."""
-        return Setting(
-            self.scenario,
-            tuple(pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN),
-        )
+_USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
+_USUAL_PLAY = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {
+    "camera_detections": None,
+    "presence": ANNOTATED,
+}
 
 
 Key = tuple[Setting, str, float]
@@ -62,16 +33,29 @@ Groups = Mapping[Key, Sequence[Row]]
 
 
 def setting_of(row: Row) -> Setting:
-    """The setting a row belongs to."""
+    """The setting of a row, of an episode or of a play in the open loop."""
+    return _setting_of_play(row) if "source" in row else _setting_of_episode(row)
+
+
+def _setting_of_episode(row: Row) -> Setting:
     names = [name for name in row if name in PLAIN_FIELDS or name.startswith("scenario.")]
     changed = [
         (n, row[n])
         for n in names
-        if n not in _AXES and row[n] is not None and row[n] != _USUAL.get(n)
+        if n not in _AXES and row[n] is not None and row[n] != _USUAL_EPISODE.get(n)
     ]
-    return Setting(
-        row["scenario"], tuple(sorted((n.removeprefix("scenario."), v) for n, v in changed))
+    conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
+    return Setting(row["scenario"], tuple(conditions))
+
+
+def _setting_of_play(row: Row) -> Setting:
+    """A condition that the row has no column for is the usual one."""
+    changed = tuple(
+        (name, row[name])
+        for name, usual in _USUAL_PLAY.items()
+        if row.get(name) not in (usual, None)
     )
+    return Setting(row["source"], changed, with_parameters(row, "detector"))
 
 
 def key_of(row: Row) -> Key:

@@ -40,9 +40,9 @@ def sweep_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     name.
     """
     cells = [cell for cell in summarise(rows) if not cell.setting.conditions]
-    scenarios = sorted({cell.setting.scenario for cell in cells})
+    scenarios = sorted({cell.setting.world for cell in cells})
     by_scenario = {
-        name: [cell for cell in cells if cell.setting.scenario == name] for name in scenarios
+        name: [cell for cell in cells if cell.setting.world == name] for name in scenarios
     }
     return {
         f"{name}-budget": budget_figure(own)
@@ -68,7 +68,7 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     axes.minorticks_off()
     counts = sorted({cell.episodes for cell in cells})
     seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    axes.set_title(f"{cells[0].setting.scenario}: {seeds} seeds a point", loc="left", fontsize=10)
+    axes.set_title(f"{cells[0].setting.world}: {seeds} seeds a point", loc="left", fontsize=10)
     axes.set_xlabel(
         "\n".join(["budget (share of cells fired)", *tag_notes(tags for _, tags in policies)])
     )

@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 
 from care_sim.reports.figures.protocol_budgets import levels_figure
 from care_sim.reports.figures.protocol_frontier import pareto_figure
-from care_sim.reports.protocol.rows import SOURCES, plays_by_setting
+from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.study.run_config import Row
+from care_sim.study.settings import SOURCES
 
 KINDS = ("pareto", "levels")
 FIGURE_NAMES = tuple(

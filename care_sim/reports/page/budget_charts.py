@@ -31,8 +31,8 @@ NOTES = (
 def budget_charts(rows: Sequence[Row]) -> list[Chart]:
     """A chart for every scenario that was run without further conditions at several budgets."""
     cells = [cell for cell in summarise(rows) if not cell.setting.conditions]
-    scenarios = dict.fromkeys(cell.setting.scenario for cell in cells)
-    by_scenario = [[cell for cell in cells if cell.setting.scenario == name] for name in scenarios]
+    scenarios = dict.fromkeys(cell.setting.world for cell in cells)
+    by_scenario = [[cell for cell in cells if cell.setting.world == name] for name in scenarios]
     return [_chart(own) for own in by_scenario if len(_budgets(own)) > 1]
 
 
@@ -65,7 +65,7 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         rule = alt.Chart(inline(line)).mark_rule(strokeWidth=1.5, strokeDash=[5, 3])
         layers.append(rule.encode(y=height, color=encoding.colour, opacity=encoding.opacity))
     chart = alt.layer(*layers).add_params(encoding.chosen).properties(width="container", height=300)
-    scenario = cells[0].setting.scenario
+    scenario = cells[0].setting.world
     budgets = _budgets(cells)
     counts = sorted({cell.episodes for cell in cells})
     seeds = counted(counts[0], "seed") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"

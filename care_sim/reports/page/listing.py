@@ -10,8 +10,9 @@ from care_sim.base.text import percent
 from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode
 from care_sim.reports.page.replay import packed
-from care_sim.study.row_reading import Setting, policy_of, setting_of, tags_of_row
+from care_sim.study.row_reading import policy_of, setting_of, tags_of_row
 from care_sim.study.run_config import Row
+from care_sim.study.settings import Setting
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import whole
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals
 from care_sim.reports.protocol.paper import BUDGETS, GATE
-from care_sim.reports.protocol.rows import HISTORY, Setting, SettingPlays, plays_by_setting
+from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.study.run_config import REFERENCE, Row
+from care_sim.study.settings import Setting
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:

@@ -13,7 +13,7 @@ from care_sim.reports.protocol.differences import (
     PolicyPair,
     SceneThird,
 )
-from care_sim.reports.protocol.rows import Setting
+from care_sim.study.settings import Setting
 
 BUDGETS = (0.10, 0.20, 0.35)
 _SIGNS = {"+": 1, "above": 1, "-": -1, "below": -1, "tied": 0}

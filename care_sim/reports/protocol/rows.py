@@ -3,70 +3,23 @@ every scene.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import fields
 
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.core.frames import Floats
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import Ratio, RatioLevel, Tallies, averaged, ratio_level
-from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.evaluation.strata import thirds
-from care_sim.perception.detectors import PROXY
-from care_sim.study.row_reading import policy_of, tags_of_row, with_parameters
+from care_sim.study.row_reading import policy_of, setting_of, tags_of_row
 from care_sim.study.run_config import FULL, REFERENCE, Row
+from care_sim.study.settings import Setting
 
-SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 HISTORY = "history"
 """The policy that every other is held against."""
-_USUAL = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {
-    "camera_detections": None,
-    "presence": ANNOTATED,
-}
 _COLUMNS = tuple(field.name for field in fields(Tally))
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What plays that are compared have in common: films, detector, and the conditions that are not
-    the default.
-    """
-
-    source: str
-    detector: str
-    conditions: tuple[tuple[str, Any], ...] = ()
-
-    @property
-    def strict_causal(self) -> bool:
-        """Whether it is the paper's strict-causal variant (Sec. 3): the camera one keyframe old."""
-        return self.conditions == (("camera_latency", 1),)
-
-    @property
-    def label(self) -> str:
-        """A heading."""
-        changed = [f"{name.replace('_', ' ')} {value}" for name, value in self.conditions]
-        if self.strict_causal:
-            changed = ["strict-causal (camera one keyframe old)"]
-        return ", ".join(
-            [SOURCES.get(self.source, self.source), f"detector {self.detector}", *changed]
-        )
-
-    @property
-    def slug(self) -> str:
-        """A part of a file's name, beginning with the source."""
-        detector = [] if self.detector == PROXY else [self.detector]
-        changed = [f"{name}-{value}" for name, value in self.conditions]
-        text = "-".join([self.source, *detector, *changed])
-        return "".join(sign if sign.isalnum() or sign in ".-" else "-" for sign in text)
-
-    def for_full(self) -> "Setting":
-        """The setting in which the full scan of the same films is found."""
-        felt = (pair for pair in self.conditions if pair[0] not in UNUSED_BY_FULL_SCAN)
-        return Setting(self.source, self.detector, tuple(felt))
 
 
 class SettingPlays:
@@ -184,14 +137,6 @@ def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
         for setting, own in groups.items()
     ]
     return [each for each in plays if each.tags] or plays
-
-
-def setting_of(row: Row) -> Setting:
-    """The setting that a row belongs to; a condition that it has no column for is the usual one."""
-    changed = tuple(
-        (name, row[name]) for name, usual in _USUAL.items() if row.get(name) not in (usual, None)
-    )
-    return Setting(row["source"], with_parameters(row, "detector"), changed)
 
 
 def _check_films(rows: Sequence[Row]) -> None:

@@ -49,7 +49,7 @@ def statements(rows: Sequence[Row]) -> list[Statement]:
 
 def _key(cell: Cell) -> tuple[str, str, float, str]:
     fault = " ".join(f"{name} {value}" for name, value in cell.setting.conditions)
-    return cell.setting.scenario, cell.policy, cell.budget, fault
+    return cell.setting.world, cell.policy, cell.budget, fault
 
 
 def _dartout(cells: CellsByName) -> list[Statement]:
@@ -127,7 +127,7 @@ def _dense(cells: CellsByName) -> list[Statement]:
 
 
 def _cutin(cells: CellsByName) -> Statement:
-    group = [cell for cell in cells.values() if cell.setting.scenario == "cutin"]
+    group = [cell for cell in cells.values() if cell.setting.world == "cutin"]
     first = max(group, key=_median)
     last = min(group, key=_median)
     return Statement(

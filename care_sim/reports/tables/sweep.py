@@ -11,8 +11,9 @@ from care_sim.reports.formatting import ends, interval, marked, spread, tag_note
 from care_sim.reports.summary import Cell, summarise
 from care_sim.reports.table import Table
 from care_sim.study.designs.paper import Published, paper_cells, published
-from care_sim.study.row_reading import Groups, Key, Setting, full_of, grouped
+from care_sim.study.row_reading import Groups, Key, full_of, grouped
 from care_sim.study.run_config import FULL, REFERENCE, Row
+from care_sim.study.settings import Setting
 
 COLUMNS = (
     "budget",
@@ -110,7 +111,7 @@ def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast
 def _published(cell: Cell) -> Published | None:
     if (cell.setting, cell.policy, cell.budget) not in paper_cells():
         return None
-    return published(cell.setting.scenario, cell.policy, cell.budget, cell.setting.faults)
+    return published(cell.setting.world, cell.policy, cell.budget, cell.setting.faults)
 
 
 def _line(cell: Cell, saying: Published | None) -> tuple[str, ...]:

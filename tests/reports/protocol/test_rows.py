@@ -6,7 +6,9 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
-from care_sim.reports.protocol.rows import Setting, plays_by_setting, setting_of
+from care_sim.reports.protocol.rows import plays_by_setting
+from care_sim.study.row_reading import setting_of
+from care_sim.study.settings import Setting
 from tests.helpers.made_plays import FRAMES, found, play, study
 
 
@@ -14,12 +16,14 @@ def test_source_detector_and_conditions_make_a_setting_and_floor_seeds_do_not():
     def setting(**more):
         return setting_of(play("a", "care", [0], [1], **more))
 
-    assert setting() == setting(floor_seed=2, budget=0.35) == Setting("streets", "returns")
+    assert setting() == setting(floor_seed=2, budget=0.35) == Setting("streets", detector="returns")
     unknown = {"camera_rotation_sigma_deg": None}
-    assert setting_of(play("a", "care", [0], [1]) | unknown) == Setting("streets", "returns")
+    assert setting_of(play("a", "care", [0], [1]) | unknown) == Setting(
+        "streets", detector="returns"
+    )
     assert setting(source="nuscenes").label == "nuScenes, detector returns"
     near = {"detector": "cluster", "detector.eps": 0.5}
-    assert setting(**near) == Setting("streets", "cluster eps=0.5")
+    assert setting(**near) == Setting("streets", detector="cluster eps=0.5")
     assert (
         setting(reserve_fraction=0.5).label
         == "generated streets, detector returns, reserve fraction 0.5"
@@ -30,9 +34,9 @@ def test_source_detector_and_conditions_make_a_setting_and_floor_seeds_do_not():
 
 
 def test_a_name_for_files_tells_settings_apart():
-    assert Setting("streets", "returns").slug == "streets"
+    assert Setting("streets", detector="returns").slug == "streets"
     slug = Setting(
-        "nuscenes", "cluster eps=0.5", (("camera_latency", 1), ("lidar_dead_rows", (3, 4)))
+        "nuscenes", (("camera_latency", 1), ("lidar_dead_rows", (3, 4))), "cluster eps=0.5"
     ).slug
     assert slug == "nuscenes-cluster-eps-0.5-camera-latency-1-lidar-dead-rows--3--4-"
 

@@ -10,12 +10,12 @@ from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.differences import MeasuredDifference
 from care_sim.reports.protocol.formatting import verdict
 from care_sim.reports.protocol.paper import BUDGETS, LEVELS, statements_about
-from care_sim.reports.protocol.rows import Setting
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.rows import read_rows, with_tuples, write_rows
+from care_sim.study.settings import Setting
 from tests.helpers.made_plays import found, play, study
 
 FOUND = {
@@ -208,7 +208,7 @@ def test_the_rule_of_met(difference, claimed, says):
 
 
 def test_every_entry_of_the_paper_says_a_sign_or_nothing():
-    for said in statements_about(Setting("streets", "returns")).values():
+    for said in statements_about(Setting("streets", detector="returns")).values():
         assert all((said.sign(budget) is None) == (said.at(budget) == "") for budget in BUDGETS)
         assert said.at(0.05) == ""
     assert {budget for _, budget in LEVELS} == {*BUDGETS, 1.0}
