@@ -7,6 +7,7 @@ numbers).
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Difference, Reading, difference
 from care_sim.study.row_reading import detection
 from care_sim.study.run_config import Row
@@ -50,6 +51,31 @@ class Contrast:
     def mean(self) -> float:
         """In the unit of the measure."""
         return self.difference.interval.mean
+
+    @property
+    def interval(self) -> Interval:
+        """The interval of the mean."""
+        return self.difference.interval
+
+    @property
+    def decimals(self) -> int:
+        """Those of the measure."""
+        return self.measure.decimals
+
+    @property
+    def bound(self) -> str:
+        """On which side of the mean the true difference may lie."""
+        return self.difference.bound
+
+    @property
+    def asterisk(self) -> str:
+        """An asterisk where the difference counts."""
+        return "*" if self.counts else ""
+
+    @property
+    def suffix(self) -> str:
+        """Nothing: the intervals of the closed loop all rest on seeds."""
+        return ""
 
     @property
     def excludes_zero(self) -> bool:

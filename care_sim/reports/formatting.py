@@ -1,6 +1,7 @@
 """How measured values are written in tables."""
 
 from collections.abc import Iterable
+from typing import Protocol
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Quartiles
@@ -15,6 +16,45 @@ MEANINGS = {
     "non-causal": "‡ saw the full scan first: saves no sensing.",
     "generator": "§ looks the episode up in the public generator: a warning, no contender.",
 }
+
+
+class ShownDifference(Protocol):
+    """A mean difference, of the closed or the open loop, as tables show it."""
+
+    @property
+    def mean(self) -> float:
+        """In the unit of what is compared."""
+        ...
+
+    @property
+    def interval(self) -> Interval | None:
+        """None where too little was played for one."""
+        ...
+
+    @property
+    def decimals(self) -> int:
+        """Decimals of the mean and of the interval's ends."""
+        ...
+
+    @property
+    def bound(self) -> str:
+        """Stands before the mean: on which side of it the true difference may lie."""
+        ...
+
+    @property
+    def asterisk(self) -> str:
+        """Stands after the mean: whether the difference reaches its gate."""
+        ...
+
+    @property
+    def suffix(self) -> str:
+        """Stands at the end: what the interval rests on, where that is not the usual."""
+        ...
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the interval excludes zero."""
+        ...
 
 
 def marked(policy: str, tags: tuple[str, ...]) -> str:
@@ -49,24 +89,41 @@ def spread(values: Quartiles) -> str:
     return f"{median(values)} {quarters(values)}".rstrip()
 
 
-def mean(contrast: Contrast | None) -> str:
-    """A mean difference without its interval: bold and with an asterisk where that is earned."""
-    return _weighed(contrast, _mean(contrast)) if contrast else ""
+def mean(difference: ShownDifference | None) -> str:
+    """A mean difference without its interval, bold where it excludes zero."""
+    if difference is None:
+        return ""
+    return emphasised(difference, f"{signed(difference)}{difference.suffix}")
 
 
-def interval(contrast: Contrast | None) -> str:
-    """A mean difference with its interval: bold and with an asterisk where that is earned."""
-    return _weighed(contrast, f"{_mean(contrast)} {ends(contrast)}") if contrast else ""
+def interval(difference: ShownDifference | None) -> str:
+    """A mean difference with its interval if it has one, bold where it excludes zero."""
+    if difference is None:
+        return ""
+    return emphasised(difference, f"{signed(difference)} {ends(difference)}".rstrip())
 
 
 def unsigned(contrast: Contrast | None) -> str:
     """A mean difference that is zero at best."""
-    return f"{contrast.difference.bound}{contrast.mean:z.1f}" if contrast else ""
+    return f"{contrast.bound}{contrast.mean:z.1f}" if contrast else ""
 
 
-def ends(contrast: Contrast) -> str:
-    """The interval of a difference."""
-    return bounds(contrast.difference.interval, contrast.measure.decimals)
+def ends(difference: ShownDifference | None) -> str:
+    """The interval of a difference alone; empty where there is none."""
+    if difference is None or difference.interval is None:
+        return ""
+    return f"{bounds(difference.interval, difference.decimals)}{difference.suffix}"
+
+
+def signed(difference: ShownDifference) -> str:
+    """A mean difference with its sign and the marks beside it."""
+    number = f"{difference.mean:+z.{difference.decimals}f}"
+    return f"{difference.bound}{number}{difference.asterisk}"
+
+
+def emphasised(difference: ShownDifference, text: str) -> str:
+    """The text, bold where the interval of the difference excludes zero."""
+    return Bold(text) if difference.excludes_zero else text
 
 
 def bounds(interval: Interval, decimals: int) -> str:
@@ -77,12 +134,3 @@ def bounds(interval: Interval, decimals: int) -> str:
 def _end(end: float, decimals: int) -> str:
     hidden = round(end, decimals) == 0 != round(end, decimals + 1)
     return f"{end:z.{decimals + hidden}f}"
-
-
-def _mean(contrast: Contrast) -> str:
-    star = "*" if contrast.counts else ""
-    return f"{contrast.difference.bound}{contrast.mean:+z.{contrast.measure.decimals}f}{star}"
-
-
-def _weighed(contrast: Contrast, text: str) -> str:
-    return Bold(text) if contrast.excludes_zero else text

@@ -60,7 +60,7 @@ def steady(row):
 
 
 def attempted(configs):
-    return [row for batch in batches(configs) for row in plays.attempt(batch)]
+    return [row for batch in batches(configs) for row in plays.play_scene(batch)]
 
 
 def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):

@@ -17,8 +17,8 @@ from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
 from care_sim.study.rows import check_columns, write_columns, write_rows
-from care_sim.study.runner import Failure
 from care_sim.study.run_config import Row, RunConfig
+from care_sim.study.runner import Failure
 
 
 def conduct(
@@ -64,10 +64,7 @@ def summary(failures: Sequence[Failure], unit: str) -> list[str]:
     by_reason: dict[str, list[Failure]] = {}
     for failure in failures:
         by_reason.setdefault(failure.reason, []).append(failure)
-    return [
-        str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}"
-        for own in by_reason.values()
-    ]
+    return [str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}" for own in by_reason.values()]
 
 
 def _description(configs: Sequence[RunConfig], study: Study, failures: Sequence[Failure]) -> str:

@@ -1,6 +1,6 @@
 """How to read the tables of the first-sighting protocol."""
 
-from care_sim.reports.protocol.formatting import OVER_EVENTS
+from care_sim.reports.protocol.differences import OVER_EVENTS
 
 READING = (
     "Differences are points of recall (TTFD: keyframes), positive where the first named has more, "

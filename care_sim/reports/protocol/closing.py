@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from care_sim.base.text import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.reports.contrasts import GATE_POINTS
+from care_sim.reports.formatting import interval
 from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
-from care_sim.reports.protocol.formatting import whole
+from care_sim.reports.protocol.formatting import MET, NOT_MET
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals
 from care_sim.reports.protocol.paper import BUDGETS, GATE
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
@@ -58,11 +59,11 @@ def _gains(plays: SettingPlays) -> dict[float, MeasuredDifference]:
 
 def _gate(setting: Setting, differences: Mapping[float, MeasuredDifference]) -> str:
     measured = (
-        f"{whole(difference)} at {percent(budget)} ({'met' if _is_met(difference) else 'not met'})"
+        f"{interval(difference)} at {percent(budget)} ({_met_or_not(difference)})"
         for budget, difference in differences.items()
     )
     return f'Paper: "{GATE}" Here, {setting.label}: {", ".join(measured)}.'
 
 
-def _is_met(difference: MeasuredDifference) -> bool:
-    return difference.sign > 0 and difference.mean >= GATE_POINTS
+def _met_or_not(difference: MeasuredDifference) -> str:
+    return MET if difference.sign > 0 and difference.mean >= GATE_POINTS else NOT_MET

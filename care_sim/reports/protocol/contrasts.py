@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from care_sim.base.text import percent
-from care_sim.reports.formatting import marked, tag_notes
+from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
-from care_sim.reports.protocol.formatting import PAPER, whole
+from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.protocol.notes import UNITS, left_out, on_intervals, papers, played
 from care_sim.reports.protocol.paper import statements_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
@@ -80,7 +80,7 @@ def _lines(plays: SettingPlays, contrasts: Iterable[ContrastLine]) -> Iterator[t
             heading = pair.heading
             yield (heading,)
         if any(differences):
-            yield (marked(policy, plays.tags[policy]), *map(whole, differences))
+            yield (marked(policy, plays.tags[policy]), *map(interval, differences))
             said = statements_about(plays.setting).get(pair)
             if said and (entries := said.among(plays.budgets)):
                 yield (PAPER, *entries)

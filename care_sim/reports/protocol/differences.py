@@ -31,6 +31,8 @@ RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
 FEWEST_SCENES = 9
 """Three in each third: of fewer, a third says nothing of crowded scenes but of one or two."""
 DENSE_LESS_SPARSE = "dense minus sparse"
+OVER_EVENTS = "°"
+"""Ends what rests on an interval over events."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,36 @@ class MeasuredDifference:
         return (
             0 if self.interval is None else int(self.interval.low > 0) - int(self.interval.high < 0)
         )
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether there is an interval and it excludes zero."""
+        return self.sign != 0
+
+    @property
+    def decimals(self) -> int:
+        """Those of the measure."""
+        return decimals_of(self.ratio)
+
+    @property
+    def bound(self) -> str:
+        """Nothing: recall has no censored values."""
+        return ""
+
+    @property
+    def asterisk(self) -> str:
+        """Nothing: the gate of the protocol is told in its closing sentences."""
+        return ""
+
+    @property
+    def suffix(self) -> str:
+        """Whether the interval is over events."""
+        return OVER_EVENTS if self.over_events else ""
+
+
+def decimals_of(ratio: Ratio) -> int:
+    """Decimals of a recall in % and of TTFD in keyframes."""
+    return 2 if ratio is TTFD else 1
 
 
 class Comparison(Protocol):

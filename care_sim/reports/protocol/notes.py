@@ -8,8 +8,7 @@ from care_sim.base.text import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE
-from care_sim.reports.protocol.differences import MeasuredDifference
-from care_sim.reports.protocol.formatting import OVER_EVENTS
+from care_sim.reports.protocol.differences import OVER_EVENTS, MeasuredDifference
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import FULL, Row
 

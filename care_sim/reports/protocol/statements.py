@@ -4,8 +4,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from care_sim.base.text import percent
+from care_sim.reports.formatting import ends
 from care_sim.reports.protocol.differences import Comparison, MeasuredDifference, SceneThird
-from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, interval, judged, verdict
+from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, judged, verdict
 from care_sim.reports.protocol.notes import UNITS, on_intervals, papers
 from care_sim.reports.protocol.paper import BUDGETS, Said, statements_about
 from care_sim.reports.protocol.rows import SettingPlays
@@ -89,7 +90,7 @@ def _lines(measured: Measured, said: Mapping[Comparison, Said]) -> Iterator[tupl
 
 def _entries(difference: MeasuredDifference | None, said: Said, budget: float) -> tuple[str, str]:
     """The difference with the verdict and the paper's beside it; its interval."""
-    return judged(difference, said.sign(budget), said.short(budget)), interval(difference)
+    return judged(difference, said.sign(budget), said.short(budget)), ends(difference)
 
 
 def _count(measured: Measured, said: Mapping[Comparison, Said]) -> str:

@@ -8,7 +8,7 @@ from care_sim.base.text import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import SCENE_THIRDS
-from care_sim.reports.formatting import marked, tag_notes
+from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import (
     DENSE_LESS_SPARSE,
     FEWEST_SCENES,
@@ -16,7 +16,7 @@ from care_sim.reports.protocol.differences import (
     PolicyPair,
     SceneThird,
 )
-from care_sim.reports.protocol.formatting import PAPER, whole, written
+from care_sim.reports.protocol.formatting import PAPER, written
 from care_sim.reports.protocol.notes import UNITS, papers
 from care_sim.reports.protocol.paper import ALLOCATIONS, statements_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
@@ -96,7 +96,7 @@ def _stratum_line(plays: SettingPlays, ratio: Ratio, within: str, budget: float)
         percent(budget),
         f"{sum(row[f'{within}/{column}'] for row in plays.scenes.values()):,.0f}",
         *(written(ratio, value) for value in levels),
-        *(whole(pair.measured(plays, budget)) for pair in _pairs(plays, ratio, within)),
+        *(interval(pair.measured(plays, budget)) for pair in _pairs(plays, ratio, within)),
     )
 
 
@@ -147,7 +147,7 @@ def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[tuple[str, ...]
 
 
 def _third_lines(plays: SettingPlays, third: SceneThird) -> Iterator[tuple[str, ...]]:
-    yield (third.label, *(whole(third.measured(plays, budget)) for budget in plays.budgets))
+    yield (third.label, *(interval(third.measured(plays, budget)) for budget in plays.budgets))
     said = statements_about(plays.setting).get(third)
     if said and (entries := said.among(plays.budgets)):
         yield (PAPER, *entries)
