@@ -8,9 +8,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.conduct import conduct
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
-from care_sim.reports.tables import ablations, crowding, faults
 from care_sim.study.added_columns import annotated
-from care_sim.study.designs import paper
+from care_sim.study.designs import ablations, crowding, faults, paper
 from care_sim.study.episode_config import grid
 from care_sim.study.rows import read_rows, write_rows
 from tests.helpers.made_rows import CROWD, STUDY, row
@@ -66,9 +65,9 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     Parquet changed.
     """
     played = {
-        "ablate": ablations.paper_study(range(2)),
-        "faults": faults.paper_study(range(2)),
-        "crowding": crowding.paper_study(range(2)),
+        "ablate": ablations.ablation_study(range(2)),
+        "faults": faults.fault_study(range(2)),
+        "crowding": crowding.crowding_study(range(2)),
         "paper": paper.paper_study(range(2)),
     }
     for name, configs in played.items():

@@ -1,7 +1,6 @@
 from collections import Counter
 
-from care_sim.reports.tables import crowding
-from care_sim.study.designs import paper
+from care_sim.study.designs import crowding, paper
 
 
 def test_the_study_has_245_episodes_in_the_stated_split():
@@ -31,6 +30,6 @@ def test_every_published_figure_belongs_to_a_cell_that_is_run():
 
 
 def test_crowding_varies_the_vehicles_from_none_to_all():
-    configs = crowding.paper_study([0])
+    configs = crowding.crowding_study([0])
     assert {dict(c.scenario_parameters)["vehicles"] for c in configs} == set(range(13))
     assert len(configs) == 13 * (2 * 8 + 1)

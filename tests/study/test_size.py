@@ -7,10 +7,12 @@ import sys
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.reports.tables import ablations, crowding, faults
 from care_sim.sources.scenes import source_of
 from care_sim.study import episode_config as config
-from care_sim.study.designs import paper
+from care_sim.study.designs.ablations import ablation_study
+from care_sim.study.designs.crowding import crowding_study
+from care_sim.study.designs.faults import fault_study
+from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import grid, of_seeds
 from care_sim.study.play_config import play_grid
 
@@ -66,8 +68,8 @@ def test_axes_are_counted_before_they_are_multiplied(monkeypatch):
         grid(["dartout"], ["care", "full"], [0.1, 0.2], range(5))
 
 
-@pytest.mark.parametrize("study", [paper, ablations, crowding, faults])
+@pytest.mark.parametrize("study", [paper_study, ablation_study, crowding_study, fault_study])
 def test_a_study_of_several_seeds_is_that_of_one_with_each(study, monkeypatch):
     monkeypatch.setattr(config.EpisodeConfig, "__post_init__", lambda self: None)
-    whole = study.paper_study((3, 1, 4), ["random"])
-    assert of_seeds(study.paper_study((3,), ["random"]), (3, 1, 4)) == whole
+    whole = study((3, 1, 4), ["random"])
+    assert of_seeds(study((3,), ["random"]), (3, 1, 4)) == whole

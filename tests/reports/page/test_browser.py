@@ -15,8 +15,8 @@ from PIL import Image, ImageColor
 from care_sim.reports.figures.styles import styles
 from care_sim.reports.page.build import write_page
 from care_sim.reports.page.replay import packed
-from care_sim.reports.tables import ablations, faults
 from care_sim.study.added_columns import annotated, tagged
+from care_sim.study.designs import ablations, faults
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.rows import write_rows
@@ -298,8 +298,8 @@ def test_everything_is_open_in_print(opened, played):
     assert closed.count() > 0
 
 
-FAULTY = [row(config, 9.0) for config in faults.configurations([0]) if config.scenario == "dartout"]
-ABLATED = [row(config, 9.0) for config in ablations.configurations([0])[:12]]
+FAULTY = [row(config, 9.0) for config in faults.fault_study([0]) if config.scenario == "dartout"]
+ABLATED = [row(config, 9.0) for config in ablations.ablation_study([0])[:12]]
 PLAYED = tagged(made_plays.study({"history": (4, 2), "care": (8, 4), "full": (9, 5)}))
 STUDIES = {
     "paper": (STUDY + rows("care", [9.0, None], budget=0.1), "Collisions: 0 in 22 episodes", 1),
