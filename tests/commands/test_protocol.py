@@ -23,8 +23,8 @@ from care_sim.study import scene_play as plays
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
 from care_sim.study.results_formats import PLAYS
-from care_sim.study.runner import run_all
 from care_sim.study.run_config import batches
+from care_sim.study.runner import run_all
 from tests.helpers.av2_log import at, box, write
 
 MEASURED = {"wall_s", "peak_rss_mb"}
