@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, NoReturn
 from care_sim.base import interrupts
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.text import one_line, shortened, shown
-from care_sim.commands.shared.parsing import chosen
+from care_sim.commands.shared.parsing import chosen_command
 
 BAD_INPUT, UNEXPECTED, UNREAD = 2, 70, 141
 """Exit codes: that of a fault in the software is `EX_SOFTWARE` of BSD, the last that of a shell for
@@ -28,7 +28,7 @@ LONGEST, NARROWEST = 2000, 20
 """Characters of a complaint, and of a line of help at the least."""
 
 
-class Command(NamedTuple):
+class CommandEntry(NamedTuple):
     """Where a command is, and what `care-sim --help` says of it."""
 
     module: str
@@ -45,102 +45,102 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
-    "reproduce": Command(
+    "reproduce": CommandEntry(
         "reproduce",
         "Reproduce",
         "Play the paper's closed-loop study, 49 configurations per seed, and print it beside "
         "the paper's figures.",
     ),
-    "run": Command(
+    "run": CommandEntry(
         "run",
         "Run",
         "Play one episode and print its timeline and outcome.",
     ),
-    "compare": Command(
+    "compare": CommandEntry(
         "compare",
         "Compare",
         "Play the same seed under several policies and print their outcomes side by side.",
     ),
-    "view": Command(
+    "view": CommandEntry(
         "view",
         "View",
         "Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra "
         "'viewer').",
     ),
-    "sweep": Command(
+    "sweep": CommandEntry(
         "sweep",
         "Sweep",
         "Play every combination of scenarios, policies, budgets, faults and seeds.",
     ),
-    "ablate": Command(
+    "ablate": CommandEntry(
         "ablate",
         "Ablate",
         "Vary one thing at a time as the paper's ablations do, 162 configurations per seed: a "
         "table each.",
     ),
-    "faults": Command(
+    "faults": CommandEntry(
         "faults",
         "Faults",
         "Let every fault grow and find where the order of the policies changes, 318 "
         "configurations per seed.",
     ),
-    "crowding": Command(
+    "crowding": CommandEntry(
         "crowding",
         "Crowding",
         "Find where the all-camera reserve collapses as vehicles fill the dense street, 221 "
         "configurations per seed.",
     ),
-    "protocol": Command(
+    "protocol": CommandEntry(
         "protocol",
         "Protocol",
         "Play the paper's first-sighting protocol: every policy over the same keyframes, on "
         "streets or recordings.",
     ),
-    "report": Command(
+    "report": CommandEntry(
         "report",
         "Report",
         "Print the tables of a folder of results and draw its figures again, or make one web "
         "page of it all.",
     ),
-    "export": Command(
+    "export": CommandEntry(
         "export",
         "Export",
         "Play a policy over nuScenes scenes and write its detections in the results form of the "
         "official devkit.",
     ),
-    "policies": Command(
+    "policies": CommandEntry(
         "listings",
         "Policies",
         "List the policies with their tags, parameters and sources.",
     ),
-    "detectors": Command(
+    "detectors": CommandEntry(
         "listings",
         "Detectors",
         "List the detectors of the open loop.",
     ),
-    "scenarios": Command(
+    "scenarios": CommandEntry(
         "listings",
         "Scenarios",
         "List the scenarios and their parameters.",
     ),
-    "bench": Command(
+    "bench": CommandEntry(
         "bench",
         "Bench",
         "Measure speed: keyframe, scans, steps and memory, beside other engines and environments.",
     ),
-    "parity": Command(
+    "parity": CommandEntry(
         "parity",
         "Parity",
         "Compare the engine `fast` with Bullet: rays of random scenes and of every keyframe, "
         "pictures, whole episodes.",
     ),
-    "certify": Command(
+    "certify": CommandEntry(
         "certify",
         "Certify",
         "Play a published list of episodes and say whether they go as published, or where one "
         "does not.",
     ),
-    "train": Command(
+    "train": CommandEntry(
         "train",
         "LEARNERS",
         "Train a learned policy on an environment: `care-sim train --help` lists the learners.",
@@ -149,9 +149,9 @@ COMMANDS = {
 
 STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
 KEPT = dict.fromkeys(STUDIES, "; what is finished is kept, the same command goes on from there")
-LEARNERS = ("ppo", "sac", "recurrent-ppo")
+AGENTS = ("ppo", "sac", "recurrent-ppo")
 KEPT |= dict.fromkeys(
-    (f"train {name}" for name in LEARNERS),
+    (f"train {name}" for name in AGENTS),
     "; what is learned is kept, the same command with --resume goes on from there",
 )
 """What commands that keep what they have finished say when they are interrupted."""
@@ -267,11 +267,11 @@ def parsed(arguments: Sequence[str]) -> Callable[[], int]:
     named = arguments[0] if arguments else ""
     if named == "train":
         train = COMMANDS[named]
-        return chosen(train.loaded(), "care-sim train", train.about, arguments[1:])
+        return chosen_command(train.loaded(), "care-sim train", train.about, arguments[1:])
     commands = {name: _described(command.about) for name, command in COMMANDS.items()}
     if named in COMMANDS:
         commands[named] = COMMANDS[named].loaded()
-    return chosen(commands, "care-sim", ABOUT, arguments)
+    return chosen_command(commands, "care-sim", ABOUT, arguments)
 
 
 def _described(about: str) -> Callable[..., Any]:

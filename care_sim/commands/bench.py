@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from care_sim.measure.bench.config import BenchConfig
-from care_sim.measure.bench.run import run
+from care_sim.measure.bench.run import run_bench
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,4 +15,4 @@ class Bench(BenchConfig):
 
     def __call__(self) -> int:
         """Run it."""
-        return run(self)
+        return run_bench(self)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from care_sim.measure.certify.config import CertifyConfig
-from care_sim.measure.certify.run import run
+from care_sim.measure.certify.run import run_certify
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,4 +16,4 @@ class Certify(CertifyConfig):
 
     def __call__(self) -> int:
         """Run it."""
-        return run(self)
+        return run_certify(self)

@@ -71,11 +71,11 @@ class Compare:
         policies, left_out = playable(self.policies, lambda name: made([name]))
         if not policies:
             raise InvalidInput("none of the policies can be played")
-        failures = play(made(policies), self.record, self.video)
+        failures = play_side_by_side(made(policies), self.record, self.video)
         return FAILED if left_out or failures else DONE
 
 
-def play(
+def play_side_by_side(
     configs: Sequence[EpisodeConfig], record: Path | None = None, video: Path | None = None
 ) -> list[str]:
     """Play one after the other, into one recording and one film if there are to be any, and print
@@ -108,7 +108,7 @@ def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> l
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
-        console().print(outcomes(rows))
+        console().print(outcome_table(rows))
     failures = [
         f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)
     ]
@@ -130,7 +130,7 @@ def _recorded(
         yield lambda name, env, policy: RecordRerun(env, shared, policy, name)
 
 
-def outcomes(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
+def outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
     """A line an episode."""
     config = played[0][0]
     table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from care_sim.measure.parity.config import ParityConfig
-from care_sim.measure.parity.run import run
+from care_sim.measure.parity.run import run_parity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,4 +14,4 @@ class Parity(ParityConfig):
 
     def __call__(self) -> int:
         """Run it."""
-        return run(self)
+        return run_parity(self)

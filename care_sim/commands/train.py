@@ -9,38 +9,38 @@ import tyro
 
 from care_sim.base.errors import InvalidInput
 from care_sim.reports.figures.files import check_figure, save
-from care_sim.training.config import Ppo, RecurrentPpo, Sac
-from care_sim.training.curves import read, together
+from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
+from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
-from care_sim.training.run import train
+from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainPpo(Ppo):
+class TrainPpo(PpoConfig):
     """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
 
     def __call__(self) -> int:
         """Train it."""
-        return train(self)
+        return train_agent(self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainSac(Sac):
+class TrainSac(SacConfig):
     """Train an allocator by soft actor-critic."""
 
     def __call__(self) -> int:
         """Train it."""
-        return train(self)
+        return train_agent(self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainRecurrentPpo(RecurrentPpo):
+class TrainRecurrentPpo(RecurrentPpoConfig):
     """Train an allocator with a memory (an LSTM) by proximal policy optimisation."""
 
     def __call__(self) -> int:
         """Train it."""
-        return train(self)
+        return train_agent(self)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Curves:
             raise InvalidInput(
                 "curves needs the folder of a training run, the --out of `care-sim train`"
             )
-        groups = together(map(read, self.folders))
+        groups = grouped_runs(map(read_run, self.folders))
         check_figure(self.out)
         save(curves_figure(groups), self.out)
         print(self.out.with_suffix(".png"))

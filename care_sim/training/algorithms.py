@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from care_sim.base.errors import MissingExtra
 from care_sim.policies.learned.grid_features import CHANNELS
-from care_sim.training.config import AgentConfig, OnPolicy, Ppo, RecurrentPpo, Sac
+from care_sim.training.config import AgentConfig, OnPolicy, PpoConfig, RecurrentPpoConfig, SacConfig
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -59,13 +59,13 @@ def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
             "sectors": (config.elevations, config.azimuths),
         },
     }
-    if isinstance(config, Ppo):
+    if isinstance(config, PpoConfig):
         kwargs = {"shape": shape, "hidden": config.hidden, "log_std_init": math.log(config.noise)}
         return SectorPolicy, _on_policy(config) | {"policy_kwargs": kwargs}
-    if isinstance(config, RecurrentPpo):
+    if isinstance(config, RecurrentPpoConfig):
         kwargs = own | {"log_std_init": math.log(config.noise)}
         return "MultiInputLstmPolicy", _on_policy(config) | {"policy_kwargs": kwargs}
-    assert isinstance(config, Sac)
+    assert isinstance(config, SacConfig)
     return "MultiInputPolicy", {
         "buffer_size": config.memory,
         "batch_size": config.batch,

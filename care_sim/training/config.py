@@ -136,7 +136,7 @@ class OnPolicy(AgentConfig):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ppo(OnPolicy):
+class PpoConfig(OnPolicy):
     """Train an allocator by proximal policy optimisation; its weights become the policy `ppo`."""
 
     algorithm = "ppo"
@@ -146,14 +146,14 @@ class Ppo(OnPolicy):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecurrentPpo(OnPolicy):
+class RecurrentPpoConfig(OnPolicy):
     """Train an allocator with a memory (an LSTM) by proximal policy optimisation."""
 
     algorithm = "recurrent-ppo"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sac(AgentConfig):
+class SacConfig(AgentConfig):
     """Train an allocator by soft actor-critic."""
 
     algorithm = "sac"
@@ -164,5 +164,5 @@ class Sac(AgentConfig):
     """Steps a gradient."""
 
 
-ALGORITHMS = tuple(config.algorithm for config in (Ppo, RecurrentPpo, Sac))
+ALGORITHMS = tuple(config.algorithm for config in (PpoConfig, RecurrentPpoConfig, SacConfig))
 """What a run may have been trained by."""

@@ -61,7 +61,7 @@ class TrainingRun:
         return [value if distance is None else distance for _, _, value, distance in self.curve]
 
 
-def read(folder: Path) -> TrainingRun:
+def read_run(folder: Path) -> TrainingRun:
     """The run in a folder. Raises InvalidInput for one without an evaluation."""
     for name in (CONFIG, RULES, CURVE):
         if not (folder / name).is_file():
@@ -74,7 +74,7 @@ def read(folder: Path) -> TrainingRun:
     return run
 
 
-def together(runs: Iterable[TrainingRun]) -> list[list[TrainingRun]]:
+def grouped_runs(runs: Iterable[TrainingRun]) -> list[list[TrainingRun]]:
     """The runs of every recipe, in the order of the first."""
     groups: dict[str, list[TrainingRun]] = {}
     for run in runs:

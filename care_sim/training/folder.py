@@ -27,10 +27,10 @@ from care_sim.base.files import replacing, write_text
 from care_sim.base.json_text import check_file_size, json_content
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save_weights
-from care_sim.training.card_provenance import machine, versions
+from care_sim.training.card_provenance import machine_line, package_versions
 from care_sim.training.config import ALGORITHMS, AgentConfig
 from care_sim.training.seeds import TRAINING, validation_seeds
-from care_sim.training.validation import Score
+from care_sim.training.validation import ValidationScore
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -69,7 +69,7 @@ class Folder:
         self.save(model)
         write_text(self.path / CONFIG, self.config.to_json())
 
-    def rules(self, score: Callable[[], dict[str, Score]]) -> dict[str, Score]:
+    def rules(self, score: Callable[[], dict[str, ValidationScore]]) -> dict[str, ValidationScore]:
         """What rules score: measured at the beginning of a run, read when it is resumed."""
         path = self.path / RULES
         if not path.exists():
@@ -77,7 +77,7 @@ class Folder:
                 json.dumps({name: asdict(each) for name, each in score().items()}, indent=1) + "\n"
             )
             write_text(path, text)
-        return {name: Score(**plain) for name, plain in read_rules(path).items()}
+        return {name: ValidationScore(**plain) for name, plain in read_rules(path).items()}
 
     @property
     def seconds(self) -> float:
@@ -88,7 +88,9 @@ class Folder:
         """Whether the learner has been evaluated as it is."""
         return bool(self._curve) and self._curve[-1][0] >= model.num_timesteps
 
-    def keep(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> None:
+    def keep(
+        self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
+    ) -> None:
         """Write an evaluation and, when it is the best yet, the weights."""
         if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
@@ -103,7 +105,9 @@ class Folder:
         with replacing(self.checkpoint) as unfinished:
             model.save(unfinished)
 
-    def _export(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> None:
+    def _export(
+        self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
+    ) -> None:
         from care_sim.training.networks import SectorPolicy
 
         if isinstance(model.policy, SectorPolicy):
@@ -111,7 +115,9 @@ class Folder:
                 self.weights, model.policy.arrays(), self._card(model, score, seconds, rig)
             )
 
-    def _card(self, model: "BaseAlgorithm", score: Score, seconds: float, rig: Rig) -> Card:
+    def _card(
+        self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
+    ) -> Card:
         config, held_out = self.config, validation_seeds(score.episodes)
         return Card(
             kind="ppo",
@@ -126,8 +132,8 @@ class Folder:
                 "validation": [held_out[0], held_out[-1]],
             },
             steps=model.num_timesteps,
-            machine=f"{machine()}, {round(seconds)} s",
-            versions=versions("care-sim", "numpy", "stable-baselines3", "torch"),
+            machine=f"{machine_line()}, {round(seconds)} s",
+            versions=package_versions("care-sim", "numpy", "stable-baselines3", "torch"),
             result={"validation": asdict(score), "config": config.recipe},
         )
 
@@ -164,10 +170,10 @@ def read_rules(path: Path) -> dict[str, dict[str, Any]]:
     """What rules score. Raises InvalidInput for a damaged file, or one of something else."""
     rules = _read_map(path)
     for name, score in rules.items():
-        if not isinstance(score, dict) or {*score} != {*Score.__dataclass_fields__}:
+        if not isinstance(score, dict) or {*score} != {*ValidationScore.__dataclass_fields__}:
             raise InvalidInput(
                 f"{path} holds no scores of rules: {name!r:.80} has not "
-                f"{', '.join(Score.__dataclass_fields__)}"
+                f"{', '.join(ValidationScore.__dataclass_fields__)}"
             )
         for column, value in score.items():
             if not (_is_finite(value) or (column == "distance_m" and value is None)):

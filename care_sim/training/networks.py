@@ -74,7 +74,7 @@ class Windows(nn.Module):
         return result
 
 
-class Score(nn.Module):
+class ScoreHead(nn.Module):
     """(n, sectors) from -1 to 1: one weight a feature, one number a sector."""
 
     def __init__(self, hidden: int, sectors: int):
@@ -130,7 +130,7 @@ class SectorPolicy(ActorCriticPolicy):
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
-        self.action_net: Any = Score(self._hidden, int(np.prod(self._sectors)))
+        self.action_net: Any = ScoreHead(self._hidden, int(np.prod(self._sectors)))
         self.optimizer = self.optimizer_class(
             self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs
         )  # type: ignore[call-arg]

@@ -15,7 +15,7 @@ from care_sim.training.config import AgentConfig
 from care_sim.training.environments import bare, side_by_side, wrapped
 from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
-from care_sim.training.validation import Score, acting, evaluate, rule
+from care_sim.training.validation import ValidationScore, acting, evaluate, rule
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -24,7 +24,7 @@ RULES = {"random": None, "history": None, "care": None, "full": 1.0}
 """What the learner is held against, with its budget where that is not the learner's."""
 
 
-def train(config: AgentConfig) -> int:
+def train_agent(config: AgentConfig) -> int:
     """Train, and keep everything in `config.out`; see `care_sim.training.folder`.
 
     Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
@@ -62,7 +62,7 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
     return model
 
 
-def _rules(config: AgentConfig) -> dict[str, Score]:
+def _rules(config: AgentConfig) -> dict[str, ValidationScore]:
     """What the rules score on the validation seeds."""
     scores = {}
     for name, budget in RULES.items():

@@ -25,7 +25,7 @@ from care_sim.base.files import ZIP, check_output
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Arrays, Card, save_weights
 from care_sim.sources.streets.street import CALIBRATION_SEEDS
-from care_sim.training.card_provenance import machine, versions
+from care_sim.training.card_provenance import machine_line, package_versions
 from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples
 
 UNITS = 16
@@ -60,7 +60,7 @@ class TrainScorer:
         check_output(self.out, ZIP)
         started = time.perf_counter()
         learned, held_out = (_gathered(name, seeds) for name, seeds in _STREETS.items())
-        arrays, losses = train(learned, held_out, self.seed, self.steps)
+        arrays, losses = train_scorer(learned, held_out, self.seed, self.steps)
         save_weights(self.out, arrays, _card(self, learned, losses))
         told = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
         print(f"{self.out}: loss {told}; {time.perf_counter() - started:.0f} s")
@@ -70,7 +70,7 @@ class TrainScorer:
 _STREETS = {"calibration": CALIBRATION_SEEDS, "held out": HELD_OUT}
 
 
-def train(
+def train_scorer(
     learned: Examples, held_out: Examples, seed: int, steps: int
 ) -> tuple[Arrays, dict[str, float]]:
     """The weights, and the loss on both sets of examples (log 2 = 0.69 without any knowledge)."""
@@ -149,8 +149,8 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
         f"the cells, with six cameras and with the front one; {OTHERS} others a keyframe",
         seeds={name: list(seeds) for name, seeds in _STREETS.items()} | {"training": made.seed},
         steps=made.steps,
-        machine=machine(),
-        versions=versions("care-sim", "numpy", "torch"),
+        machine=machine_line(),
+        versions=package_versions("care-sim", "numpy", "torch"),
         result={f"loss {name}": round(loss, 5) for name, loss in losses.items()},
     )
 

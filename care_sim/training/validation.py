@@ -25,7 +25,7 @@ class Learner(Protocol):
 
 
 @dataclass(frozen=True)
-class Score:
+class ValidationScore:
     """Means over episodes: the return, and the distance at which the first-sighting actor was
     detected, metres (0 where it never was; None in the open loop).
     """
@@ -43,7 +43,7 @@ class Score:
         return f"return {self.mean_return:.2f}{seen}"
 
 
-def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> Score:
+def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> ValidationScore:
     """Play an episode a seed."""
     played = [_episode(env, choose, seed) for seed in seeds]
     distances = [
@@ -52,7 +52,7 @@ def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int])
         if "detection_distance_m" in outcome
     ]
     returns = float(np.mean([total for total, _ in played]))
-    return Score(len(played), returns, float(np.mean(distances)) if distances else None)
+    return ValidationScore(len(played), returns, float(np.mean(distances)) if distances else None)
 
 
 def acting(learner: Learner) -> Choose:

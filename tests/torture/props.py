@@ -39,13 +39,13 @@ class Inline(Executor):
 @contextmanager
 def inline(seconds=PLAYS_S):
     """Studies play in this process, for so long."""
-    from care_sim.measure.certify.playing import played
+    from care_sim.measure.certify.playing import trails_of
     from care_sim.reports.page.build import write_page
     from care_sim.study import executors
 
     usual, defaults = (
         executors.processes,
-        {made: made.__defaults__ for made in (write_page, played)},
+        {made: made.__defaults__ for made in (write_page, trails_of)},
     )
     executors.processes = partial(Inline, seconds)
     for made, values in defaults.items():
@@ -169,9 +169,9 @@ def _make_trained(path):
 
     path.mkdir()
     scores = {"episodes": 2, "mean_return": -3.0, "distance_m": 12.0}
-    from care_sim.training.config import Ppo
+    from care_sim.training.config import PpoConfig
 
-    (path / "config.json").write_text(Ppo().to_json())
+    (path / "config.json").write_text(PpoConfig().to_json())
     (path / "rules.json").write_text(
         json.dumps(dict.fromkeys(("random", "history", "care", "full"), scores))
     )

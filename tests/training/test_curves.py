@@ -6,8 +6,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.training.config import Ppo, Sac
-from care_sim.training.curves import read, together
+from care_sim.training.config import PpoConfig, SacConfig
+from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
 
 DISTANCES = (4.0, 10.0, 16.0)
@@ -37,7 +37,7 @@ def folder(path, config, distances=DISTANCES):
 
 @pytest.fixture
 def folders(tmp_path):
-    configs = Ppo(seed=0), Ppo(seed=1), Ppo(env="CARE-Dartout-v0"), Sac()
+    configs = PpoConfig(seed=0), PpoConfig(seed=1), PpoConfig(env="CARE-Dartout-v0"), SacConfig()
     return [folder(tmp_path / f"run-{n}", config) for n, config in enumerate(configs)]
 
 
@@ -47,12 +47,12 @@ def learned(axes):
 
 
 def test_runs_that_differ_by_their_seed_lie_together(folders):
-    assert [len(group) for group in together(map(read, folders))] == [2, 1, 1]
+    assert [len(group) for group in grouped_runs(map(read_run, folders))] == [2, 1, 1]
 
 
 def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
-    other = folder(tmp_path / "other", Ppo(seed=2), (4.0, 13.0, 16.0))
-    figure = curves_figure(together(map(read, [folders[0], other, folders[2]])))
+    other = folder(tmp_path / "other", PpoConfig(seed=2), (4.0, 13.0, 16.0))
+    figure = curves_figure(grouped_runs(map(read_run, [folders[0], other, folders[2]])))
     both, alone = figure.axes
     assert [line.get_ydata().tolist() for line in learned(both)] == [
         [4, 10, 16],
@@ -68,7 +68,7 @@ def test_a_panel_a_task_a_line_a_seed_and_their_mean(folders, tmp_path):
 
 
 def test_without_a_distance_the_return_is_drawn(tmp_path):
-    run = read(folder(tmp_path / "street", Ppo(env="CARE-Street-v0"), (None, None)))
+    run = read_run(folder(tmp_path / "street", PpoConfig(env="CARE-Street-v0"), (None, None)))
     assert run.values == [-9.0, -8.0]
     assert run.marks["random"] == -6.0
     assert curves_figure([[run]]).axes[0].get_ylabel() == "return"
@@ -97,7 +97,7 @@ def test_the_command_draws_both_forms(folders, tmp_path, capsys):
 def test_a_folder_that_lacks_something_is_named(folders, name):
     (folders[0] / name).unlink()
     with pytest.raises(InvalidInput, match=f"run-0 holds no evaluated training run: no {name}"):
-        read(folders[0])
+        read_run(folders[0])
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_folder_that_lacks_something_is_named(folders, name):
 def test_a_damaged_file_is_named(folders, name, text):
     (folders[0] / name).write_text(text)
     with pytest.raises(InvalidInput, match=f"{name} is damaged") as error:
-        read(folders[0])
+        read_run(folders[0])
     assert "\n" not in str(error.value)
 
 
@@ -160,7 +160,7 @@ def test_files_of_somebody_else_are_one_line(folders, name, text, capsys, tmp_pa
 
 @pytest.mark.filterwarnings("error")
 def test_a_run_that_was_only_evaluated_before_its_first_step_is_drawn(tmp_path):
-    run = read(folder(tmp_path / "begun", Ppo(), (4.0,)))
+    run = read_run(folder(tmp_path / "begun", PpoConfig(), (4.0,)))
     assert run.steps == [0]
     assert curves_figure([[run]]).axes[0].get_xlim()[0] == 0
 

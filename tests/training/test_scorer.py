@@ -23,7 +23,7 @@ def drawn(seed, count=3000):
 
 def test_it_learns_what_there_is_to_learn():
     """One label in ten is wrong: the loss cannot fall below 0.325, the entropy of that."""
-    arrays, losses = scorer.train(drawn(0), drawn(1), 0, 300)
+    arrays, losses = scorer.train_scorer(drawn(0), drawn(1), 0, 300)
     assert {name: array.shape for name, array in arrays.items()} == {
         "layer": (INPUTS, scorer.UNITS), "bias": (scorer.UNITS,), "out": (scorer.UNITS,),
     }  # fmt: skip
@@ -47,12 +47,12 @@ def test_training_does_not_depend_on_the_threads_and_gives_them_back():
     made = []
     for threads in (1, 2):
         torch.set_num_threads(threads)
-        made.append(scorer.train(drawn(0), drawn(1), 0, 20)[0])
+        made.append(scorer.train_scorer(drawn(0), drawn(1), 0, 20)[0])
         assert torch.get_num_threads() == threads
     torch.set_num_threads(before)
     for name, array in made[0].items():
         assert np.array_equal(array, made[1][name])
-    other, _ = scorer.train(drawn(0), drawn(1), 1, 20)
+    other, _ = scorer.train_scorer(drawn(0), drawn(1), 1, 20)
     assert not np.array_equal(made[0]["layer"], other["layer"])
 
 

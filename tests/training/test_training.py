@@ -12,7 +12,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.cli import main
 from care_sim.policies.learned.weights import load_weights
 from care_sim.training.algorithms import algorithm
-from care_sim.training.config import Ppo, Sac
+from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import bare, training
 from care_sim.training.seeds import TRAINING, VALIDATION, validation_seeds
 from care_sim.training.validation import evaluate, rule
@@ -36,7 +36,7 @@ def libraries():
 
 def test_training_never_meets_a_seed_that_is_held_out(monkeypatch):
     monkeypatch.setattr("care_sim.training.seeds.LAST", TRAINING + 100_000)
-    env = training(Ppo(), 0.03)
+    env = training(PpoConfig(), 0.03)
     seeds = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
     again = [env.reset(seed=0 if n == 0 else None)[1]["seed"] for n in range(30)]
     other = [env.reset(seed=1 if n == 0 else None)[1]["seed"] for n in range(30)]
@@ -51,7 +51,7 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
     """Though Stable-Baselines3 seeds environment n of a learner with its seed + n."""
     met = []
     for learner, environment in ((0, 1), (1, 0)):
-        env = training(Ppo(seed=learner), 0.03)
+        env = training(PpoConfig(seed=learner), 0.03)
         met.append(
             [env.reset(seed=learner + environment if n == 0 else None)[1]["seed"] for n in range(5)]
         )
@@ -60,7 +60,7 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
 
 
 def test_an_evaluation_is_the_mean_of_its_episodes():
-    env = bare(Ppo())
+    env = bare(PpoConfig())
     care_rule, seeds = rule("care", env), [VALIDATION, VALIDATION + 1]
     each = [evaluate(env, care_rule, [seed]) for seed in seeds]
     both = evaluate(env, care_rule, seeds)
@@ -106,7 +106,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
         492,
         "SectorReserve 32 x 4, GridObservation 64 x 8",
     )
-    env = bare(Ppo())
+    env = bare(PpoConfig())
     care_sim.make_policy("ppo", env, path=out / "weights.npz")
     env.close()
 
@@ -212,4 +212,4 @@ def test_a_missing_library_is_named(monkeypatch):
 
 def test_budgets_beyond_the_environments_are_refused():
     with pytest.raises(InvalidInput, match="budget needs one value to 2"):
-        Sac(environments=2, budget=(0.1, 0.2, 0.3))
+        SacConfig(environments=2, budget=(0.1, 0.2, 0.3))

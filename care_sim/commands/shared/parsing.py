@@ -69,7 +69,7 @@ def _real(text: str) -> float:
         raise ValueError(f"must be a number, got {shown(text)}") from None
 
 
-def chosen(
+def chosen_command(
     commands: Mapping[str, Callable[..., Any]],
     prog: str,
     about: str | None,

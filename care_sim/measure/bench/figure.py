@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from care_sim.measure.bench.ratios import Report
+from care_sim.measure.bench.ratios import BenchReport
 
 AXES = {
     "budget": "budget (share of cells fired)",
@@ -18,7 +18,7 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 _MARKERS = "osD^v"
 
 
-def growth_figure(report: Report) -> Figure:
+def growth_figure(report: BenchReport) -> Figure:
     """A panel an axis, a line an engine, both scales logarithmic."""
     figure = Figure(figsize=(10.0, 3.4), layout="constrained")
     panels = figure.subplots(1, len(AXES), sharey=True)

@@ -10,7 +10,7 @@ from care_sim.measure.bench.core import one_core
 from care_sim.measure.bench.growth import growth
 from care_sim.measure.bench.keyframe import stages
 from care_sim.measure.bench.memory import worker_memory
-from care_sim.measure.bench.ratios import Report, ratios
+from care_sim.measure.bench.ratios import BenchReport, ratios
 from care_sim.measure.bench.scanning.scans import scans
 from care_sim.measure.bench.steps import makers, speed
 from care_sim.measure.bench.study import study
@@ -21,7 +21,7 @@ from care_sim.study.provenance import machine, versions
 Rounds = dict[str, list[float]]
 
 
-def measure(config: BenchConfig, tell: Callable[[str], None] = lambda _what: None) -> Report:
+def measure(config: BenchConfig, tell: Callable[[str], None] = lambda _what: None) -> BenchReport:
     """`config`, `machine`, `versions`, `main` (the environment in question), every measure by the
     name of its file's figures, `ratios`, `targets`, and `skipped`, what is left out in one line
     each.
@@ -32,7 +32,7 @@ def measure(config: BenchConfig, tell: Callable[[str], None] = lambda _what: Non
     made, skipped = makers(config)
     tell("compiling")
     stages(config.episode)
-    report: Report = {
+    report: BenchReport = {
         "config": {name: value for name, value in asdict(config).items() if name != "out"},
         "machine": machine(),
         "versions": versions(),

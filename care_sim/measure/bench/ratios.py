@@ -10,7 +10,7 @@ import numpy as np
 from care_sim.measure.bench.scanning.scans import REFERENCE
 from care_sim.measure.bench.steps import DRIVING, REACHING
 
-Report = dict[str, Any]
+BenchReport = dict[str, Any]
 FAST = "fast"
 
 OVER_DRIVING, OVER_REACHING = (
@@ -32,7 +32,7 @@ def same_on_grid(engine: str) -> str:
     return f"scan of {engine}, time on the smallest grid over the largest"
 
 
-def ratios(report: Report) -> dict[str, float]:
+def ratios(report: BenchReport) -> dict[str, float]:
     """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's
     does. Steps are those of a second on the core, but for processes side by side.
     """

@@ -7,13 +7,13 @@ import numpy as np
 
 from care_sim.measure.bench.choices import TRACKS
 from care_sim.measure.bench.keyframe import REST
-from care_sim.measure.bench.ratios import Report
+from care_sim.measure.bench.ratios import BenchReport
 from care_sim.reports.table import Table
 
 SPREAD = "median (least to most)"
 
 
-def tables(report: Report) -> list[Table]:
+def bench_tables(report: BenchReport) -> list[Table]:
     """Machine and speed, vectorised, keyframe, choices, scans, memory, ratios, targets."""
     return [
         _speed(report),
@@ -35,7 +35,7 @@ def tables(report: Report) -> list[Table]:
     ]
 
 
-def _speed(report: Report) -> Table:
+def _speed(report: BenchReport) -> Table:
     rows = tuple(
         (
             name,
@@ -66,7 +66,7 @@ def _stages(stages: Mapping[str, Sequence[float]]) -> Table:
     return replace(_spreads("Where a keyframe's time goes, ms", "stage", stages), notes=(note,))
 
 
-def _scans(report: Report) -> Table:
+def _scans(report: BenchReport) -> Table:
     scans = report["scans"]
     rows = tuple(
         (
@@ -93,7 +93,7 @@ def _scans(report: Report) -> Table:
     )
 
 
-def _memory(report: Report) -> Table:
+def _memory(report: BenchReport) -> Table:
     memory = report["memory"]
     moments = {
         "its first reset and step": "begun_mb",
@@ -104,7 +104,7 @@ def _memory(report: Report) -> Table:
     return Table("Peak memory of a worker, MB", ("", "MB"), rows)
 
 
-def _targets(report: Report) -> Table:
+def _targets(report: BenchReport) -> Table:
     rows = tuple(
         (
             target["name"],

@@ -12,7 +12,7 @@ from care_sim.measure.bench.ratios import (
     OVER_DRIVING,
     OVER_REACHING,
     TWO_OVER_ONE,
-    Report,
+    BenchReport,
     middle,
     over,
     same_on_grid,
@@ -56,7 +56,7 @@ class Target:
         return self.figure <= self.bound if self.most else self.figure >= self.bound
 
 
-def targets(report: Report) -> list[Target]:
+def targets(report: BenchReport) -> list[Target]:
     """Every promise that this run has figures for; they speak of the default scenario, policy and
     budget alone.
     """
@@ -116,13 +116,13 @@ def _longest(parts: Mapping[str, float], whole: float) -> str:
     return f"{name}, {parts[name] / whole:.0%}"
 
 
-def _keyframe_holder(report: Report) -> str:
+def _keyframe_holder(report: BenchReport) -> str:
     stages = {name: middle(values) for name, values in report["stages"].items()}
     whole = stages.pop(WHOLE)
     return _longest(stages, whole)
 
 
-def _scan_holder(report: Report) -> str:
+def _scan_holder(report: BenchReport) -> str:
     engines = report["scans"]["engines"]
     mine = engines.get(FAST, engines[REFERENCE])
     return _longest(
@@ -130,12 +130,12 @@ def _scan_holder(report: Report) -> str:
     )
 
 
-def _choice_holder(report: Report) -> str:
+def _choice_holder(report: BenchReport) -> str:
     parts = {part: middle(report["choices"][part]) for part in ("demand", "allocation")}
     return _longest(parts, middle(report["choices"]["p50"]))
 
 
-def _memory_holder(report: Report) -> str:
+def _memory_holder(report: BenchReport) -> str:
     memory = report["memory"]
     begun = memory["begun_mb"]
     return _longest({"libraries": begun, "episodes": memory["peak_mb"] - begun}, memory["peak_mb"])

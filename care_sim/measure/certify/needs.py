@@ -23,7 +23,7 @@ NEEDS: tuple[tuple[Callable[[Drawn], bool], Callable[[], object]], ...] = (
 """Which episodes need it, and what raises MissingExtra where it is not there."""
 
 
-def playable(episodes: Sequence[Drawn]) -> tuple[list[Drawn], list[str]]:
+def playable_here(episodes: Sequence[Drawn]) -> tuple[list[Drawn], list[str]]:
     """The episodes that can be played with what is installed, and a line for each thing that others
     lack.
     """

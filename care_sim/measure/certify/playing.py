@@ -12,7 +12,7 @@ from care_sim.measure.certify.modes import Left, play, together
 from care_sim.study.episode_play import answer
 from care_sim.study.executors import ExecutorFactory, Processes, processes
 
-Played = dict[int, Left]
+Trails = dict[int, Left]
 """The trail of every episode by number, or in one line why there is none."""
 
 A_BATCH = 24
@@ -20,14 +20,14 @@ A_LONG_BATCH = 120
 """Episodes of a batch; more where it takes a while to begin: another interpreter, PyTorch."""
 
 
-def played(
+def trails_of(
     numbers: Sequence[int],
     workers: int,
     show: Callable[[int], None] = lambda _done: None,
     make_executor: ExecutorFactory = processes,
-) -> Played:
+) -> Trails:
     """Play episodes; `show` is told how many are done. An interrupt waits for none of them."""
-    found: Played = {}
+    found: Trails = {}
     with TemporaryDirectory(prefix="care-sim-certify-") as folder:
         source = write_drive(Path(folder))
         waiting = batches([drawn(number) for number in numbers])
@@ -78,11 +78,11 @@ def batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
     )
 
 
-def attempt(batch: Sequence[Drawn], source: str) -> Played:
+def attempt(batch: Sequence[Drawn], source: str) -> Trails:
     """What a worker does: play a batch. Where one of several that are played together fails, each
     is played alone, so that the others have their trails.
     """
-    found: Played = {}
+    found: Trails = {}
     for group in _alike(batch):
         trails = answer(play, group[0].mode, group, source)
         if isinstance(trails, str):

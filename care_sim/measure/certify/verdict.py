@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from care_sim.measure.certify.design import drawn
-from care_sim.measure.certify.playing import Played
+from care_sim.measure.certify.playing import Trails
 from care_sim.measure.certify.published import combined
 from care_sim.measure.certify.trail import stage
 
@@ -53,7 +53,7 @@ class Verdict:
             yield f"  care-sim certify --episode {first}"
 
 
-def compare(found: Played, published: Sequence[bytes], asked: int = 0) -> Verdict:
+def verdict_of(found: Trails, published: Sequence[bytes], asked: int = 0) -> Verdict:
     """Hold trails against the published ones of the same numbers; `asked`, where more were asked
     for than played.
     """

@@ -15,21 +15,21 @@ from care_sim.measure.parity.config import ParityConfig
 from care_sim.measure.parity.keyframes import keyframes
 from care_sim.measure.parity.outcomes import outcomes
 from care_sim.measure.parity.random_scenes import random_scenes
-from care_sim.measure.parity.tables import tables
+from care_sim.measure.parity.tables import parity_tables
 from care_sim.measure.parity.tally import REFERENCES
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.progress import Lines, bar
 from care_sim.study.provenance import machine, versions
 
-Compared = TypeVar("Compared")
+Figures = TypeVar("Figures")
 
 
-def run(config: ParityConfig) -> int:
+def run_parity(config: ParityConfig) -> int:
     """Compare, print the tables, write JSON; 1 if the engines do not agree, see `agree`."""
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
         report = measure(config)
         console = Console(highlight=False)
-        for table in tables(report):
+        for table in parity_tables(report):
             console.print(table.rich())
         if unfinished is not None:
             unfinished.write_text(json.dumps(report, indent=2) + "\n")
@@ -73,7 +73,7 @@ def unexplained(report: dict[str, Any]) -> int:
 
 
 def _shown(
-    unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Compared]
-) -> Compared:
+    unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Figures]
+) -> Figures:
     with bar(total, unit) if sys.stderr.isatty() else nullcontext(Lines(total, unit)) as show:
         return compare(total, lambda done: show(done, ""))

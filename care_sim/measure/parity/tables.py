@@ -24,7 +24,7 @@ PICTURES = {
 }
 
 
-def tables(report: dict[str, Any]) -> list[Table]:
+def parity_tables(report: dict[str, Any]) -> list[Table]:
     """One for random scenes and for each scenario, the notes below the last of them, one of the
     pictures and one of the outcomes.
     """

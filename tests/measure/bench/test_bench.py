@@ -14,9 +14,9 @@ from care_sim.measure.bench.growth import BUDGETS, COUNTS, GRIDS
 from care_sim.measure.bench.keyframe import POLICY, REST, STAGES, WHOLE, stages
 from care_sim.measure.bench.measure import measure
 from care_sim.measure.bench.ratios import TWO_OVER_ONE
-from care_sim.measure.bench.run import run
+from care_sim.measure.bench.run import run_bench
 from care_sim.measure.bench.steps import DRIVING, REACHING, makers
-from care_sim.measure.bench.tables import tables
+from care_sim.measure.bench.tables import bench_tables
 from care_sim.perception.tracker import TrackMemory
 from care_sim.policies.base import Policy
 from care_sim.policies.paper.care import Care
@@ -32,7 +32,7 @@ PUBLISHED = ROOT / "results" / "bench.json"
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     out = tmp_path_factory.mktemp("bench") / "new" / "bench.json"
-    assert run(BenchConfig(**TINY, out=out)) == 0
+    assert run_bench(BenchConfig(**TINY, out=out)) == 0
     assert all(out.with_suffix(suffix).stat().st_size > 1000 for suffix in (".png", ".svg"))
     return json.loads(out.read_text())
 
@@ -89,7 +89,7 @@ def test_the_growth_curves_have_a_time_for_every_point(measured):
 def test_machine_versions_targets_and_what_is_left_out_are_printed(measured):
     assert measured["machine"]["cores"] >= 1
     assert {"python", "pybullet", "highway-env", "gymnasium"} <= set(measured["versions"])
-    shown = tables({**measured, "skipped": ["PandaReach-v3: not here"]})
+    shown = bench_tables({**measured, "skipped": ["PandaReach-v3: not here"]})
     words = " ".join(str(part) for table in shown for part in (*table.rows, *table.notes))
     assert measured["machine"]["processor"] in words
     assert "left out: PandaReach-v3: not here" in words

@@ -29,10 +29,10 @@ from care_sim.measure.certify.design import (
 )
 from care_sim.measure.certify.drive import write_drive
 from care_sim.measure.certify.modes import in_turns, play
-from care_sim.measure.certify.needs import FARTHEST, playable
-from care_sim.measure.certify.playing import batches, played
+from care_sim.measure.certify.needs import FARTHEST, playable_here
+from care_sim.measure.certify.playing import batches, trails_of
 from care_sim.measure.certify.trail import CONFIGURATION, DIGEST_BYTES, OUTCOME, STAGES, stage
-from care_sim.measure.certify.verdict import compare
+from care_sim.measure.certify.verdict import verdict_of
 from care_sim.perception.tracker import TrackMemory
 from care_sim.policies import BUILT_IN
 from care_sim.sensors.camera import CameraDetector
@@ -125,7 +125,7 @@ def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch
     found = attempt([replace(good, mode="sync"), replace(broken, mode="sync")], source)
     assert found[good.number] == alone(good)
     assert "nobody" in found[bad.number]
-    verdict = compare(found | {0: found[bad.number]}, [found[good.number]] * 1000)
+    verdict = verdict_of(found | {0: found[bad.number]}, [found[good.number]] * 1000)
     assert verdict.differing[bad.number] == ("not played", None)
     assert verdict.hash is None
 
@@ -134,11 +134,11 @@ def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch
 def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     module, extra, monkeypatch, capsys
 ):
-    able, lines = playable(LIST)
+    able, lines = playable_here(LIST)
     assert (able, lines) == (LIST, [])
     monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(needs, "find_spec", lambda name: None if name == module else name)
-    able, (line,) = playable(LIST)
+    able, (line,) = playable_here(LIST)
     missing = len(LIST) - len(able)
     assert line.startswith(f"{missing} of 1,000 not played: ")
     assert f"extra '{extra}'" in line
@@ -146,8 +146,8 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     monkeypatch.setattr(
         run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers}
     )
-    monkeypatch.setattr(run, "read", lambda: trails)
-    assert run.run(CertifyConfig(workers=1)) == 0
+    monkeypatch.setattr(run, "read_published", lambda: trails)
+    assert run.run_certify(CertifyConfig(workers=1)) == 0
     told = capsys.readouterr()
     assert told.err.splitlines() == [f"care-sim: {line}"]
     left = published.combined([trails[episode.number] for episode in able])
@@ -155,12 +155,12 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     lacking = next(one.number for one in LIST if one not in able)
     for config in (CertifyConfig(episode=lacking), CertifyConfig(every=True, write=True)):
         with pytest.raises(MissingExtra, match=f"extra '{extra}'"):
-            run.run(config)
+            run.run_certify(config)
 
 
 def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
-    closed = [episode for episode in playable(LIST)[0] if episode.environment in CLOSED]
+    closed = [episode for episode in playable_here(LIST)[0] if episode.environment in CLOSED]
     policies = {episode.policy: replace(episode, keyframes=2) for episode in closed}
     assert set(POLICIES) - set(policies) == {FARTHEST}
     for episode in policies.values():
@@ -297,29 +297,29 @@ def test_another_configuration_is_named():
 def test_the_first_that_differs_is_told_with_a_command(capsys):
     trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(6)]
     other = trails[4][:-3] + b"abc"
-    verdict = compare(dict(enumerate(trails)) | {4: other, 5: trails[0]}, trails)
+    verdict = verdict_of(dict(enumerate(trails)) | {4: other, 5: trails[0]}, trails)
     text = "\n".join(verdict.lines())
     assert not verdict.as_published
     assert "episode 4" in text
     assert "care-sim certify --episode 4" in text
     assert drawn(4).environment in text
-    assert compare(dict(enumerate(trails)), trails).as_published
+    assert verdict_of(dict(enumerate(trails)), trails).as_published
 
 
 def test_one_alone_is_told_with_what_it_is_made_of_and_without_its_own_command():
     trails = [bytes([n]) * (DIGEST_BYTES + 20) for n in range(6)]
     made = f"  {drawn(4).text}, played in mode {drawn(4).mode}"
-    same = [*compare({4: trails[4]}, trails, 1).lines()]
+    same = [*verdict_of({4: trails[4]}, trails, 1).lines()]
     assert same == [f"1 episode: {published.combined(trails[4:5])}, as published", made]
-    other = [*compare({4: trails[4][:-3] + b"abc"}, trails, 1).lines()]
+    other = [*verdict_of({4: trails[4][:-3] + b"abc"}, trails, 1).lines()]
     assert other[1].startswith("the first is episode 4, which differs first in")
     assert other[2:] == [made]
-    assert len([*compare(dict(enumerate(trails)), trails).lines()]) == 1
+    assert len([*verdict_of(dict(enumerate(trails)), trails).lines()]) == 1
 
 
 def test_the_combined_hash_is_over_the_order_of_the_numbers():
     one, two = b"a" * 20, b"b" * 20
-    assert compare({1: two, 0: one}, [one, two]).hash == published.combined([one, two])
+    assert verdict_of({1: two, 0: one}, [one, two]).hash == published.combined([one, two])
     assert published.combined([one, two]) != published.combined([two, one])
 
 
@@ -328,12 +328,12 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     with pytest.raises(
         InvalidInput, match=r"^the list of certify is missing: install the package again$"
     ):
-        published.read(file)
-    published.write([b"12345678" + b"x"], file)
-    assert published.read(file) == [b"12345678x"]
+        published.read_published(file)
+    published.write_published([b"12345678" + b"x"], file)
+    assert published.read_published(file) == [b"12345678x"]
     file.write_bytes(b"no")
     with pytest.raises(ValueError, match="not a readable Parquet"):
-        published.read(file)
+        published.read_published(file)
 
 
 def test_some_of_the_list_goes_as_published():
@@ -342,27 +342,27 @@ def test_some_of_the_list_goes_as_published():
         episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12
     ]
     chosen = [one.number for mode in MODES for one in [e for e in short if e.mode == mode][:5]]
-    verdict = compare(played(chosen, 1), published.read())
+    verdict = verdict_of(trails_of(chosen, 1), published.read_published())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
 def test_a_seed_finder_of_the_list_knows_the_dense_street_in_the_cut_in_too():
     known = 4520
     assert (drawn(known).environment, drawn(known).policy) == ("CARE-CutIn-v0", "seed-finder")
-    verdict = compare(played([known], 1), published.read())
+    verdict = verdict_of(trails_of([known], 1), published.read_published())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
 @pytest.mark.slow
 def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
-    verdict = compare(played([number], 1), published.read())
+    verdict = verdict_of(trails_of([number], 1), published.read_published())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
 def test_the_readme_tells_the_hash_of_the_list():
     readme = ROOT / "README.md"
     assert (
-        f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}"
+        f"{EPISODES:,} episodes: {published.combined(published.read_published()[:EPISODES])}"
         in readme.read_text()
     )

@@ -15,7 +15,7 @@ from care_sim.measure.certify.design import drawn
 
 mode = sys.argv[1]
 chosen = [n for n in range(1000) if drawn(n).mode == mode and drawn(n).environment in design.CLOSED]
-playing.played(chosen, 1)
+playing.trails_of(chosen, 1)
 """
 OTHERS = {"async": 4, "subprocess": 4, "hash-seed": 1}
 """Processes of a mode beside the command, the fork server, its resource tracker and the worker."""

@@ -14,7 +14,7 @@ from PIL import Image, ImageSequence
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.cli import main
-from care_sim.commands.compare import play
+from care_sim.commands.compare import play_side_by_side
 from care_sim.loops.records import Keyframe
 from care_sim.policies.paper.care import Care
 from care_sim.reports.episodes.clips import Clip
@@ -148,7 +148,7 @@ def test_episodes_side_by_side_end_together(tmp_path, capsys):
         EpisodeConfig("dartout", policy, scenario_parameters=(("duration_s", length),))
         for policy, length in lengths.items()
     ]
-    assert play(configs, video=tmp_path / "clip.png") == []
+    assert play_side_by_side(configs, video=tmp_path / "clip.png") == []
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     fired = {words[0]: int(words[-1]) for words in rows if words[:1] and words[0] in lengths}
     assert fired == {config.policy: run_episode(config)["rays_fired"] for config in configs}
