@@ -58,8 +58,9 @@ def test_rows_that_nobody_asks_for_now_are_named(folder):
     asked = grid(["dense"], ["history", "care"], [0.03], range(5))
     with pytest.raises(InvalidInput) as refused:
         check_results(folder, asked, PAPER)
-    assert "holds 20 episodes of the study paper; 10 of them, the first dense all-camera 0.03, would be gone" in str(
-        refused.value
+    assert (
+        "holds 20 episodes of the study paper; 10 of them, the first dense all-camera 0.03, would be gone"
+        in str(refused.value)
     )
     whole = grid(["dense"], ["history", "all-camera", "care", "full"], [0.03], range(5))
     check_results(folder, whole, PAPER)
@@ -76,17 +77,26 @@ def test_rows_that_nobody_asks_for_now_are_named(folder):
         range(5),
         camera_latencies=(1,),
     )
-    with pytest.raises(InvalidInput, match=r"; 15 of them, .* 0\.03 \(camera_latency 0, now 1\), would be"):
+    with pytest.raises(
+        InvalidInput, match=r"; 15 of them, .* 0\.03 \(camera_latency 0, now 1\), would be"
+    ):
         check_results(folder, late, PAPER)
 
 
-def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_the_code(tmp_path, monkeypatch):
+def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_the_code(
+    tmp_path, monkeypatch
+):
     assert conduct(short(lidar_dead_rows=(3, 4)), tmp_path, workers=1) == []
-    assert conduct(short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), tmp_path, workers=1) == []
+    assert (
+        conduct(short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), tmp_path, workers=1)
+        == []
+    )
     monkeypatch.setattr("care_sim.study.run_config.code_digest", lambda: "edited")
     check_results(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), SWEEP)
     with pytest.raises(InvalidInput, match=r"; 1 of them, the first dartout care 0\.1 seed 1"):
-        check_results(tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4))[:3], SWEEP)
+        check_results(
+            tmp_path, short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4))[:3], SWEEP
+        )
 
 
 def test_force_replaces_at_the_end_and_keeps_the_journal(folder, tmp_path, capsys):
@@ -153,7 +163,9 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
     capsys.readouterr()
     (failure,) = conduct(short(("history", "moody")), out, workers=1)
     assert failure.config.policy == "moody"
-    assert [line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line] == [
+    assert [
+        line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line
+    ] == [
         f"the results in {out} stay as they were: 1 of their 2 episodes, the first dartout moody "
         "0.1, would be gone, "
         "since this time only 1 episode did not fail; the journal keeps what was played: mend what "
@@ -168,7 +180,9 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
 def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
     with Journal(tmp_path / JOURNAL, "faults") as journal:
         journal.append({"digest": "a"})
-    with pytest.raises(InvalidInput, match="holds the unfinished study faults, 1 row, beside which the study sweep"):
+    with pytest.raises(
+        InvalidInput, match="holds the unfinished study faults, 1 row, beside which the study sweep"
+    ):
         conduct(short(), tmp_path, workers=1)
     assert conduct(short(), tmp_path, workers=1, force=True) == []
     assert conduct(short(), tmp_path, workers=1) == []
@@ -192,7 +206,10 @@ def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
         with pytest.raises(InvalidInput) as refused:
             conduct(other, tmp_path, workers=1)
         told = str(refused.value)
-        assert f"holds the unfinished study sweep, 4 rows; {gone} of them, the first dartout history 0.1" in told
+        assert (
+            f"holds the unfinished study sweep, 4 rows; {gone} of them, the first dartout history 0.1"
+            in told
+        )
         assert what in told
         assert told.endswith(
             ", are not asked for now: give the command that began it, another --out, or --force to play beside them"
@@ -258,12 +275,17 @@ def test_made_rows_are_of_the_same_identity_as_played_ones(tmp_path):
 
 def test_plays_by_one_presence_are_known_by_it_and_are_not_those_of_the_other(tmp_path):
     streets = source_of("streets")
-    by = {name: play_grid(streets, streets.scenes()[:2], ["care"], [0.1], presence=name) for name in PRESENCES}
+    by = {
+        name: play_grid(streets, streets.scenes()[:2], ["care"], [0.1], presence=name)
+        for name in PRESENCES
+    }
     for own, other in (PRESENCES, PRESENCES[::-1]):
         write_rows([config.row() for config in by[own]], tmp_path / PLAYS.file, "protocol")
         check_results(tmp_path, by[own], STUDIES["protocol"])
         check_results(tmp_path, [*by[other], *by[own]], STUDIES["protocol"])
-        with pytest.raises(InvalidInput, match="; 2 of them, the first street-0000-straight care") as refused:
+        with pytest.raises(
+            InvalidInput, match="; 2 of them, the first street-0000-straight care"
+        ) as refused:
             check_results(tmp_path, by[other], STUDIES["protocol"])
         assert f"care 0.1 (presence {own}, now {other}), would be gone" in str(refused.value)
 

@@ -64,7 +64,10 @@ def summary(failures: Sequence[Failure], unit: str) -> list[str]:
     by_reason: dict[str, list[Failure]] = {}
     for failure in failures:
         by_reason.setdefault(failure.reason, []).append(failure)
-    return [str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}" for own in by_reason.values()]
+    return [
+        str(own[0]) if len(own) == 1 else f"{len(own)} {unit}, the first {own[0]}"
+        for own in by_reason.values()
+    ]
 
 
 def _description(configs: Sequence[RunConfig], study: Study, failures: Sequence[Failure]) -> str:
@@ -78,7 +81,11 @@ def _description(configs: Sequence[RunConfig], study: Study, failures: Sequence[
 
 
 def _check(
-    folder: Path, configs: Sequence[RunConfig], study: Study, force: bool, journal: Journal | None = None
+    folder: Path,
+    configs: Sequence[RunConfig],
+    study: Study,
+    force: bool,
+    journal: Journal | None = None,
 ) -> None:
     """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves
     a file there, and after.
@@ -99,7 +106,9 @@ def _journal(folder: Path, study: Study) -> Journal:
         raise InvalidInput(f"cannot write results to {folder}: {error.strerror}") from error
 
 
-def _say_what_is_found(configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str) -> None:
+def _say_what_is_found(
+    configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str
+) -> None:
     """One line when tasks will not be played again, or others share the journal; one for what is
     damaged there.
     """

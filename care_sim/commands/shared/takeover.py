@@ -81,7 +81,9 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
     )
 
 
-def check_journal(folder: Path, configs: Sequence[RunConfig], journal: Journal, study: Study) -> None:
+def check_journal(
+    folder: Path, configs: Sequence[RunConfig], journal: Journal, study: Study
+) -> None:
     """Raise InvalidInput where an interrupted study is to go on that has another name, or rows that
     nobody asks for now: once other results lie there, its own command is refused. A row counts by
     its parameters, whatever code played it, so that a command goes on after a change of the code.
