@@ -11,19 +11,19 @@ import numpy as np
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats
 
-Interval = tuple[float, float]
+ValueRange = tuple[float, float]
 
-SIZES_M: Interval = (0.01, 200.0)
+SIZES_M: ValueRange = (0.01, 200.0)
 """Length, width and height of an annotated box: a tenth of the smallest, and twice the longest
 train in a street.
 """
-AWAY_M: Interval = (-1e4, 1e4)
+AWAY_M: ValueRange = (-1e4, 1e4)
 """x, y and z of an annotated box from the car: forty times as far as boxes are annotated."""
-MAP_M: Interval = (-1e8, 1e8)
+MAP_M: ValueRange = (-1e8, 1e8)
 """x, y and z in a map: more than twice round the Earth, and yet a float tells a micrometre."""
-MOUNT_M: Interval = (-100.0, 100.0)
+MOUNT_M: ValueRange = (-100.0, 100.0)
 """x, y and z of a sensor in its car, which may be a road train."""
-STAMPS_NS: Interval = (0, 2**62)
+STAMPS_NS: ValueRange = (0, 2**62)
 """Nanoseconds since 1970, until 2116: differences stay within 64 bits."""
 LONGEST_S = 86_400
 """A drive lasts a day."""

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from pyarrow import feather, types
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.plausible import Interval
+from care_sim.sources.plausible import ValueRange
 
 Columns = dict[str, NDArray[Any]]
 
 
-def read_columns(path: Path, kinds: Mapping[str, type], ranges: Mapping[str, Interval]) -> Columns:
+def read_columns(
+    path: Path, kinds: Mapping[str, type], ranges: Mapping[str, ValueRange]
+) -> Columns:
     """The named columns of a Feather file as arrays of the given kinds, int, float or str; numbers
     lie in their ranges.
 

@@ -12,11 +12,11 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import json_content
 from care_sim.core.frames import Floats
-from care_sim.sources.plausible import STAMPS_NS, Interval, check_span
+from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 
 JsonRow = dict[str, Any]
 
-UNBOUNDED: Interval = (float("-inf"), float("inf"))
+UNBOUNDED: ValueRange = (float("-inf"), float("inf"))
 LARGEST_TABLE = 2**33
 """Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of
 half a kilobyte).
@@ -90,7 +90,7 @@ class Database:
         return rows[token]
 
     def numbers(
-        self, table: str, token: str, field: str, *shape: int, within: Interval = UNBOUNDED
+        self, table: str, token: str, field: str, *shape: int, within: ValueRange = UNBOUNDED
     ) -> Floats:
         """A field of finite numbers as an array of `shape`, all in the range `within`."""
         found = self.row(table, token)[field]
