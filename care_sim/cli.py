@@ -75,8 +75,8 @@ COMMANDS = {
     "ablate": CommandEntry(
         "ablate",
         "Ablate",
-        "Vary one thing at a time as the paper's ablations do, 162 configurations per seed: a "
-        "table each.",
+        "Vary one thing at a time as the paper's ablations do, 162 configurations per seed, "
+        "one table per thing varied.",
     ),
     "faults": CommandEntry(
         "faults",

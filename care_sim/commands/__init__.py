@@ -1,1 +1,1 @@
-"""The commands of `care-sim`, a file each."""
+"""The commands of `care-sim`, one file per command."""

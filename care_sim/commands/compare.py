@@ -131,7 +131,7 @@ def _recorded(
 
 
 def outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
-    """A line an episode."""
+    """One line per episode."""
     config = played[0][0]
     table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)
     for column in ("policy", "budget", *COLUMNS.values()):

@@ -45,11 +45,7 @@ class Export(PlayOptions):
             shown = track(
                 configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty()
             )
-            results = {
-                token: boxes
-                for config in shown
-                for token, boxes in found(config).items()
-            }
+            results = {token: boxes for config in shown for token, boxes in found(config).items()}
             unfinished.write_text(
                 json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
             )
@@ -66,8 +62,10 @@ class Export(PlayOptions):
                 "source must be nuscenes:FOLDER, whose samples the official form names, got "
                 f"{self.source!r}"
             )
-        source, common = self.scene_source(), self.common()
-        floors, latencies = [common.pop("floor_seed")], [common.pop("camera_latency")]
+        source = self.scene_source()
+        common = self.common()
+        floors = [common.pop("floor_seed")]
+        latencies = [common.pop("camera_latency")]
         return play_grid(
             source, source.scenes(), [self.policy], [self.budget], floors, latencies, **common
         )
@@ -82,8 +80,8 @@ class Export(PlayOptions):
 def found(config: PlayConfig) -> dict[str, list[JsonRow]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
     film = config.source.film(config.scene)
-    moments = zip(film.shots, play(config, film).keyframes, strict=True)
+    shots = zip(film.shots, play(config, film).keyframes, strict=True)
     return {
         shot.token: result_boxes(shot, record.detections, record.velocities)
-        for shot, record in moments
+        for shot, record in shots
     }

@@ -54,7 +54,8 @@ class Protocol(Running, PlayOptions):
         for axis in ("policies", "budgets"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis} needs at least one value")
-        source, common = self.scene_source(), self.common() | {"presence": self.presence}
+        source = self.scene_source()
+        common = self.common() | {"presence": self.presence}
         scenes = chosen_scenes(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)
         first = common.pop("floor_seed")

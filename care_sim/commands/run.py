@@ -51,7 +51,8 @@ class Run:
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
-        photographer, film = BrakePhoto(self.picture), Clip(self.video)
+        photographer = BrakePhoto(self.picture)
+        film = Clip(self.video)
         print_timeline(
             config,
             *trace(config, photographer, film.episode(self.policy), wrap=self._watched),

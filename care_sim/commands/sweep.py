@@ -40,7 +40,8 @@ class Sweep(EpisodeStudy):
         for axis in ("scenarios", "policies", "budgets", "seeds"):
             if not getattr(self, axis):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
-        scenarios, common = expanded(self.scenarios, SCENARIOS), self.conditions.arguments()
+        scenarios = expanded(self.scenarios, SCENARIOS)
+        common = self.conditions.arguments()
         policies, left_out = playable(
             self.policies, lambda name: grid(scenarios, [name], self.budgets[:1], [0], **common)
         )

@@ -45,8 +45,8 @@ class TrainRecurrentPpo(RecurrentPpoConfig):
 
 @dataclass(frozen=True)
 class Curves:
-    """Draw the learning curves of training runs, a panel a task, a line a training seed; PNG and
-    SVG.
+    """Draw the learning curves of training runs, one panel per task and one line per training seed;
+    PNG and SVG.
     """
 
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDERS")]

@@ -51,7 +51,7 @@ class AgentConfig:
     steps: int = bounded(200_000, 1, LARGEST_INTEGER)
     """Environment steps in all."""
     seed: int = bounded(0, 0, LARGEST_INTEGER)
-    """Of the weights, the exploration and the episodes trained on."""
+    """Seed of the weights, the exploration and the episodes that are trained on."""
     environments: int = bounded(8, 1, 1024)
     """Environments side by side."""
     processes: bool = False
@@ -61,11 +61,11 @@ class AgentConfig:
     learning_rate: float = bounded(1e-3, 1e-8, 1)
     """Step size of Adam."""
     discount: float = bounded(0.9, 0, 1)
-    """What a reward is worth a keyframe later."""
+    """What a reward is worth that comes one keyframe later."""
     evaluate_every: int = bounded(20_000, 1, LARGEST_INTEGER)
     """Environment steps between evaluations; each also writes a checkpoint."""
     episodes: int = bounded(20, 1, TRAINING - VALIDATION)
-    """Held-out episodes an evaluation."""
+    """Held-out episodes per evaluation."""
     out: Path = Path("runs/train")
     """Folder of configuration, weights, checkpoint and learning curve."""
     resume: bool = False
@@ -126,11 +126,11 @@ class OnPolicy(AgentConfig):
     """What learners share that learn from the episodes that they just played."""
 
     rollout: int = bounded(128, 1, 100_000)
-    """Steps an environment between two updates."""
+    """Steps of every environment between two updates."""
     batch: int = bounded(256, 2, 1_000_000)
-    """Steps a gradient."""
+    """Steps per gradient."""
     epochs: int = bounded(4, 1, 1000)
-    """Times that every step is learned from."""
+    """How often every step is learned from."""
     noise: float = bounded(0.3, 1e-3, 10)
     """Standard deviation of the scores at the start."""
 
@@ -161,7 +161,7 @@ class SacConfig(AgentConfig):
     memory: int = bounded(20_000, 1, 1_000_000)
     """Steps that are remembered and learned from; 25 kB each."""
     batch: int = bounded(256, 2, 1_000_000)
-    """Steps a gradient."""
+    """Steps per gradient."""
 
 
 ALGORITHMS = tuple(config.algorithm for config in (PpoConfig, RecurrentPpoConfig, SacConfig))

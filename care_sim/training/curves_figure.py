@@ -25,7 +25,8 @@ def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
 
 
 def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
-    config, marks = runs[0].config, runs[0].marks
+    config = runs[0].config
+    marks = runs[0].marks
     learner = config["algorithm"]
     drawn = styles((name, tags_of(name)) for name in (*marks, learner)) | {"full": FULL}
     colours = {name: style.colour for name, style in drawn.items()}

@@ -51,8 +51,10 @@ class Folder:
     """
 
     def __init__(self, config: AgentConfig):
-        self.config, self.path = config, config.out
-        self.checkpoint, self.weights = self.path / "checkpoint.zip", self.path / "weights.npz"
+        self.config = config
+        self.path = config.out
+        self.checkpoint = self.path / "checkpoint.zip"
+        self.weights = self.path / "weights.npz"
         if config.resume:
             self._check_resumable()
         elif (self.path / CONFIG).exists():
@@ -118,7 +120,8 @@ class Folder:
     def _card(
         self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
     ) -> Card:
-        config, held_out = self.config, validation_seeds(score.episodes)
+        config = self.config
+        held_out = validation_seeds(score.episodes)
         return Card(
             kind="ppo",
             grid=rig.grid,

@@ -53,9 +53,11 @@ class Windows(nn.Module):
 
     def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
         super().__init__()
-        self.actor, self.critic = Window(shape, sectors, hidden), Window(shape, sectors, hidden)
+        self.actor = Window(shape, sectors, hidden)
+        self.critic = Window(shape, sectors, hidden)
         self.valued = nn.Sequential(nn.Linear(2 * hidden + len(EGO_INPUTS), 2 * hidden), nn.ReLU())
-        self.latent_dim_pi, self.latent_dim_vf = hidden, 2 * hidden
+        self.latent_dim_pi = hidden
+        self.latent_dim_vf = 2 * hidden
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
         """Both."""
@@ -75,7 +77,7 @@ class Windows(nn.Module):
 
 
 class ScoreHead(nn.Module):
-    """(n, sectors) from -1 to 1: one weight a feature, one number a sector."""
+    """(n, sectors) from -1 to 1: one weight per feature, one number per sector."""
 
     def __init__(self, hidden: int, sectors: int):
         super().__init__()
@@ -102,7 +104,7 @@ class Joined(BaseFeaturesExtractor):
 
 
 class Sectored(BaseFeaturesExtractor):
-    """(n, 4 + 4 * sectors): four features a sector and the car's motion, for learners with layers
+    """(n, 4 + 4 * sectors): four features per sector and the car's motion, for learners with layers
     of their own.
     """
 
@@ -122,7 +124,8 @@ class SectorPolicy(ActorCriticPolicy):
     """The score map as actor; `shape` as of `Window`, `hidden` its width."""
 
     def __init__(self, *args: Any, shape: tuple[int, int, int], hidden: int = 16, **kwargs: Any):
-        self._shape, self._hidden = shape, hidden
+        self._shape = shape
+        self._hidden = hidden
         super().__init__(*args, **kwargs | {"features_extractor_class": Joined})
 
     def _build_mlp_extractor(self) -> None:

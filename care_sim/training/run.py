@@ -74,7 +74,8 @@ def _rules(config: AgentConfig) -> dict[str, ValidationScore]:
 
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
     """Evaluate and learn in turn, until the last step is evaluated."""
-    clock, begun = Stopwatch(folder.seconds), model.num_timesteps
+    clock = Stopwatch(folder.seconds)
+    begun = model.num_timesteps
     with (
         bar(config.steps, "steps")
         if sys.stderr.isatty()
@@ -128,14 +129,16 @@ class Stopwatch:
     """Seconds spent in learning; evaluations do not count."""
 
     def __init__(self, before: float):
-        self._before, self._done = before, 0.0
+        self._before = before
+        self._done = 0.0
         self._since: float | None = None
 
     def __enter__(self) -> None:
         self._since = time.monotonic()
 
     def __exit__(self, *_: object) -> None:
-        self._done, self._since = self.here, None
+        self._done = self.here
+        self._since = None
 
     @property
     def here(self) -> float:

@@ -107,7 +107,8 @@ def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArr
     """Rows of so many batches; a pass is in random order, and what does not fill a batch is left
     out of it.
     """
-    size, order = min(BATCH, count), np.empty(0, np.int64)
+    size = min(BATCH, count)
+    order = np.empty(0, np.int64)
     for _ in range(steps):
         if len(order) < size:
             order = rng.permutation(count)

@@ -56,7 +56,7 @@ class Examples:
 
 
 def examples(seeds: Iterable[int]) -> Iterator[Examples]:
-    """Those of the streets of some seeds, a play at a time."""
+    """The examples of the streets of some seeds, one play at a time."""
     for seed in seeds:
         film = street_film(seed)
         for number, (shown, budget) in enumerate(
@@ -84,7 +84,8 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     """Cells (n,) of the coming keyframe's full scan with a return from an object in range that has
     no track and can be detected, and what each weighs (n,). Truth.
     """
-    cloud, annotations = loop.shot.cloud, loop.shot.annotations
+    cloud = loop.shot.cloud
+    annotations = loop.shot.annotations
     in_range = np.hypot(annotations.boxes[:, 0], annotations.boxes[:, 1]) <= RANGE_M
     behind_tracks = loop.true_boxes(loop.belief.tracks)
     tracked = (annotations.boxes[:, None] == behind_tracks[None]).all(axis=2).any(axis=1)
@@ -98,7 +99,8 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
 
 
 def _play(env: FilmEnv, seed: int, rng: np.random.Generator) -> Iterator[Examples]:
-    policy, cues = History(env.rig), CellInputs(env.rig)
+    policy = History(env.rig)
+    cues = CellInputs(env.rig)
     observation, _ = env.reset(seed=seed)
     while not env.loop.over:
         yield _keyframe(env.loop, Belief.from_observation(observation), cues, rng)

@@ -44,7 +44,7 @@ class ValidationScore:
 
 
 def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> ValidationScore:
-    """Play an episode a seed."""
+    """Play one episode per seed."""
     played = [_episode(env, choose, seed) for seed in seeds]
     distances = [
         outcome["detection_distance_m"] or 0.0

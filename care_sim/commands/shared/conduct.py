@@ -43,7 +43,8 @@ def conduct(
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
     check_whole("workers", workers, 1)
-    configs, kind = [config.changed() for config in configs], study.results
+    configs = [config.changed() for config in configs]
+    kind = study.results
     check_columns(config.row() for config in configs)
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:

@@ -30,7 +30,7 @@ FASTEST_MPS = 14.0
 
 
 def choices(config: BenchConfig) -> dict[str, list[float]]:
-    """Milliseconds of a choice in every round: `p50` and `p99` of the whole, and of its parts the
+    """Milliseconds per choice in every round: `p50` and `p99` of the whole, and of its parts the
     medians `demand` and `allocation`.
     """
     with driven(config.episode) as env:

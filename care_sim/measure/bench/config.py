@@ -28,7 +28,7 @@ class BenchConfig:
     repeats: int = bounded(5, 1, 10_000)
     """Rounds; in each round everything is measured once."""
     samples: int = bounded(200, 1, 1_000_000)
-    """Scans an engine, and choices of cells, in a round; a point of the growth curves has a
+    """Scans per engine, and choices of cells, in a round; a point of the growth curves has a
     tenth."""
     resets: int = bounded(2000, 1, LARGEST_INTEGER)
     """Episodes begun in the worker whose memory is watched."""

@@ -19,7 +19,7 @@ _MARKERS = "osD^v"
 
 
 def growth_figure(report: BenchReport) -> Figure:
-    """A panel an axis, a line an engine, both scales logarithmic."""
+    """One panel per axis and one line per engine; both scales are logarithmic."""
     figure = Figure(figsize=(10.0, 3.4), layout="constrained")
     panels = figure.subplots(1, len(AXES), sharey=True)
     for axes, (name, label) in zip(panels, AXES.items(), strict=True):

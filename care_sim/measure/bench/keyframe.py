@@ -35,8 +35,8 @@ STAGES: dict[str, tuple[tuple[type, str], ...]] = {
 
 
 def stages(config: EpisodeConfig) -> dict[str, float]:
-    """Mean milliseconds a keyframe of every stage over one episode; `REST` is what no stage holds,
-    `WHOLE` the sum.
+    """Mean milliseconds per keyframe of every stage over one episode; `REST` is what no stage
+    holds, `WHOLE` the sum.
     """
     with driven(config) as env, ExitStack() as watches:
         env.reset(seed=config.seed)

@@ -36,11 +36,9 @@ def ratios(report: BenchReport) -> dict[str, float]:
     """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's
     does. Steps are those of a second on the core, but for processes side by side.
     """
-    speed, engines, curves = (
-        report["speed"],
-        report["scans"]["engines"],
-        report["growth"]["grid"]["ms"],
-    )
+    speed = report["speed"]
+    engines = report["scans"]["engines"]
+    curves = report["growth"]["grid"]["ms"]
     steps = {name: middle(figures["steps_per_cpu_s"]) for name, figures in speed.items()}
     scan = {name: middle(figures["scan_ms"]) for name, figures in engines.items()}
     mine = FAST if FAST in engines else REFERENCE

@@ -1,4 +1,4 @@
-"""Steps and constructions a second of the environments, and of known ones beside them."""
+"""Steps and constructions per second of the environments, and of known ones beside them."""
 
 import time
 from collections.abc import Callable

@@ -65,8 +65,11 @@ def targets(report: BenchReport) -> list[Target]:
         for name in ("scenario", "policy", "budget")
     ):
         return []
-    keyframe, scan, choice = _keyframe_holder(report), _scan_holder(report), _choice_holder(report)
-    memory, ratios = report["memory"], report["ratios"]
+    keyframe = _keyframe_holder(report)
+    scan = _scan_holder(report)
+    choice = _choice_holder(report)
+    memory = report["memory"]
+    ratios = report["ratios"]
     holders = {OVER_DRIVING: keyframe, OVER_REACHING: keyframe}
     return [
         Target(

@@ -1,4 +1,4 @@
-"""Steps a second of vectorised environments: two processes against one."""
+"""Steps per second of vectorised environments: two processes against one."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,8 +16,8 @@ PROCESSES = (1, 2)
 
 
 def vectorised(config: BenchConfig) -> dict[str, list[float]]:
-    """Steps a second, in every round, of one and of two processes that each hold an environment and
-    its policy.
+    """Steps per second, in every round, of one and of two processes that each hold an environment
+    and its policy.
 
     The two are measured in turn; those not measured wait. Not to be called on one core.
     """

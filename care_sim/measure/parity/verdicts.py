@@ -42,7 +42,8 @@ def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
     fast, bullet, exact = (
         engine.cast(sensor, cells) for engine in (engines.fast, engines.bullet, engines.exact)
     )
-    on_exact, on_bullet = np.full(len(cells), SAME), np.full(len(cells), SAME)
+    on_exact = np.full(len(cells), SAME)
+    on_bullet = np.full(len(cells), SAME)
     for n in np.flatnonzero(~same(fast, exact)).tolist():
         on_exact[n] = _judge(
             engines.fast, engines.exact, sensor, cells[n], _only(fast, n), _only(exact, n)
