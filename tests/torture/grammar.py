@@ -42,7 +42,8 @@ WORK = {
 }  # fmt: skip
 """Options that say how much is to be done; a large value is an honest wish, which takes its time."""
 TINY = {
-    "workers": "1", "seeds": "1", "scenes": "1", "episodes": "0", "episode": "0", "floor_seeds": "1", "steps": "64", "repeats": "1",
+    "workers": "1", "seeds": "1", "scenes": "1", "episodes": "0", "episode": "0",
+    "floor_seeds": "1", "steps": "64", "repeats": "1",
     "samples": "1", "resets": "1", "seconds": "0.01", "environments": "1", "rollout": "8", "evaluate_every": "64",
 }  # fmt: skip
 LONG = (
