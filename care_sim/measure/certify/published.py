@@ -11,7 +11,7 @@ from care_sim.study.rows import read_rows, write_columns
 FILE = Path(__file__).with_name("published.parquet")
 
 
-def read_published(path: Path = FILE) -> list[bytes]:
+def read(path: Path = FILE) -> list[bytes]:
     """The trails by number. Raises InvalidInput for a file that is missing or damaged."""
     if not path.exists():
         raise InvalidInput("the list of certify is missing: install the package again")
@@ -26,7 +26,7 @@ def read_published(path: Path = FILE) -> list[bytes]:
     return trails
 
 
-def write_published(trails: Sequence[bytes], path: Path = FILE) -> None:
+def write(trails: Sequence[bytes], path: Path = FILE) -> None:
     """Publish the trails of the episodes from 0 on."""
     write_columns({"trail": list(trails)}, path)
 

@@ -9,7 +9,7 @@ from care_sim.measure.certify.config import CertifyConfig
 from care_sim.measure.certify.design import drawn
 from care_sim.measure.certify.needs import playable_here
 from care_sim.measure.certify.playing import Trails, trails_of
-from care_sim.measure.certify.published import combined, read_published, write_published
+from care_sim.measure.certify.published import combined, read, write
 from care_sim.measure.certify.verdict import verdict_of
 from care_sim.study.progress import Lines, bar
 
@@ -20,7 +20,7 @@ def run_certify(config: CertifyConfig) -> int:
 
     Raises MissingExtra where none can be played, or not all that are to be published.
     """
-    published = [] if config.write else read_published()
+    published = [] if config.write else read()
     if config.numbers[-1] >= len(published) and not config.write:
         raise InvalidInput(f"the published list has {len(published):,} episodes")
     episodes, lacking = playable_here([drawn(number) for number in config.numbers])
@@ -54,6 +54,6 @@ def _published(found: Trails) -> int:
         )
         print(f"nothing is written: episode {number} was not played: {reason}")
         return 1
-    write_published(trails)
+    write(trails)
     print(f"{len(trails):,} episodes: {combined(trails)}, published")
     return 0

@@ -146,7 +146,7 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     monkeypatch.setattr(
         run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers}
     )
-    monkeypatch.setattr(run, "read_published", lambda: trails)
+    monkeypatch.setattr(run, "read", lambda: trails)
     assert run.run_certify(CertifyConfig(workers=1)) == 0
     told = capsys.readouterr()
     assert told.err.splitlines() == [f"care-sim: {line}"]
@@ -328,12 +328,12 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
     with pytest.raises(
         InvalidInput, match=r"^the list of certify is missing: install the package again$"
     ):
-        published.read_published(file)
-    published.write_published([b"12345678" + b"x"], file)
-    assert published.read_published(file) == [b"12345678x"]
+        published.read(file)
+    published.write([b"12345678" + b"x"], file)
+    assert published.read(file) == [b"12345678x"]
     file.write_bytes(b"no")
     with pytest.raises(ValueError, match="not a readable Parquet"):
-        published.read_published(file)
+        published.read(file)
 
 
 def test_some_of_the_list_goes_as_published():
@@ -342,27 +342,27 @@ def test_some_of_the_list_goes_as_published():
         episode for episode in LIST if episode.environment != STREET and episode.keyframes <= 12
     ]
     chosen = [one.number for mode in MODES for one in [e for e in short if e.mode == mode][:5]]
-    verdict = verdict_of(trails_of(chosen, 1), published.read_published())
+    verdict = verdict_of(trails_of(chosen, 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
 def test_a_seed_finder_of_the_list_knows_the_dense_street_in_the_cut_in_too():
     known = 4520
     assert (drawn(known).environment, drawn(known).policy) == ("CARE-CutIn-v0", "seed-finder")
-    verdict = verdict_of(trails_of([known], 1), published.read_published())
+    verdict = verdict_of(trails_of([known], 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
 @pytest.mark.slow
 def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
-    verdict = verdict_of(trails_of([number], 1), published.read_published())
+    verdict = verdict_of(trails_of([number], 1), published.read())
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
 def test_the_readme_tells_the_hash_of_the_list():
     readme = ROOT / "README.md"
     assert (
-        f"{EPISODES:,} episodes: {published.combined(published.read_published()[:EPISODES])}"
+        f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}"
         in readme.read_text()
     )
