@@ -64,10 +64,10 @@ def full_sweep(
 ) -> Cloud:
     """The returns of every cell, fired from the frame `sensor`.
 
-    `objects` are body ids; for the road NO_BODY, or the world's ground where it has one. `boxes` (n,
-    7) in the sensor frame hold all bodies. Rays are cast where these are. All others can only meet
-    the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world without
-    ground the road hides nothing.
+    `objects` are body ids; for the road NO_BODY, or the world's ground where it has one. `boxes`
+    (n, 7) in the sensor frame hold all bodies. Rays are cast where these are. All others can only
+    meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world
+    without ground the road hides nothing.
     """
     covered = np.zeros(grid.size, dtype=bool)
     for hull in grid.hulls(boxes):
