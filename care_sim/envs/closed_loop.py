@@ -13,12 +13,12 @@ from care_sim.envs import reward as rewards
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.loops.other_drive import seen_on_a_drive
+from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.records import Keyframe
 from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import check_engine
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import WORLD_STEP_S, whole_steps
 
@@ -114,14 +114,10 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         whole_steps(keyframe_s)
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
         kind = SCENARIOS[self.scenario_name]
-        check_arguments(
-            type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__]
-        )
+        check_arguments(type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__])
         conditions = conditions_of(parameters)
         check_engine(conditions.engine)
-        super().__init__(
-            conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info
-        )
+        super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info)
         self.scenario = make_scenario(self.scenario_name, **parameters)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
@@ -190,7 +186,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             return EMPTY_POOL
         _, camera, lidar, _, odometry, another = self.streams(entropy, count=6)
         world = self.scenario.build(np.random.default_rng(another))
-        return seen_on_a_drive(
+        return pool_of_another_drive(
             world, self.scenario.duration_s, self.rig, self.conditions, (camera, lidar, odometry)
         )
 

@@ -1,4 +1,4 @@
-"""How often, and by how many cells, two policies chose to fire differently at the same keyframes."""
+"""How often, and by how many cells, two policies fired differently at the same keyframes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

@@ -5,17 +5,16 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Floats, Integers
 
 RESAMPLES = 10_000
 """Paired resamples (paper, Remark 1)."""
-CONFIDENCE = 0.95
+INTERVAL_CONFIDENCE = 0.95
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 Sums = tuple[ArrayLike, ArrayLike]
 """Numerators and denominators (n,) of a group of scenes, scene by scene."""
 
@@ -32,7 +31,7 @@ def paired_difference(
     ours: ArrayLike,
     theirs: ArrayLike,
     *,
-    confidence: float = CONFIDENCE,
+    confidence: float = INTERVAL_CONFIDENCE,
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> Interval:
@@ -54,7 +53,7 @@ def ratio_of_sums(
     group: Sums,
     *,
     less: Sums | None = None,
-    confidence: float = CONFIDENCE,
+    confidence: float = INTERVAL_CONFIDENCE,
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> Interval:
@@ -88,7 +87,7 @@ def ratio_of_sums(
 
 
 def _difference_of_ratios(
-    groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Rows], axis: int = -1
+    groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Integers], axis: int = -1
 ) -> Floats:
     """Ratio of the drawn scenes of the first group, less that of the second where there is one."""
     first, *second = (
@@ -140,7 +139,8 @@ def _differences(ours: Floats, theirs: Floats) -> Floats:
 def _check_pairs(ours: Floats, theirs: Floats) -> None:
     if ours.ndim != 1 or ours.shape != theirs.shape or not ours.size:
         raise InvalidInput(
-            f"paired samples must be two lists of one length, at least one long; got {ours.shape} and {theirs.shape}"
+            "paired samples must be two lists of one length, at least one long; "
+            f"got {ours.shape} and {theirs.shape}"
         )
     if not np.all(np.isfinite(ours) & np.isfinite(theirs)):
         raise InvalidInput("paired samples must be finite")

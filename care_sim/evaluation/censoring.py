@@ -33,7 +33,7 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True)
 class Quartiles:
-    """Lower quartile, median and upper quartile, None for not detected; and the number of values."""
+    """Lower quartile, median and upper quartile, None for not detected; the number of values."""
 
     low: float | None
     median: float | None
@@ -42,7 +42,7 @@ class Quartiles:
 
 
 class Bound(StrEnum):
-    """How the printed difference stands to the true one; the value is the sign to print before it."""
+    """How a printed difference bounds the true one; the value is the sign to print before it."""
 
     EXACT = ""
     AT_MOST = "≤"

@@ -50,6 +50,7 @@ def _optimal(distances: Floats) -> NDArray[np.intp]:
     near = np.isfinite(distances)
     rows = np.flatnonzero(near.any(axis=1))
     distances = distances[rows][:, near.any(axis=0)]
+    # A pair that is no match costs more than all matches together: most are served, then nearest.
     worse_than_all = MATCH_M * (min(distances.shape) + 1)
     served, by = linear_sum_assignment(np.minimum(distances, worse_than_all))
     return rows[served[np.isfinite(distances[served, by])]]
@@ -73,7 +74,8 @@ def _check(detections: Detections) -> None:
             "" if scores is None else f", scores {scores.shape}"
         )
         raise InvalidInput(
-            f"{count} detections must have boxes ({count}, 7) and a score each, if any; got {shapes}"
+            f"{count} detections must have boxes ({count}, 7) and a score each, if any; "
+            f"got {shapes}"
         )
     if not (
         np.all(np.isfinite(detections.boxes)) and (scores is None or np.all(np.isfinite(scores)))

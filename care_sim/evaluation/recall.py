@@ -16,19 +16,17 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Detections
 from care_sim.evaluation import matching
+from care_sim.evaluation.matching import Mask
 from care_sim.evaluation.sightings import Sightings
 
 CENSORED_AT = 6
 """K, in keyframes: three seconds at 2 Hz (paper, Remark 1)."""
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -72,15 +70,16 @@ class SceneScore:
     ) -> "SceneScore":
         """The score of a scene whose keyframes were matched one by one.
 
-        `masks` are one a keyframe: (n,) which of its annotations, of all ranges, were found
-        (`matching.found_objects`). Raises InvalidInput where they are not one a keyframe and one
-        value an annotation, and for a `censored_at` that is no whole number of 1 or more.
+        `masks` are one per keyframe: (n,) which of its annotations, of all ranges, were found
+        (`matching.found_objects`). Raises InvalidInput for another number of masks or of values in
+        one, and for a `censored_at` that is no whole number of 1 or more.
         """
         check_whole("censored_at", censored_at, 1)
-        _check_one_a_keyframe(sightings, len(masks), "masks")
+        _check_keyframes(sightings, len(masks), "masks")
         for index, (shown, mask) in enumerate(zip(sightings.keyframes, masks, strict=True)):
-            _check_one_an_annotation(sightings.scene, index, len(shown), mask)
+            _check_mask(sightings.scene, index, len(shown), mask)
         found = np.concatenate(masks)[sightings.in_range]
+        # Found at no row of its object that is younger than K, an event keeps K, the initial value.
         ages = _ages(sightings, censored_at)
         delays = np.where(found, ages, censored_at).min(axis=1, initial=censored_at)
         return cls(sightings, found, delays, np.sum(ages < censored_at, axis=1))
@@ -98,7 +97,7 @@ class SceneScore:
         return Tally(*map(float, (*sums, rows.sum(), self.found[rows].sum())))
 
     def event_rows(self) -> list[dict[str, Any]]:
-        """One row an event: where and what it was, whether it was found at once, its TTFD and its
+        """One row per event: where and what it was, whether it was found at once, its TTFD and its
         chances.
         """
         events = self.sightings.frames.take(self.sightings.events)
@@ -122,12 +121,12 @@ class SceneScore:
 def score_scene(
     sightings: Sightings, reports: Sequence[Detections], censored_at: int = CENSORED_AT
 ) -> SceneScore:
-    """Score what a policy's detector reported, one entry a keyframe.
+    """Score what a policy's detector reported, one entry per keyframe.
 
-    Raises InvalidInput where the reports are not one a keyframe, and as `matching.found_objects`
+    Raises InvalidInput where the reports are not one per keyframe, and as `matching.found_objects`
     does.
     """
-    _check_one_a_keyframe(sightings, len(reports), "reports")
+    _check_keyframes(sightings, len(reports), "reports")
     masks = [
         matching.found_objects(shown, report)
         for shown, report in zip(sightings.keyframes, reports, strict=True)
@@ -144,7 +143,7 @@ def _ages(sightings: Sightings, censored_at: int) -> Cells:
     return np.where(rows.objects == events.objects[:, None], late, censored_at)
 
 
-def _check_one_a_keyframe(sightings: Sightings, count: int, what: str) -> None:
+def _check_keyframes(sightings: Sightings, count: int, what: str) -> None:
     keyframes = len(sightings.keyframes)
     if count != keyframes:
         raise InvalidInput(
@@ -152,9 +151,9 @@ def _check_one_a_keyframe(sightings: Sightings, count: int, what: str) -> None:
         )
 
 
-def _check_one_an_annotation(scene: str, keyframe: int, annotations: int, mask: Mask) -> None:
+def _check_mask(scene: str, keyframe: int, annotations: int, mask: Mask) -> None:
     if mask.shape != (annotations,) or mask.dtype != np.bool_:
         raise InvalidInput(
-            f"scene {scene}, keyframe {keyframe}: {annotations} annotations need a boolean mask ({annotations},), "
-            f"got {mask.dtype} {mask.shape}"
+            f"scene {scene}, keyframe {keyframe}: {annotations} annotations need a boolean mask "
+            f"({annotations},), got {mask.dtype} {mask.shape}"
         )

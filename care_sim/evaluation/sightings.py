@@ -5,23 +5,23 @@ no policy.
 scene, excluding objects present at scene start." Only objects within range are in the scene that is
 scored, so this one sentence settles every case:
 
-- not annotated at the first keyframe, and later scored within range (it drove in round a corner): an event where it
-  is first scored, that is where a return or a pixel first tells of it;
-- annotated from the start or later, but beyond R, and then nearer (it enters by range): an event where it is first
-  scored within R, a "new entry" like any other;
+- not annotated at the first keyframe, and later scored within range (it drove in round a corner):
+  an event where it is first scored, that is where a return or a pixel first shows it;
+- annotated from the start or later, but beyond R, and then nearer (it enters by range): an event
+  where it is first scored within R, a "new entry" like any other;
 - within R at the first keyframe: "present at scene start", never an event, whatever it does later;
-- gone and back, out of range or out of the annotations: "reappearances after annotation gaps are not scored
-  separately", so an object has one event at most;
+- gone and back, out of range or out of the annotations: "reappearances after annotation gaps are
+  not scored separately", so an object has one event at most;
 - never within R: no event.
 
-The sentence says nothing of who could be seen. So an object that its source annotates within R at
-the first keyframe is present there though neither a return nor a pixel tells of it
+The sentence does not ask who could be seen. So an object that its source annotates within R at
+the first keyframe is present there though neither a return nor a pixel shows it
 (`care_sim.loops.film.Film.hidden`), and is no event when it shows itself: `presence="annotated"`,
 the rule. That takes out the very case after which the closed loop is made: the person who stands
 behind a parked van from the first keyframe on and then walks out. How much it takes out depends on
 who annotates. People drew the boxes of recordings, and seldom drew one where they saw nothing; the
 generator of a street knows everybody, also those whom nobody could have annotated.
-`presence="visible"` counts as present only what a sensor tells of at the first keyframe, so that
+`presence="visible"` counts as present only what a sensor shows at the first keyframe, so that
 the one behind the van is an event; `Sightings.emerging` are those by which the two counts differ.
 What is scored at a keyframe is the same in both.
 """
@@ -44,7 +44,7 @@ RANGE_M = 50.0
 1).
 """
 ANNOTATED, VISIBLE = PRESENCES = ("annotated", "visible")
-"""Who is present at scene start: whoever is annotated there, or only who shows a return or a pixel."""
+"""Who is present at scene start: all that is annotated there, or what shows a return or a pixel."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Sightings:
         hidden: Annotations = NO_ANNOTATIONS,
         presence: str = ANNOTATED,
     ) -> "Sightings":
-        """The sightings of the scene's annotations, one entry a keyframe; `hidden` are those of
+        """The sightings of the scene's annotations, one entry per keyframe; `hidden` are those of
         `Film.hidden`.
 
         Raises InvalidInput for a scene without a keyframe, for an object annotated twice at one

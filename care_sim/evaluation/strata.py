@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.core.types import CLASSES
+from care_sim.evaluation.matching import Mask
 from care_sim.evaluation.sightings import ObjectFrames
 
 NEAR_M, FAR_M = 20.0, 35.0
@@ -16,8 +16,6 @@ FRONT, REAR = np.pi / 4, 3 * np.pi / 4
 """Bounds of the sectors, radians off straight ahead to either side: a quarter of the turn ahead,
 one behind and one on each side, whatever the mounting of the cameras."""
 SCENE_THIRDS = ("sparse", "middle", "dense")
-
-Mask = NDArray[np.bool_]
 
 
 def strata(frames: ObjectFrames) -> dict[str, dict[str, Mask]]:
@@ -42,7 +40,7 @@ def strata(frames: ObjectFrames) -> dict[str, dict[str, Mask]]:
 
 
 def thirds(counts: Mapping[str, float]) -> dict[str, list[str]]:
-    """Scenes ranked by a number each (tracked objects, explained detections) and cut in three,
+    """Scenes ranked by one number per scene (tracked objects, explained detections), cut in three,
     sparse first.
 
     The parts differ by a scene at most; scenes of equal number stand in the order of their names.

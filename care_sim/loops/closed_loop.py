@@ -18,9 +18,9 @@ from care_sim.loops.records import Keyframe
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import ReturnsDetector
 from care_sim.perception.tracker import TrackMemory
+from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
 from care_sim.world.world import World
 
@@ -36,7 +36,8 @@ class ClosedLoop:
         seeds: Sequence[np.random.SeedSequence],
         pool: BoxPool = EMPTY_POOL,
     ):
-        self.world, self.rig = world, rig
+        self.world = world
+        self.rig = rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
         self._reported = np.array(list(labels), np.int64)
         camera_seed, lidar_seed, odometry_seed = seeds

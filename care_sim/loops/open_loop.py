@@ -4,7 +4,6 @@ react.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +15,15 @@ from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.odometry import Odometry
+from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
+from care_sim.sensors.box_pool import EMPTY_POOL
 from care_sim.sensors.camera import CameraDetector
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool
 from care_sim.sensors.recorded_lidar import RecordedLidar
-
-ANOTHER_TIME_S = 3.0
-"""A film's own boxes are made into false ones this long before and after they were true: at 30 km/h
-what stands is 25 m nearer by then, and what was 20 m away is passed.
-"""
 
 
 @dataclass(frozen=True)
@@ -36,8 +31,8 @@ class OpenLoopKeyframe:
     """The record of one keyframe of the open loop: what was fired, and what the detector made of
     the returns.
 
-    `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 at a
-    first sight.
+    `velocities` (n, 2) are those of the detections' tracks, over ground, in sensor axes; 0 for a
+    track that has just begun.
     """
 
     index: int
@@ -57,14 +52,15 @@ class OpenLoop:
         seeds: Sequence[np.random.SeedSequence],
         detector: Detector,
     ):
-        self.film, self.rig = film, rig
+        self.film = film
+        self.rig = rig
         camera_seed, lidar_seed, odometry_seed = seeds
         objects = sorted(
             {number for shot in film.shots for number in shot.annotations.objects.tolist()}
         )
         self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, lidar_seed)
-        pool = _seen_another_time(film) if sensing.false_positive_rate else EMPTY_POOL
+        pool = pool_of_film(film) if sensing.false_positive_rate else EMPTY_POOL
         self._camera = CameraDetector(
             objects, sensing, film.keyframe_s, camera_seed, film.cameras, pool
         )
@@ -142,13 +138,3 @@ class OpenLoop:
         ranges = np.zeros(self.rig.grid.size, np.float32)
         ranges[fired] = np.minimum(self._lidar.ranges(cloud)[fired], self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
-
-
-@lru_cache(maxsize=1)
-def _seen_another_time(film: Film) -> BoxPool:
-    """All boxes of a film. In a short one those serve that are half of it away, so that every
-    keyframe has some.
-    """
-    times = [shot.time_s for shot in film.shots]
-    apart = min(ANOTHER_TIME_S, (times[-1] - times[0]) / 2)
-    return BoxPool.of([shot.seen.detections for shot in film.shots], times, film.cameras, apart)

@@ -1,6 +1,6 @@
 """What is true about the coming keyframe: for privileged policies and the scoring alone.
 
-Truth is asked of the running loop and never enters a `Belief`. `EpisodeTruth` is the one door to it.
+Truth is asked of the running loop and never enters a `Belief`.
 """
 
 from collections.abc import Callable
@@ -73,7 +73,7 @@ class TrackObjects:
         self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
 
     def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
-        """(n, 7) where the objects behind forecasts are now; a track without one keeps its forecast.
+        """(n, 7) where the objects behind forecasts are now; a track without one stays as forecast.
 
         `boxes_of` gives the present sensor-frame boxes of objects, and leaves out those that are
         nowhere.

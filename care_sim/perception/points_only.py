@@ -1,4 +1,4 @@
-"""Real detectors: they are handed points, and no truth.
+"""Real detectors are handed points, and no truth.
 
 `PointsOnly` is the one place where a film meets a real detector. Whatever is installed or loaded
 goes through it.
@@ -17,7 +17,7 @@ from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
 MOST_DETECTIONS = 500
-"""Boxes a keyframe: as many as the official nuScenes evaluation takes."""
+"""Boxes per keyframe: as many as the official nuScenes evaluation takes."""
 
 
 class BrokenDetector(InvalidInput):

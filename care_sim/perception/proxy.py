@@ -1,5 +1,4 @@
-"""Detectors as the open loop calls them, and the paper's proxy: an object is detected when enough
-fired rays hit it.
+"""The paper's proxy detector: an object is detected when enough fired rays hit it.
 
 The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is
 made a `Detector` by `care_sim.perception.points_only.PointsOnly`;

@@ -1,4 +1,4 @@
-"""Track memory: assignment by position, velocity from two frames, coasting, death, forecasts."""
+"""Track memory: assignment by position, velocity from two keyframes, coasting, forecasts."""
 
 from dataclasses import dataclass
 
@@ -17,9 +17,9 @@ class MemoryRules:
     """Association and life of a track."""
 
     gate_m: float = 2.0
-    """Detections further than this from a forecast are another object (the paper's match distance)."""
+    """A detection further from a forecast is another object (the paper's match distance)."""
     first_speed_mps: float = 15.0
-    """A track seen once has no velocity: its gate grows by this much a second (54 km/h)."""
+    """A track seen once has no velocity: its gate grows by this much per second (54 km/h)."""
     coast_s: float = 1.5
     """An undetected track is forecast this long, then dropped (CenterPoint's tracker: 3 frames at 2
     Hz).
@@ -27,7 +27,11 @@ class MemoryRules:
 
 
 class TrackMemory:
-    """Tracks in the world frame, so that ego motion is compensated; sensor frame at its doors."""
+    """The tracks of an episode.
+
+    They are kept in the world frame, so that the ego's motion is compensated, and are given and
+    taken in the sensor frame.
+    """
 
     def __init__(self, keyframe_s: float, rules: MemoryRules = MemoryRules()):
         self._keyframe_s = keyframe_s
@@ -74,6 +78,7 @@ class TrackMemory:
         ids = np.empty(len(detections), np.int64)
         ids[found] = self._tracks.ids[matched]
         ids[new] = np.arange(self._next_id, self._next_id + len(ids) - len(found))
+        # Rows of matched tracks hold only until old tracks are dropped.
         self._correct(matched, seen[found])
         self._forget()
         self._start(ids[new], detections.classes[new], seen[new])
@@ -94,6 +99,7 @@ class TrackMemory:
         slack = np.where(tracks.hits > 1, 0.0, self._rules.first_speed_mps * elapsed)
         gate = self._rules.gate_m + slack
         possible = (distance <= gate[:, None]) & (tracks.classes[:, None] == classes[None, :])
+        # Impossible pairs cost more than any sum of possible ones, so the most pairs are matched.
         rows, columns = linear_sum_assignment(np.where(possible, distance, 1e6))
         kept = possible[rows, columns]
         return rows[kept], columns[kept]
@@ -103,6 +109,7 @@ class TrackMemory:
         boxes, velocities = tracks.boxes.copy(), tracks.velocities.copy()
         misses, hits = tracks.misses + 1, tracks.hits.copy()
         elapsed = (misses[rows] * self._keyframe_s)[:, None]
+        # A forecast moved at constant velocity; moved back, it is where the object was last seen.
         last_seen = boxes[rows, :2] - velocities[rows] * elapsed
         velocities[rows] = (seen[:, :2] - last_seen) / elapsed
         boxes[rows], misses[rows] = seen, 0
@@ -110,6 +117,7 @@ class TrackMemory:
         self._tracks = Tracks(tracks.ids, tracks.classes, boxes, velocities, misses, hits)
 
     def _forget(self) -> None:
+        # Keyframes add up to the time with an error of last bits.
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
         if not alive.all():
             self._tracks = self._tracks.take(alive)

@@ -10,18 +10,20 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
 Range = tuple[float, float]
+"""Low and high; the seed draws evenly between them."""
+
 LONGEST_EPISODE_S = 60.0
-"""Of an episode: a car at 60 km/h comes to the end of the road, and a picture is as old as an
-observation can say.
+"""The longest episode: a car at 60 km/h then comes to the end of the road, and a delayed picture is
+as old as an observation can say.
 """
-EGO_SPEEDS_MPS = (0.5, 60.0)
-"""From a walk to far beyond any street's traffic: what the ego's speed may be."""
+EGO_SPEED_BOUNDS_MPS = (0.5, 60.0)
+"""Bounds of the ego's speed: from a walk to far beyond any street's traffic."""
 
 SPEED_LIMIT_MPS = 30 / 3.6
 """All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
 NO_LIMIT_MPS = 2 * SPEED_LIMIT_MPS
-"""What the lanes say to drivers who keep the ego's speed: a limit below it would slow them."""
-EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
+"""The limit of lanes whose drivers keep the ego's speed: one below that would slow them."""
+USUAL_EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
 """30 km/h, give or take the 1 km/h by which a driver's speed varies."""
 LANE_WIDTH_M = 3.5
 PARKING_WIDTH_M = 2.5
@@ -35,7 +37,7 @@ LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
 
 @dataclass(frozen=True)
 class Scenario(ABC):
-    """The physics of a scenario; a seeded generator places and times what its ranges leave open."""
+    """The physics of a scenario: numbers, and ranges within which a seeded generator draws."""
 
     duration_s: float = bounded(6.0, 0.05, LONGEST_EPISODE_S)
 

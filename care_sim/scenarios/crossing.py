@@ -9,14 +9,14 @@ from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.base import (
-    EGO_SPEED_MPS,
-    EGO_SPEEDS_MPS,
+    EGO_SPEED_BOUNDS_MPS,
     LANE_WIDTH_M,
     LEFT_PARKING_Y,
     NO_LIMIT_MPS,
     PARKING_WIDTH_M,
     PAVEMENT_WIDTH_M,
     RIGHT_PARKING_Y,
+    USUAL_EGO_SPEED_MPS,
     Range,
     Scenario,
     draw,
@@ -45,7 +45,7 @@ class CrossingScenario(Scenario):
 
     occluder: str = "trailer"
     occluder_reported: bool = False
-    ego_speed_mps: Range = bounded(EGO_SPEED_MPS, *EGO_SPEEDS_MPS)
+    ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     crossing_m: Range = bounded((37.0, 41.0), 5, 200)
     """From the ego's first position to the person's line: four to five seconds of approach, so that
     every track has settled."""

@@ -6,10 +6,10 @@ import numpy as np
 
 from care_sim.base.bounds import bounded
 from care_sim.scenarios.base import (
-    EGO_SPEED_MPS,
-    EGO_SPEEDS_MPS,
+    EGO_SPEED_BOUNDS_MPS,
     LANE_WIDTH_M,
     SPEED_LIMIT_MPS,
+    USUAL_EGO_SPEED_MPS,
     Range,
     Scenario,
     draw,
@@ -26,12 +26,12 @@ class CutIn(Scenario):
     right lane; a car standing hidden before it pulls out (highway-env lane change, IDM) ahead of
     the ego.
 
-    The bus is one of the five classes; `occluder_reported=False` keeps perception silent about it.
-    Ranges are drawn uniformly by the seed.
+    The bus is one of the five classes; with `occluder_reported=False` perception does not report
+    it. Ranges are drawn uniformly by the seed.
     """
 
     occluder_reported: bool = True
-    ego_speed_mps: Range = bounded(EGO_SPEED_MPS, *EGO_SPEEDS_MPS)
+    ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     stop_m: Range = bounded((42.0, 46.0), 5, 200)
     """From the ego's first position to the front of the bus: far enough for the bus to hide the
     car.

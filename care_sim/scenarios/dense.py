@@ -53,7 +53,8 @@ view at the encounter: a parked row with a gap to walk through, and a double-par
 go on beside and behind the ego, where only the LiDAR sees them. The first `vehicles` are taken."""
 
 FOLLOWER_M = -22.5
-"""A driver follows the ego at the distance that highway-env's IDM keeps at 30 km/h: 10 m and 1.5 s."""
+"""A driver follows the ego at the distance that highway-env's IDM keeps at 30 km/h: 10 m and 1.5 s.
+"""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,8 @@ class Dense(CrossingScenario):
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""
         for number, (kind, kerb, beyond) in enumerate(VEHICLE_PLACES[: self.vehicles]):
-            along, across = draw(rng, self.place_jitter_m), draw(rng, self.place_jitter_m) / 4
+            along = draw(rng, self.place_jitter_m)
+            across = draw(rng, self.place_jitter_m) / 4
             world.add(
                 f"{kind} {number}", kind, (crossing_x + beyond + along, KERBS[kerb] + across, 0.0)
             )

@@ -12,10 +12,11 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
+from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.picture_kernels import visible_boxes
-from care_sim.sensors.false_boxes import EMPTY_POOL, BoxPool, FalseBoxes
+from care_sim.sensors.false_boxes import FalseBoxes
 from care_sim.world.bullet import PixelWindow
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)

@@ -1,4 +1,4 @@
-"""How sure the camera is of what shows so many pixels."""
+"""How sure the camera's detector is of a box, by the visible pixels of what it shows."""
 
 from typing import TypeVar
 
@@ -17,7 +17,7 @@ Pixels = TypeVar("Pixels", float, Floats)
 
 
 def confidence_of(pixels: Pixels) -> Pixels:
-    """The confidence of a box of so many visible pixels."""
+    """The confidence, from 0 to 1, of a box of so many visible pixels."""
     return pixels / (pixels + FULL_CONFIDENCE)
 
 

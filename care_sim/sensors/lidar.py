@@ -23,8 +23,10 @@ NEAREST_M = 0.01
 
 
 class Lidar:
-    """Casts the fired cells through an engine; noise draws are one a cell, fired or not, so that
-    every policy meets the same noise (common random numbers).
+    """Casts the fired cells through an engine.
+
+    Noise and dropout are drawn once per cell, fired or not, so that every policy meets the same
+    (common random numbers).
     """
 
     def __init__(
@@ -38,10 +40,8 @@ class Lidar:
         self._engine = engine
         self._faults = faults
         self._dead = dead_cells(grid, faults.lidar_dead_rows)
-        self._noise, self._dropout = (
-            np.random.default_rng(seed),
-            np.random.default_rng(seed.spawn(1)[0]),
-        )
+        self._noise = np.random.default_rng(seed)
+        self._dropout = np.random.default_rng(seed.spawn(1)[0])
 
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
@@ -74,11 +74,14 @@ class Lidar:
 
 
 def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
-    """(n,) `ranges` with `errors`, metres. What would come within NEAREST_M of 0 or of the reach,
-    or beyond, is folded back: cut, it would heap up at one number, which tells that it was cut.
+    """(n,) `ranges` with `errors`, metres.
+
+    What would come within NEAREST_M of 0 or of the reach, or beyond, is folded back. If it were cut
+    instead, ranges would heap up at one number, which would tell a policy that they were cut.
     """
     erring = ranges + errors
     span = reach - 2 * NEAREST_M
+    # A triangle wave: the way from the near bound to the far one and back is 2 * span long.
     beyond = np.mod(erring - NEAREST_M, 2 * span)
     folded: Floats = NEAREST_M + np.minimum(beyond, 2 * span - beyond)
     return np.where(np.abs(erring - reach / 2) <= span / 2, erring, folded)

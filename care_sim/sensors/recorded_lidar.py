@@ -1,4 +1,4 @@
-"""A LiDAR whose full scan was recorded: of it, fired cells return what the faults leave."""
+"""A LiDAR whose full scan was recorded: fired cells return their part of it, after the faults."""
 
 import numpy as np
 
@@ -10,18 +10,18 @@ from care_sim.sensors.lidar import dead_cells, noisy
 
 
 class RecordedLidar:
-    """Hands out the returns of fired cells. Noise and dropout are drawn one a cell, fired or not,
-    so that every policy meets the same (common random numbers).
+    """Hands out the returns of fired cells.
+
+    Noise and dropout are drawn once per cell, fired or not, so that every policy meets the same
+    (common random numbers).
     """
 
     def __init__(self, grid: AngularGrid, faults: LidarFaults, seed: np.random.SeedSequence):
         self.grid = grid
         self._faults = faults
         self._live = ~dead_cells(grid, faults.lidar_dead_rows)
-        self._noise, self._dropout = (
-            np.random.default_rng(seed),
-            np.random.default_rng(seed.spawn(1)[0]),
-        )
+        self._noise = np.random.default_rng(seed)
+        self._dropout = np.random.default_rng(seed.spawn(1)[0])
 
     def fire(self, cells: Cells, cloud: Cloud) -> Cloud:
         """The returns of `cells` (k,) in the recorded `cloud`, after the faults."""
@@ -42,6 +42,7 @@ class RecordedLidar:
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""
         nearest = np.full(self.grid.size, np.inf)
+        # Cells come ascending, so the returns of each are one stretch.
         cells, starts = np.unique(cloud.cells, return_index=True)
         nearest[cells] = np.minimum.reduceat(np.linalg.norm(cloud.points, axis=1), starts)
         return nearest

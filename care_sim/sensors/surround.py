@@ -1,4 +1,4 @@
-"""Six cameras and a LiDAR around the car: everything that a world shows of itself at one moment.
+"""Six cameras and a LiDAR around the car: all that can be measured of a world at one time.
 
 The ring is that of nuScenes (Caesar et al. 2020, Fig. 4): front and sides 70 degrees wide and 55
 degrees apart, the back 110 degrees wide, at the places of one of its calibrations, seen from
@@ -46,8 +46,8 @@ def surround_detections(
     labels: Mapping[int, int],
     boxes: Floats,
 ) -> IdentifiedDetections:
-    """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes,
-    by body id.
+    """What cameras mounted in the frame `sensor` see of the bodies that `labels` maps to classes;
+    `objects` are body ids.
 
     `boxes` (n, 7) are those of the bodies in the sensor frame; nothing outside them is rendered.
     """
@@ -62,17 +62,18 @@ def surround_detections(
 def full_sweep(
     world: BulletWorld, grid: AngularGrid, sensor: Frame, boxes: Floats, height_m: float
 ) -> Cloud:
-    """The returns of every cell, fired from the frame `sensor`; `objects` are body ids, of the road
-    NO_BODY or the world's ground.
+    """The returns of every cell, fired from the frame `sensor`.
 
-    `boxes` (n, 7) in the sensor frame hold all bodies. Rays are cast where these are; all others
-    can only meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a
-    world without ground it hides nothing.
+    `objects` are body ids; for the road NO_BODY, or the world's ground where it has one. `boxes`
+    (n, 7) in the sensor frame hold all bodies. Rays are cast where these are. All others can only
+    meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world
+    without ground the road hides nothing.
     """
     covered = np.zeros(grid.size, dtype=bool)
     for hull in grid.hulls(boxes):
         covered[hull] = True
-    ranges, bodies = road_ranges(grid, height_m), np.full(grid.size, NO_BODY)
+    ranges = road_ranges(grid, height_m)
+    bodies = np.full(grid.size, NO_BODY)
     directions = sensor.vectors_to_world(grid.directions[covered])
     cast, hit = world.cast(sensor.origin, directions, grid.range_m)
     ranges[covered] = np.where(hit == NO_BODY, ranges[covered], cast)

@@ -7,9 +7,9 @@ from care_sim.loops.records import Keyframe, Outcome
 
 def keyframe(index=0, **changes):
     quiet = {
-        "time_s": index / 10, "fired": np.arange(100), "in_view": False, "detected": False, "braking": False,
-        "speed_mps": 8.0, "distance_m": 30.0 - index, "nearest_m": 30.0 - index, "clearance_m": 25.0 - index,
-        "impact_speed_mps": None,
+        "time_s": index / 10, "fired": np.arange(100), "speed_mps": 8.0, "impact_speed_mps": None,
+        "in_view": False, "detected": False, "braking": False,
+        "distance_m": 30.0 - index, "nearest_m": 30.0 - index, "clearance_m": 25.0 - index,
     }  # fmt: skip
     return Keyframe(index=index, **{**quiet, **changes})
 

@@ -118,7 +118,8 @@ def test_a_scene_of_several_objects_worked_by_hand(shown, reported):
     behind, unseen.
     """
     car, van, child, rider = (
-        (1, "car", 8.0, 3.0), (2, "truck", 49.0, 0.0), (3, "pedestrian", 12.0, -2.0), (4, "bicycle", -30.0, 0.5)
+        (1, "car", 8.0, 3.0), (2, "truck", 49.0, 0.0),
+        (3, "pedestrian", 12.0, -2.0), (4, "bicycle", -30.0, 0.5),
     )  # fmt: skip
     keyframes = [
         shown(car, (2, "truck", 55.0, 0.0)),
@@ -140,8 +141,9 @@ def test_a_scene_of_several_objects_worked_by_hand(shown, reported):
         (2, 4, "bicycle", 6),
     ]
     assert result.event_rows()[2] == {
-        "scene": "street", "keyframe": 2, "object": 4, "class": "bicycle", "range_m": np.hypot(30.0, 0.5),
-        "azimuth": np.arctan2(0.5, -30.0), "detected": False, "ttfd": 6, "chances": 1,
+        "scene": "street", "keyframe": 2, "object": 4, "class": "bicycle",
+        "range_m": np.hypot(30.0, 0.5), "azimuth": np.arctan2(0.5, -30.0),
+        "detected": False, "ttfd": 6, "chances": 1,
     }  # fmt: skip
 
 

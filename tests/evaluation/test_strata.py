@@ -18,8 +18,8 @@ def labels(shown, kind, name, x, y):
 
 @pytest.mark.parametrize(
     ("distance", "label"),
-    [(0, "below 20 m"), (19.9, "below 20 m"), (20, "20 to 35 m"), (34.9, "20 to 35 m"), (35, "from 35 m"),
-     (50, "from 35 m")],
+    [(0, "below 20 m"), (19.9, "below 20 m"), (20, "20 to 35 m"), (34.9, "20 to 35 m"),
+     (35, "from 35 m"), (50, "from 35 m")],
 )  # fmt: skip
 def test_by_range(shown, distance, label):
     assert labels(shown, "range", "car", 0.0, distance) == [label]
@@ -27,8 +27,9 @@ def test_by_range(shown, distance, label):
 
 @pytest.mark.parametrize(
     ("degrees", "label"),
-    [(0, "front"), (44.9, "front"), (-44.9, "front"), (45.1, "side"), (-90, "side"), (134.9, "side"), (135.1, "rear"),
-     (-135.1, "rear"), (179.9, "rear"), (-179.9, "rear"), (180, "rear"), (-180, "rear")],
+    [(0, "front"), (44.9, "front"), (-44.9, "front"), (45.1, "side"), (-90, "side"),
+     (134.9, "side"), (135.1, "rear"), (-135.1, "rear"), (179.9, "rear"), (-179.9, "rear"),
+     (180, "rear"), (-180, "rear")],
 )  # fmt: skip
 def test_by_sector_with_the_seam_in_the_rear(shown, degrees, label):
     angle = np.deg2rad(degrees)

@@ -1,4 +1,4 @@
-"""The closed loop on small worlds made by hand: when it reads the truth, and what its sensing does."""
+"""The closed loop on small worlds made by hand: when it reads truth, and what its sensing does."""
 
 import numpy as np
 import pytest
@@ -323,7 +323,7 @@ def test_a_detector_that_asks_for_too_many_returns_stays_silent_and_the_car_driv
 
 
 def test_a_collision_is_told_at_its_keyframe_with_the_speed_of_the_contact(street):
-    """Braking from 0.3 s on covers 3.65 m by 0.70 s and 4.05 m by 0.75 s, when 7.75 m/s are left."""
+    """Braking from 0.3 s on covers 3.65 m by 0.70 s, and 4.05 m by 0.75 s with 7.75 m/s left."""
     world = street()
     world.add("bus", "bus", (BUMPER + 3.0 + 3.85 + BUS, 0.0, 0.0))
     loop = loop_in(world)

@@ -181,7 +181,7 @@ def test_misses_are_drawn_anew_for_every_detection_and_frame():
 
 
 def test_misses_do_not_depend_on_what_is_seen():
-    """Two runs that see different bodies agree on every body that both see: common random numbers."""
+    """Two runs that see different bodies agree on each that both see: common random numbers."""
     few = [1, 4, 5, 11, 20]
     some = picture(*[(body, 15 * body, 0, 15 * body + 10, 10) for body in few])
     one, other = (detector(LABELS, false_negative_rate=0.5, seed=3) for _ in range(2))

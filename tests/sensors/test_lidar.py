@@ -152,7 +152,7 @@ def test_noise_is_added_where_there_is_room_and_folded_back_at_the_ends():
 
 @pytest.mark.parametrize("distance", [49.9, 0.4])
 def test_noisy_returns_near_the_ends_do_not_heap_up(grid, bullet, lidar, distance):
-    """A lorry's rear so far away: whoever saw one range again and again would know that it was cut."""
+    """A lorry's rear so far away: one range seen again and again would tell that it was cut."""
     length = CATALOGUE["truck"].size[0]
     bullet.add(CATALOGUE["truck"], (distance + length / 2, 0.0, 0.0))
     clean, bodies = lidar(grid, bullet).fire(everything(grid), SENSOR)

@@ -28,9 +28,9 @@ MOST_MISFIT = 11.3
 dimensions).
 """
 
-_KINDS = [kind for kind in CATALOGUE.values() if kind.label in CLASSES]
-_CLASSES: Cells = np.array([CLASSES.index(kind.label or "") for kind in _KINDS] * 2)
-_SIZES: Floats = np.array([kind.size for kind in _KINDS])
+_CLASSED = [kind for kind in CATALOGUE.values() if kind.label in CLASSES]
+_CLASSES: Cells = np.array([CLASSES.index(kind.label or "") for kind in _CLASSED] * 2)
+_SIZES: Floats = np.array([kind.size for kind in _CLASSED])
 """Length, width, height."""
 _ALONG: Floats = np.concatenate([_SIZES, _SIZES[:, [1, 0, 2]]])
 """(2k, 3) extents along both axes of the sides and up, of bodies heading along the first axis, then
@@ -110,7 +110,7 @@ def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
         sides.low > 0, sides.low + half, np.where(sides.high < 0, sides.high - half, sides.middle)
     )
     centre = along @ sides.axes
-    forward = which // len(_KINDS)
+    forward = which // len(_CLASSED)
     heading = sides.axes[forward] * (
         1.0 if np.round(sides.middle[forward], DECIMALS) >= 0 else -1.0
     )

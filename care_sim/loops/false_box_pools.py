@@ -1,0 +1,67 @@
+"""Where the false boxes of an episode come from: another drive, or another time of the film."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from care_sim.core.conditions import Sensing
+from care_sim.core.rig import Rig
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.film import Film
+from care_sim.sensors.box_pool import BoxPool
+from care_sim.world.world import World
+
+NEAR_S = 2.0
+"""How far in time a false box of a drive may be from the time that it was taken at. A scenario runs
+by the clock: a person seen long before anybody can have emerged would be known as false by the time
+alone. With less, false boxes would fall on what is there so often that those which are left would
+be known by their places.
+"""
+APART_S = 3.0
+"""A film's own boxes become false ones this long before and after they were true: at 30 km/h what
+stands is 25 m nearer by then, and what was 20 m away is passed.
+"""
+
+
+def pool_of_another_drive(
+    world: World,
+    duration_s: float,
+    rig: Rig,
+    sensing: Sensing,
+    seeds: Sequence[np.random.SeedSequence],
+) -> BoxPool:
+    """Drive through `world`, every cell fired, and close it: what the camera shows before misses
+    and delay.
+
+    The car brakes as a full scan makes it brake, whatever the policy, so that all policies meet the
+    same false boxes. The true boxes of a car that hardly brakes differ a little from them.
+
+    With the `seeds` of an episode its mount errs as the episode's does: false boxes of a straight
+    camera would be known among those of a crooked one.
+    """
+    with closing(world):
+        loop = ClosedLoop(world, rig, replace(sensing, false_positive_rate=0.0), seeds)
+        cells = np.arange(rig.grid.size)
+        seen, times_s = [], []
+        over = False
+        while not over:
+            seen.append(loop.seen.detections)
+            times_s.append(world.time)
+            hit = loop.keyframe(cells).impact_speed_mps is not None
+            # The time is a sum of steps, and may lie a last bit short of the end.
+            over = hit or world.time >= duration_s - 1e-9
+    return BoxPool.of(seen, times_s, rig.cameras, near_s=NEAR_S)
+
+
+@lru_cache(maxsize=1)
+def pool_of_film(film: Film) -> BoxPool:
+    """All boxes of a film. In a short one those are usable that are half of it away, so that every
+    keyframe has some.
+    """
+    times_s = [shot.time_s for shot in film.shots]
+    apart_s = min(APART_S, (times_s[-1] - times_s[0]) / 2)
+    seen = [shot.seen.detections for shot in film.shots]
+    return BoxPool.of(seen, times_s, film.cameras, apart_s)

@@ -1,0 +1,186 @@
+"""True boxes seen another time, and small variations of them: what false boxes are made from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import ImageDetections
+from care_sim.sensors.confidence import confidence_of, pixels_of
+
+NEARER, ASIDE, MORE_HIDDEN = 0.05, 0.005, 0.05
+"""How far a varied box departs at most from the true one: its distance along the camera's axis and
+its hidden share by these factors, sideways by this share of the picture's width. Enough that copies
+of a box are as rare as among true boxes, too little to change how true boxes are distributed.
+"""
+
+_BOX = slice(2, 6)
+_CAMERA = 6
+_SAME_TIME_S = 1e-9
+"""Times are sums of keyframes, equal but for the last bits."""
+
+NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
+
+
+@dataclass(frozen=True, eq=False)
+class BoxPool:
+    """Boxes of other times: `rows` (n, 9) as `ImageDetections.rows`, `times_s` (n,) when each was
+    seen, `middles` (n, 2) of their pictures in pixels, `picture_times_s` (k,) when pictures were
+    taken.
+
+    At a time those are usable that were seen at least `apart_s` and at most `near_s` before or
+    after it.
+    """
+
+    rows: Floats
+    times_s: Floats
+    middles: Floats
+    picture_times_s: Floats
+    apart_s: float = 0.0
+    near_s: float = np.inf
+
+    @classmethod
+    def of(
+        cls,
+        seen: Sequence[ImageDetections],
+        times_s: Sequence[float],
+        cameras: Sequence[PinholeCamera],
+        apart_s: float = 0.0,
+        near_s: float = np.inf,
+    ) -> "BoxPool":
+        """All that `cameras` have `seen` (k,) at the times `times_s` (k,)."""
+        rows = np.concatenate([NO_ROWS, *(detections.rows() for detections in seen)])
+        middles = np.array([(camera.width / 2, camera.height / 2) for camera in cameras])
+        own_middles = middles.reshape(-1, 2)[rows[:, _CAMERA].astype(np.int64)]
+        picture_times = np.asarray(times_s, float)
+        times = np.repeat(picture_times, [len(detections) for detections in seen])
+        return cls(rows, times, own_middles, picture_times, apart_s, near_s)
+
+    def usable(self, time_s: float) -> Cells:
+        """The rows that are usable at a time."""
+        return np.flatnonzero(self._is_usable(self.times_s, time_s))
+
+    def relative_density(self, time_s: float) -> float:
+        """Boxes per picture among the usable ones, over boxes per picture of the whole pool."""
+        pictures = np.count_nonzero(self._is_usable(self.picture_times_s, time_s))
+        usual = len(self.rows) / max(len(self.picture_times_s), 1)
+        return len(self.usable(time_s)) / pictures / usual if pictures and usual else 0.0
+
+    def varied(self, rows: Cells, draws: Floats) -> Floats:
+        """(k, 9) the boxes at `rows` (k,), varied as `draws` (k, 3) from 0 to 1 say: nearer or
+        farther, aside, more or less hidden.
+
+        A variation that would leave the edges or the least confidence of the pool is made the other
+        way round; one that would leave them that way too is not made. So nothing heaps up at these
+        bounds. An edge that the picture cuts stays cut.
+        """
+        departures = (2 * draws - 1) * (NEARER, ASIDE, MORE_HIDDEN)
+        there, is_possible = self._moved(rows, departures)
+        back, is_possible_back = self._moved(rows, -departures)
+        varied: Floats = np.where(is_possible_back[:, None], back, self.rows[rows])
+        return np.where(is_possible[:, None], there, varied)
+
+    def _is_usable(self, times_s: Floats, time_s: float) -> NDArray[np.bool_]:
+        away = np.abs(times_s - time_s)
+        is_apart, is_near = away >= self.apart_s - _SAME_TIME_S, away <= self.near_s + _SAME_TIME_S
+        usable: NDArray[np.bool_] = is_apart & is_near
+        return usable
+
+    def _moved(self, rows: Cells, departures: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """(k, 9) the boxes after departures (k, 3), and (k,) which of them are within the bounds of
+        the pool.
+        """
+        moved, middles, limits = self.rows[rows], self.middles[rows], self._limits[rows]
+        boxes = moved[:, _BOX].copy()
+        nearer, aside, hidden = departures.T
+
+        # An object that comes nearer along the camera's axis grows about the middle of the picture,
+        # and its foot stays on the road.
+        ways = np.expm1(nearer)[:, None] * (boxes - np.tile(middles, 2))
+        ways[:, [0, 2]] += (aside * 2 * middles[:, 0])[:, None]
+        after = np.where(boxes == limits, boxes, boxes + _rounded(ways, self._edge_step))
+        moved[:, _BOX] = after
+        moved[:, 1] = self._confidences(rows, box_areas(after), np.exp(hidden))
+
+        low, high = after[:, :2], after[:, 2:]
+        within = (low >= limits[:, :2]) & (high <= limits[:, 2:]) & (low < high)
+        return moved, within.all(axis=1) & (moved[:, 1] >= self.rows[:, 1].min())
+
+    def _confidences(self, rows: Cells, areas: Floats, hidden: Floats) -> Floats:
+        """(k,) of boxes that now have these areas: visible pixels grow with the area, hidden ones
+        by the factor `hidden`.
+        """
+        shares = self._pixels[rows] / box_areas(self.rows[rows, _BOX])
+        if self._is_counted:
+            shares = 1 - (1 - shares) * hidden
+            return confidence_of(np.clip(np.rint(shares * areas), 0, areas))
+        return _rounded(confidence_of(shares * areas), self._confidence_step)
+
+    @cached_property
+    def _pixels(self) -> Floats:
+        return pixels_of(self.rows[:, 1])
+
+    @cached_property
+    def _is_counted(self) -> bool:
+        """Whether confidences come from whole pixels that the boxes hold."""
+        is_whole = _decimal_step(self._pixels) == 1.0
+        # Half a pixel for what rounding a confidence leaves open.
+        return is_whole and bool(np.all(self._pixels <= box_areas(self.rows[:, _BOX]) + 0.5))
+
+    @cached_property
+    def _confidence_step(self) -> float:
+        return _decimal_step(self.rows[:, 1])
+
+    @cached_property
+    def _edge_step(self) -> float:
+        """The step of the edges: 1 of rendered pictures, a few decimals of a detector's file, else
+        0.
+        """
+        # Relative to a first box per camera: a picture that is cut or scaled begins at any number.
+        firsts = np.empty((len(self.rows), 4))
+        for own in self._by_camera():
+            firsts[own] = np.tile(self.rows[own][0, 2:4], 2)
+        return _decimal_step(self.rows[:, _BOX] - firsts)
+
+    @cached_property
+    def _limits(self) -> Floats:
+        """(n, 4) the outermost edges of all boxes in the camera of each: the picture's own where it
+        cuts one.
+        """
+        limits = np.empty((len(self.rows), 4))
+        for own in self._by_camera():
+            boxes = self.rows[own, _BOX]
+            limits[own] = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+        return limits
+
+    def _by_camera(self) -> list[NDArray[np.bool_]]:
+        """(n,) the rows of each camera."""
+        cameras = self.rows[:, _CAMERA]
+        return [cameras == camera for camera in np.unique(cameras)]
+
+
+EMPTY_POOL = BoxPool(NO_ROWS, np.empty(0), np.empty((0, 2)), np.empty(0))
+
+
+def box_areas(boxes: Floats) -> Floats:
+    """(n,) of image boxes (n, 4), square pixels."""
+    areas: Floats = np.prod(np.maximum(boxes[:, 2:] - boxes[:, :2], 0), axis=1)
+    return areas
+
+
+def _decimal_step(values: Floats) -> float:
+    """The coarsest of 1, 0.1, ... 0.0001 of which all values are multiples, 0 where none is."""
+    for digits in range(5):
+        scaled = values * 10**digits
+        if np.all(np.isfinite(scaled)) and np.all(np.abs(scaled - np.rint(scaled)) < 1e-6):
+            return 10.0**-digits
+    return 0.0
+
+
+def _rounded(values: Floats, step: float) -> Floats:
+    return np.rint(values / step) * step if step else values
