@@ -1,4 +1,6 @@
-"""A Griffe extension: a class or module that puts its docstring together when it is imported shows that one."""
+"""A Griffe extension: a class or module that puts its docstring together when it is imported shows
+that one.
+"""
 
 import inspect
 from typing import Any
@@ -21,4 +23,6 @@ class DynamicDocstrings(griffe.Extension):
 def _replace(documented: griffe.Class | griffe.Module) -> None:
     if "__doc__" in documented.members:
         imported = griffe.dynamic_import(documented.path)
-        documented.docstring = griffe.Docstring(inspect.cleandoc(imported.__doc__), parent=documented)
+        documented.docstring = griffe.Docstring(
+            inspect.cleandoc(imported.__doc__), parent=documented
+        )

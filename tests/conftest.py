@@ -1,4 +1,6 @@
-"""Shared scenes: small tables of tracks and detections, and a simulator that is freed after the test."""
+"""Shared scenes: small tables of tracks and detections, and a simulator that is freed after the
+test.
+"""
 
 import sys
 
@@ -15,7 +17,9 @@ from tests.helpers.av2_log import at, box, write
 from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
 from tests.helpers.recordings import Read
 
-settings.register_profile("repeatable", deadline=None, derandomize=True, database=None, max_examples=60)
+settings.register_profile(
+    "repeatable", deadline=None, derandomize=True, database=None, max_examples=60
+)
 settings.load_profile("repeatable")
 
 
@@ -51,14 +55,18 @@ def seen():
 
     def make(*objects, camera=0, yaw_change=0.0):
         rows = [[CLASSES.index(name), 0.9, *box, camera, 0.0, yaw_change] for name, *box in objects]
-        return ImageDetections.from_rows(np.array(rows, dtype=float).reshape(-1, len(ImageDetections.COLUMNS)))
+        return ImageDetections.from_rows(
+            np.array(rows, dtype=float).reshape(-1, len(ImageDetections.COLUMNS))
+        )
 
     return make
 
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory):
-    """An Argoverse 2 log of 10 keyframes: 5 m/s past a van and two cars; halfway a person steps out of a house."""
+    """An Argoverse 2 log of 10 keyframes: 5 m/s past a van and two cars; halfway a person steps out
+    of a house.
+    """
 
     def seen(sweep):
         ahead = 30.0 - 0.5 * sweep
@@ -67,7 +75,9 @@ def drive(tmp_path_factory):
             box("REGULAR_VEHICLE", (ahead + 9.0, -4.0, 0.42), track="parked"),
             box("REGULAR_VEHICLE", (ahead - 15.0, 3.5, 0.42), yaw=3.1, track="oncoming"),
         ]
-        person = box("PEDESTRIAN", (ahead + 6.0, 7.0 - 0.1 * (sweep - 25), 0.6), (0.6, 0.7, 1.8), yaw=-1.57)
+        person = box(
+            "PEDESTRIAN", (ahead + 6.0, 7.0 - 0.1 * (sweep - 25), 0.6), (0.6, 0.7, 1.8), yaw=-1.57
+        )
         return [*standing, person] if sweep >= 25 else standing
 
     folder = tmp_path_factory.mktemp("logs") / "drive"
@@ -85,7 +95,9 @@ def open3d():
 
 @pytest.fixture
 def install(tmp_path, monkeypatch):
-    """Puts a distribution on the path, as pip would leave it: one module, and policies or detectors by name."""
+    """Puts a distribution on the path, as pip would leave it: one module, and policies or detectors
+    by name.
+    """
 
     def put(package, source, group="care_sim.policies", **things):
         place = tmp_path / package
@@ -119,6 +131,8 @@ def third_party(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def read():
-    """Reads a recording back (`tests.helpers.recordings.Read`); skips what needs it where Rerun is not installed."""
+    """Reads a recording back (`tests.helpers.recordings.Read`); skips what needs it where Rerun is
+    not installed.
+    """
     pytest.importorskip("rerun")
     return Read

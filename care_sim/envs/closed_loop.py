@@ -114,10 +114,14 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         whole_steps(keyframe_s)
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
         kind = SCENARIOS[self.scenario_name]
-        check_arguments(type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__])
+        check_arguments(
+            type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__]
+        )
         conditions = conditions_of(parameters)
         check_engine(conditions.engine)
-        super().__init__(conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info)
+        super().__init__(
+            conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info
+        )
         self.scenario = make_scenario(self.scenario_name, **parameters)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode

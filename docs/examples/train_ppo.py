@@ -1,9 +1,11 @@
 """Proximal policy optimisation in one file: a learner that ranks sectors for the LiDAR's reserve.
 
-    python docs/examples/train_ppo.py        # about five minutes on one core; needs the extra rl, for PyTorch
+    python docs/examples/train_ppo.py        # about five minutes on one core; needs the extra rl,
+    for PyTorch
 
-Everything is here but the environment: the network, the rollout, the advantages, the update. `care-sim train ppo` does
-the same with Stable-Baselines3, keeps checkpoints, and makes the weights a policy of the benchmark.
+Everything is here but the environment: the network, the rollout, the advantages, the update.
+`care-sim train ppo` does the same with Stable-Baselines3, keeps checkpoints, and makes the weights
+a policy of the benchmark.
 """
 
 import gymnasium as gym
@@ -24,7 +26,9 @@ TRAINING_SEEDS = 10_000  # lower ones are for tests
 
 
 class Sectors(nn.Module):
-    """One small network slides over the 4 x 32 sectors: 2 x 2 blocks each, and one more on every side."""
+    """One small network slides over the 4 x 32 sectors: 2 x 2 blocks each, and one more on every
+    side.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -59,7 +63,9 @@ class Agent(nn.Module):
 
 def make_env() -> gym.Env:
     """The dense street at 3% of the cells, rewarded for detecting as early as a full scan would."""
-    env = gym.make("CARE-Dense-v0", budget=0.03, reward_weights={"gain": 10.0}, disable_env_checker=True)
+    env = gym.make(
+        "CARE-Dense-v0", budget=0.03, reward_weights={"gain": 10.0}, disable_env_checker=True
+    )
     return gym.wrappers.RecordEpisodeStatistics(GridObservation(SectorReserve(env)))
 
 
@@ -69,7 +75,9 @@ def tensors(observation: dict[str, np.ndarray]) -> tuple[torch.Tensor, torch.Ten
 
 
 def advantages(rewards: torch.Tensor, values: torch.Tensor, ends: torch.Tensor) -> torch.Tensor:
-    """Generalised advantages (ROLLOUT, ENVIRONMENTS); `values` has one row more, an end cuts the trace."""
+    """Generalised advantages (ROLLOUT, ENVIRONMENTS); `values` has one row more, an end cuts the
+    trace.
+    """
     result, trace = torch.zeros_like(rewards), torch.zeros(ENVIRONMENTS)
     for t in reversed(range(ROLLOUT)):
         surprise = rewards[t] + DISCOUNT * values[t + 1] * (1 - ends[t]) - values[t]
@@ -103,17 +111,34 @@ def main() -> None:
             with torch.no_grad():
                 chance, value = agent(grid, ego)
             action = chance.sample()
-            observation, reward, terminated, truncated, info = envs.step(action.clamp(-1, 1).numpy())
+            observation, reward, terminated, truncated, info = envs.step(
+                action.clamp(-1, 1).numpy()
+            )
             end = torch.as_tensor(terminated | truncated, dtype=torch.float32)
             before = chance.log_prob(action).sum((1, 2))
-            steps.append((grid, ego, action, before, torch.as_tensor(reward, dtype=torch.float32), end, value))
+            steps.append(
+                (
+                    grid,
+                    ego,
+                    action,
+                    before,
+                    torch.as_tensor(reward, dtype=torch.float32),
+                    end,
+                    value,
+                )
+            )
             if "final_info" in info:
                 returns += info["final_info"]["episode"]["r"][info["_final_info"]].tolist()
-        grid, ego, action, before, rewards, ends, values = (torch.stack(column) for column in zip(*steps, strict=True))
+        grid, ego, action, before, rewards, ends, values = (
+            torch.stack(column) for column in zip(*steps, strict=True)
+        )
         with torch.no_grad():
             last = agent(*tensors(observation))[1]
         advantage = advantages(rewards, torch.cat([values, last[None]]), ends)
-        rows = [part.flatten(0, 1) for part in (grid, ego, action, before, advantage, advantage + values)]
+        rows = [
+            part.flatten(0, 1)
+            for part in (grid, ego, action, before, advantage, advantage + values)
+        ]
         for _ in range(EPOCHS):
             for chosen in torch.randperm(ROLLOUT * ENVIRONMENTS).split(BATCH):
                 loss = loss_of(agent, [row[chosen] for row in rows])
@@ -121,7 +146,10 @@ def main() -> None:
                 loss.backward()
                 nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
                 optimiser.step()
-        print(f"{(update + 1) * ROLLOUT * ENVIRONMENTS:6} steps: return {np.mean(returns):7.2f}", flush=True)
+        print(
+            f"{(update + 1) * ROLLOUT * ENVIRONMENTS:6} steps: return {np.mean(returns):7.2f}",
+            flush=True,
+        )
     envs.close()
 
 

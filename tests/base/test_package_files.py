@@ -133,9 +133,13 @@ def test_what_lies_behind_links_counts_and_links_that_lead_back_end(lay):
 PATH = 'Path(os.environ["DATA"]) / "w.npz"'
 NAMED = {
     "a constant of the class, made by a function": f"class Mine(History):\n    W = {PATH}\n{MAKE}",
-    "a default of the class, made by a function": f"class Mine(History):\n    def __init__(s, w={PATH}): pass\n{MAKE}",
+    "a default of the class, made by a function": (
+        f"class Mine(History):\n    def __init__(s, w={PATH}): pass\n{MAKE}"
+    ),
     "a constant of another class": f"class Net:\n    W = {PATH}\n",
-    "a default of a static method": f"class Net:\n    @staticmethod\n    def load(w={PATH}): pass\n",
+    "a default of a static method": (
+        f"class Net:\n    @staticmethod\n    def load(w={PATH}): pass\n"
+    ),
     "a default of a helper": f"def load(w={PATH}): pass\n",
     "a default by name of a helper": f"def load(*, w={PATH}): pass\n",
     "a default of a helper that caches": f"@cache\ndef load(w={PATH}): pass\n",

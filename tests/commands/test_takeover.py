@@ -59,8 +59,8 @@ def test_rows_that_nobody_asks_for_now_are_named(folder):
     with pytest.raises(InvalidInput) as refused:
         check_results(folder, asked, PAPER)
     assert (
-        "holds 20 episodes of the study paper; 10 of them, the first dense all-camera 0.03, would be gone"
-        in str(refused.value)
+        "holds 20 episodes of the study paper; 10 of them, "
+        "the first dense all-camera 0.03, would be gone" in str(refused.value)
     )
     whole = grid(["dense"], ["history", "all-camera", "care", "full"], [0.03], range(5))
     check_results(folder, whole, PAPER)
@@ -207,12 +207,13 @@ def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
             conduct(other, tmp_path, workers=1)
         told = str(refused.value)
         assert (
-            f"holds the unfinished study sweep, 4 rows; {gone} of them, the first dartout history 0.1"
-            in told
+            f"holds the unfinished study sweep, 4 rows; {gone} of them, "
+            "the first dartout history 0.1" in told
         )
         assert what in told
         assert told.endswith(
-            ", are not asked for now: give the command that began it, another --out, or --force to play beside them"
+            ", are not asked for now: give the command that began it, another --out, or --force "
+            "to play beside them"
         )
     assert held(tmp_path) == before
     assert conduct(short(("history", "care"), range(4)), tmp_path, workers=1) == []

@@ -14,7 +14,13 @@ def turn(yaw=0.0, pitch=0.0, roll=0.0):
 
 def box(category, place, size=(4.0, 2.0, 1.5), yaw=0.0, track=None, points=10, **angles):
     """An annotation of one sweep, in the car's frame."""
-    keys = dict(zip(("tx_m", "ty_m", "tz_m", "length_m", "width_m", "height_m"), (*place, *size), strict=True))
+    keys = dict(
+        zip(
+            ("tx_m", "ty_m", "tz_m", "length_m", "width_m", "height_m"),
+            (*place, *size),
+            strict=True,
+        )
+    )
     keys |= {"track_uuid": track or category, "category": category, "num_interior_pts": points}
     return keys | turn(yaw, **angles)
 

@@ -1,4 +1,6 @@
-"""The processes that a process has started, found by a mark in their environment, whoever their parent is by now."""
+"""The processes that a process has started, found by a mark in their environment, whoever their
+parent is by now.
+"""
 
 import os
 import signal
@@ -24,7 +26,11 @@ class Marked:
         quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
         environment = os.environ | {name: value}
         self.process = subprocess.Popen(
-            command, env=environment, start_new_session=True, preexec_fn=listen_to_interrupts, **quiet
+            command,
+            env=environment,
+            start_new_session=True,
+            preexec_fn=listen_to_interrupts,
+            **quiet,
         )
 
     def __enter__(self):
@@ -38,7 +44,11 @@ class Marked:
 
     def alive(self):
         """Those that run, the process itself included."""
-        return [int(folder.name) for folder in Path("/proc").iterdir() if folder.name.isdigit() and self._runs(folder)]
+        return [
+            int(folder.name)
+            for folder in Path("/proc").iterdir()
+            if folder.name.isdigit() and self._runs(folder)
+        ]
 
     def all_end_within(self, seconds):
         """Whether none is left after that time."""

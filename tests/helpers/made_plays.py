@@ -15,8 +15,12 @@ STRATA = {
 TAGS = {"history-oracle": "privileged", "random-points": "non-causal"}
 
 
-def play(scene, policy, delays, frames_found, *, budget=0.1, source="streets", detector="returns", **more):
-    """A play that found each event after these keyframes, and of each event's object frames so many."""
+def play(
+    scene, policy, delays, frames_found, *, budget=0.1, source="streets", detector="returns", **more
+):
+    """A play that found each event after these keyframes, and of each event's object frames so
+    many.
+    """
     known = {field.name for field in fields(Conditions)}
     conditions = Conditions(**{name: value for name, value in more.items() if name in known})
     others = {name: value for name, value in more.items() if name not in known}
@@ -41,14 +45,26 @@ def play(scene, policy, delays, frames_found, *, budget=0.1, source="streets", d
 
 
 def found(events, at_once, late=0):
-    """Delays of so many events, the first ones found at once, the next ones a keyframe late, the rest never."""
+    """Delays of so many events, the first ones found at once, the next ones a keyframe late, the
+    rest never.
+    """
     return [0] * at_once + [1] * late + [CENSORED_AT] * (events - at_once - late)
 
 
 def study(plays, scenes=6, budgets=(0.1, 0.2, 0.35), seeds=(0, 1, 2), events=20, **more):
-    """`plays[policy]` is (events found at once, object frames found an event), for every scene alike."""
+    """`plays[policy]` is (events found at once, object frames found an event), for every scene
+    alike.
+    """
     return [
-        play(f"scene {n:03d}", policy, found(events, sighted), [frames] * events, budget=b, floor_seed=seed, **more)
+        play(
+            f"scene {n:03d}",
+            policy,
+            found(events, sighted),
+            [frames] * events,
+            budget=b,
+            floor_seed=seed,
+            **more,
+        )
         for policy, (sighted, frames) in plays.items()
         for b in ((1.0,) if policy == "full" else budgets)
         for seed in ((0,) if policy == "full" else seeds)

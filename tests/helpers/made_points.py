@@ -9,7 +9,9 @@ HEIGHT = 1.84
 
 
 def face(start, end, low, high, step=0.1):
-    """Points on an upright face between two places x, y, from `low` to `high` metres above the road."""
+    """Points on an upright face between two places x, y, from `low` to `high` metres above the
+    road.
+    """
     start, end = np.array(start, float), np.array(end, float)
     along = np.linspace(0, 1, max(2, round(np.hypot(*(end - start)) / step) + 1))
     places = start + along[:, None] * (end - start)
@@ -19,7 +21,10 @@ def face(start, end, low, high, step=0.1):
 
 def shell(x, y, yaw, length, width, height):
     """Points on the two upright faces of a box that a sensor at the origin sees."""
-    corners = turned(0.5 * np.array([[length, width], [-length, width], [-length, -width], [length, -width]]), yaw)
+    corners = turned(
+        0.5 * np.array([[length, width], [-length, width], [-length, -width], [length, -width]]),
+        yaw,
+    )
     corners += np.array([x, y])
     pairs = [(corners[i], corners[(i + 1) % 4]) for i in range(4)]
     shown = [(a, b) for a, b in pairs if a[0] * b[1] - a[1] * b[0] < 0]

@@ -24,7 +24,10 @@ def row(config, distance, **changes):
 def rows(policy, distances, scenario="dense", budget=0.03, changes=None, **conditions):
     """One row a distance, of seeds from 0."""
     configs = grid([scenario], [policy], [budget], range(len(distances)), **conditions)
-    return [row(config, distance, **(changes or {})) for config, distance in zip(configs, distances, strict=True)]
+    return [
+        row(config, distance, **(changes or {}))
+        for config, distance in zip(configs, distances, strict=True)
+    ]
 
 
 STUDY = [

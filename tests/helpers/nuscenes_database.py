@@ -9,45 +9,77 @@ LIDAR = ((0.943713, 0.0, 1.84023), (0.7077955, -0.0064922, 0.0106462, -0.7063073
 SENSORS = {
     "LIDAR_TOP": LIDAR,
     "CAM_FRONT": (
-        (1.70079, 0.01595, 1.51096), (0.4998015, -0.5030316, 0.4997798, -0.4973708),
+        (1.70079, 0.01595, 1.51096),
+        (0.4998015, -0.5030316, 0.4997798, -0.4973708),
         (1266.417, 816.267, 491.507),
     ),
     "CAM_FRONT_LEFT": (
-        (1.52388, 0.49463, 1.50933), (0.6757265, -0.6736267, 0.2121402, -0.2112283),
+        (1.52388, 0.49463, 1.50933),
+        (0.6757265, -0.6736267, 0.2121402, -0.2112283),
         (1272.598, 826.615, 479.752),
     ),
     "CAM_FRONT_RIGHT": (
-        (1.55085, -0.49340, 1.49575), (0.2060348, -0.2026941, 0.6824508, -0.6713611),
+        (1.55085, -0.49340, 1.49575),
+        (0.2060348, -0.2026941, 0.6824508, -0.6713611),
         (1260.847, 807.968, 495.334),
     ),
     "CAM_BACK_LEFT": (
-        (1.03569, 0.48480, 1.59097), (0.6924186, -0.7031619, -0.1164834, 0.1120332),
+        (1.03569, 0.48480, 1.59097),
+        (0.6924186, -0.7031619, -0.1164834, 0.1120332),
         (1256.741, 792.113, 492.776),
     ),
     "CAM_BACK_RIGHT": (
-        (1.01488, -0.48057, 1.56240), (0.1228098, -0.1324008, -0.7004306, 0.6904960),
+        (1.01488, -0.48057, 1.56240),
+        (0.1228098, -0.1324008, -0.7004306, 0.6904960),
         (1259.514, 807.253, 501.196),
     ),
     "CAM_BACK": (
-        (0.02833, 0.00345, 1.57910), (0.5037873, -0.4974025, -0.4941850, 0.5045496),
+        (0.02833, 0.00345, 1.57910),
+        (0.5037873, -0.4974025, -0.4941850, 0.5045496),
         (809.221, 829.220, 481.778),
     ),
-}  # fmt: skip
+}
 CATEGORIES = (
-    "vehicle.car", "human.pedestrian.adult", "vehicle.bicycle", "vehicle.trailer", "vehicle.bus.rigid", "vehicle.truck",
-)  # fmt: skip
-ATTRIBUTES = ("vehicle.parked", "vehicle.moving", "cycle.without_rider", "pedestrian.standing", "pedestrian.moving")
+    "vehicle.car",
+    "human.pedestrian.adult",
+    "vehicle.bicycle",
+    "vehicle.trailer",
+    "vehicle.bus.rigid",
+    "vehicle.truck",
+)
+ATTRIBUTES = (
+    "vehicle.parked",
+    "vehicle.moving",
+    "cycle.without_rider",
+    "pedestrian.standing",
+    "pedestrian.moving",
+)
 LEVELS = {"1": "v0-40", "2": "v40-60", "3": "v60-80", "4": "v80-100"}
 
 
-def annotated(category, place, size=(1.9, 4.6, 1.7), yaw=0.0, instance=None, visible="4", points=10, attribute=None):
+def annotated(
+    category,
+    place,
+    size=(1.9, 4.6, 1.7),
+    yaw=0.0,
+    instance=None,
+    visible="4",
+    points=10,
+    attribute=None,
+):
     """An annotation in the world; `size` is width, length, height as in the table."""
     attributes = [f"attribute-{attribute}"] if attribute else []
     return {
-        "instance": instance or category, "category": category, "translation": list(place), "size": list(size),
-        "rotation": [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)], "visibility_token": visible,
-        "num_lidar_pts": points, "num_radar_pts": 0, "attribute_tokens": attributes,
-    }  # fmt: skip
+        "instance": instance or category,
+        "category": category,
+        "translation": list(place),
+        "size": list(size),
+        "rotation": [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)],
+        "visibility_token": visible,
+        "num_lidar_pts": points,
+        "num_radar_pts": 0,
+        "attribute_tokens": attributes,
+    }
 
 
 def as_recorded(points):
@@ -58,19 +90,36 @@ def as_recorded(points):
 
 
 def pose(x=0.0, y=0.0, yaw=0.0):
-    return {"translation": [x, y, 0.0], "rotation": [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))]}
+    return {
+        "translation": [x, y, 0.0],
+        "rotation": [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))],
+    }
 
 
 def write(root, scenes, version="v1.0-trainval"):
     """`scenes` maps names to lists of samples: (annotations, pose, points of the sweep (n, 5))."""
     tables = {name: [] for name in TABLES}
-    tables["sensor"] = [{"token": f"sensor-{c}", "channel": c, "modality": modality(c)} for c in SENSORS]
-    tables["calibrated_sensor"] = [calibration(channel, *values) for channel, values in SENSORS.items()]
-    tables["category"] = [{"token": f"category-{name}", "name": name, "description": ""} for name in CATEGORIES]
-    tables["attribute"] = [{"token": f"attribute-{name}", "name": name, "description": ""} for name in ATTRIBUTES]
-    tables["visibility"] = [{"token": token, "level": level, "description": ""} for token, level in LEVELS.items()]
-    tables["log"] = [{"token": "log", "logfile": "", "vehicle": "n015", "date_captured": "", "location": ""}]
-    tables["map"] = [{"token": "map", "log_tokens": ["log"], "category": "semantic_prior", "filename": ""}]
+    tables["sensor"] = [
+        {"token": f"sensor-{c}", "channel": c, "modality": modality(c)} for c in SENSORS
+    ]
+    tables["calibrated_sensor"] = [
+        calibration(channel, *values) for channel, values in SENSORS.items()
+    ]
+    tables["category"] = [
+        {"token": f"category-{name}", "name": name, "description": ""} for name in CATEGORIES
+    ]
+    tables["attribute"] = [
+        {"token": f"attribute-{name}", "name": name, "description": ""} for name in ATTRIBUTES
+    ]
+    tables["visibility"] = [
+        {"token": token, "level": level, "description": ""} for token, level in LEVELS.items()
+    ]
+    tables["log"] = [
+        {"token": "log", "logfile": "", "vehicle": "n015", "date_captured": "", "location": ""}
+    ]
+    tables["map"] = [
+        {"token": "map", "log_tokens": ["log"], "category": "semantic_prior", "filename": ""}
+    ]
     for name, samples in scenes.items():
         add_scene(tables, root, name, samples)
     folder = root / version
@@ -81,9 +130,20 @@ def write(root, scenes, version="v1.0-trainval"):
 
 
 TABLES = (
-    "attribute", "calibrated_sensor", "category", "ego_pose", "instance", "log", "map", "sample",
-    "sample_annotation", "sample_data", "scene", "sensor", "visibility",
-)  # fmt: skip
+    "attribute",
+    "calibrated_sensor",
+    "category",
+    "ego_pose",
+    "instance",
+    "log",
+    "map",
+    "sample",
+    "sample_annotation",
+    "sample_data",
+    "scene",
+    "sensor",
+    "visibility",
+)
 
 
 def modality(channel):
@@ -94,21 +154,38 @@ def calibration(channel, translation, rotation, intrinsic):
     focal, u, v = intrinsic or (0, 0, 0)
     matrix = [[focal, 0.0, u], [0.0, focal, v], [0.0, 0.0, 1.0]] if intrinsic else []
     return {
-        "token": f"calibrated-{channel}", "sensor_token": f"sensor-{channel}", "translation": list(translation),
-        "rotation": list(rotation), "camera_intrinsic": matrix,
-    }  # fmt: skip
+        "token": f"calibrated-{channel}",
+        "sensor_token": f"sensor-{channel}",
+        "translation": list(translation),
+        "rotation": list(rotation),
+        "camera_intrinsic": matrix,
+    }
 
 
 def add_scene(tables, root, name, samples):
     tokens = [f"{name}-{n}" for n in range(len(samples))]
-    tables["scene"].append({
-        "token": f"scene-{name}", "log_token": "log", "nbr_samples": len(samples), "name": name, "description": "",
-        "first_sample_token": tokens[0], "last_sample_token": tokens[-1],
-    })  # fmt: skip
+    tables["scene"].append(
+        {
+            "token": f"scene-{name}",
+            "log_token": "log",
+            "nbr_samples": len(samples),
+            "name": name,
+            "description": "",
+            "first_sample_token": tokens[0],
+            "last_sample_token": tokens[-1],
+        }
+    )
     for n, (boxes, car, points) in enumerate(samples):
-        links = {"prev": tokens[n - 1] if n else "", "next": tokens[n + 1] if n + 1 < len(tokens) else ""}
+        links = {
+            "prev": tokens[n - 1] if n else "",
+            "next": tokens[n + 1] if n + 1 < len(tokens) else "",
+        }
         tables["sample"].append(
-            {"token": tokens[n], "timestamp": 1_532_402_927_000_000 + n * 500_000, "scene_token": f"scene-{name}"}
+            {
+                "token": tokens[n],
+                "timestamp": 1_532_402_927_000_000 + n * 500_000,
+                "scene_token": f"scene-{name}",
+            }
             | links
         )
         for channel in SENSORS:
@@ -123,11 +200,22 @@ def add_data(tables, root, sample, channel, car, points):
     suffix = "pcd.bin" if channel == "LIDAR_TOP" else "jpg"
     filename = f"samples/{channel}/{sample}.{suffix}"
     camera = channel != "LIDAR_TOP"
-    tables["sample_data"].append({
-        "token": token, "sample_token": sample, "ego_pose_token": f"pose-{token}", "is_key_frame": True,
-        "calibrated_sensor_token": f"calibrated-{channel}", "filename": filename, "fileformat": suffix,
-        "width": 1600 * camera, "height": 900 * camera, "timestamp": 0, "prev": "", "next": "",
-    })  # fmt: skip
+    tables["sample_data"].append(
+        {
+            "token": token,
+            "sample_token": sample,
+            "ego_pose_token": f"pose-{token}",
+            "is_key_frame": True,
+            "calibrated_sensor_token": f"calibrated-{channel}",
+            "filename": filename,
+            "fileformat": suffix,
+            "width": 1600 * camera,
+            "height": 900 * camera,
+            "timestamp": 0,
+            "prev": "",
+            "next": "",
+        }
+    )
     if not camera:
         (root / filename).parent.mkdir(parents=True, exist_ok=True)
         np.asarray(points, "<f4").tofile(root / filename)
@@ -137,13 +225,25 @@ def add_box(tables, token, sample, scene, box):
     box = dict(box)
     instance, category = f"{scene}-{box.pop('instance')}", box.pop("category")
     if instance not in [row["token"] for row in tables["instance"]]:
-        tables["instance"].append({
-            "token": instance, "category_token": f"category-{category}", "nbr_annotations": 0,
-            "first_annotation_token": token, "last_annotation_token": "",
-        })  # fmt: skip
+        tables["instance"].append(
+            {
+                "token": instance,
+                "category_token": f"category-{category}",
+                "nbr_annotations": 0,
+                "first_annotation_token": token,
+                "last_annotation_token": "",
+            }
+        )
     prev = link(tables, instance, token)
     tables["sample_annotation"].append(
-        {"token": token, "sample_token": sample, "instance_token": instance, "prev": prev, "next": ""} | box
+        {
+            "token": token,
+            "sample_token": sample,
+            "instance_token": instance,
+            "prev": prev,
+            "next": "",
+        }
+        | box
     )
 
 

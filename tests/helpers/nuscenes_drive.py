@@ -11,14 +11,20 @@ KEYFRAMES = 5
 SPEED = 4.0
 """Of the car, metres a keyframe."""
 SIZES = {
-    "car": (1.9, 4.6, 1.7), "truck": (2.5, 7.0, 2.9), "bus": (2.9, 11.0, 3.4), "bicycle": (0.6, 1.8, 1.4),
+    "car": (1.9, 4.6, 1.7),
+    "truck": (2.5, 7.0, 2.9),
+    "bus": (2.9, 11.0, 3.4),
+    "bicycle": (0.6, 1.8, 1.4),
     "pedestrian": (0.7, 0.7, 1.8),
-}  # fmt: skip
+}
 """Width, length and height in metres."""
 CATEGORIES = {
-    "car": "vehicle.car", "truck": "vehicle.truck", "bus": "vehicle.bus.rigid", "bicycle": "vehicle.bicycle",
+    "car": "vehicle.car",
+    "truck": "vehicle.truck",
+    "bus": "vehicle.bus.rigid",
+    "bicycle": "vehicle.bicycle",
     "pedestrian": "human.pedestrian.adult",
-}  # fmt: skip
+}
 OBJECTS = [
     ("car", (30.0, 4.0), (0.0, 0.0), 0.2, "vehicle.parked"),
     ("car", (38.0, -3.5), (-6.0, 0.5), 3.1, "vehicle.moving"),
@@ -28,7 +34,9 @@ OBJECTS = [
     ("pedestrian", (22.0, 6.5), (0.0, -1.2), -1.6, "pedestrian.moving"),
     ("pedestrian", (28.0, 7.5), (0.0, 0.0), 0.0, "pedestrian.standing"),
 ]
-"""Class, place at the start, velocity (m/s), heading and attribute; axes x along the drive, y to its left."""
+"""Class, place at the start, velocity (m/s), heading and attribute; axes x along the drive, y to
+its left.
+"""
 POINTS = 60
 """In every box, a return each."""
 
@@ -48,14 +56,20 @@ def sample(heading, number, rng):
     boxes = [placed(heading, number, n, *thing) for n, thing in enumerate(OBJECTS)]
     car = Frame(x, y, 0.0, heading)
     points = [in_box(box, rng) for box in boxes]
-    return boxes, pose(x, y, heading), as_recorded(car.vectors_to_local(np.concatenate(points) - car.origin))
+    return (
+        boxes,
+        pose(x, y, heading),
+        as_recorded(car.vectors_to_local(np.concatenate(points) - car.origin)),
+    )
 
 
 def placed(heading, number, instance, name, place, velocity, yaw, attribute):
     spot = turned(np.add(place, np.multiply(velocity, 0.5 * number)), heading)
     size = SIZES[name]
     centre = (*spot.tolist(), size[2] / 2)
-    return annotated(CATEGORIES[name], centre, size, heading + yaw, f"{name}-{instance}", "4", POINTS, attribute)
+    return annotated(
+        CATEGORIES[name], centre, size, heading + yaw, f"{name}-{instance}", "4", POINTS, attribute
+    )
 
 
 def in_box(box, rng):

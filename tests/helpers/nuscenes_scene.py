@@ -12,7 +12,9 @@ CAR = annotated("vehicle.car", (20.0, 2.0, 0.85), instance="a")
 WORLD = np.array(
     [[18.0, 2.0, 0.8], [18.1, 1.9, 0.5], [18.0, 2.0, 0.3], [30.0, -5.0, 0.1], [0.95, 0.2, 1.4]]
 )
-"""Points in the world, the car at its origin: three on the rear of CAR, one on the road, one on our own roof."""
+"""Points in the world, the car at its origin: three on the rear of CAR, one on the road, one on our
+own roof.
+"""
 
 
 def database(folder, samples=None):

@@ -1,4 +1,6 @@
-"""Environment variables under which numpy, OpenBLAS and numba compute as on a processor of fewer features."""
+"""Environment variables under which numpy, OpenBLAS and numba compute as on a processor of fewer
+features.
+"""
 
 import os
 
@@ -11,11 +13,15 @@ GROUPS = ("X86_V3", "X86_V4", "AVX512_ICL", "AVX512_SPR")
 
 
 def reduced(code=None):
-    """What a child process is given; with a folder for `code`, numba compiles for a processor of fewer features too.
-    Skips the test where there is nothing to leave out.
+    """What a child process is given; with a folder for `code`, numba compiles for a processor of
+    fewer features too. Skips the test where there is nothing to leave out.
     """
     present = [name for name in GROUPS if __cpu_features__.get(name)]
     if "X86_V4" not in present:
         pytest.skip(f"numpy {np.__version__} finds no AVX-512 here that could be left out")
     compiled = {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(code)} if code else {}
-    return os.environ | compiled | {"NPY_DISABLE_CPU_FEATURES": " ".join(present), "OPENBLAS_CORETYPE": "Nehalem"}
+    return (
+        os.environ
+        | compiled
+        | {"NPY_DISABLE_CPU_FEATURES": " ".join(present), "OPENBLAS_CORETYPE": "Nehalem"}
+    )

@@ -1,4 +1,6 @@
-"""Small classifiers of single camera boxes: how well can true ones and false ones be told apart by their numbers?"""
+"""Small classifiers of single camera boxes: how well can true ones and false ones be told apart by
+their numbers?
+"""
 
 import numpy as np
 from scipy.optimize import minimize
@@ -10,18 +12,20 @@ from care_sim.core.types import CLASSES
 BOXES = 300
 """Of each kind, to learn from and as many to be tested on."""
 CHANCE = 0.07
-"""How far from 0.5 the area under the curve may be: for n boxes of each kind that nothing tells apart its standard
-error is 1 / sqrt(6 n) = 0.024 (Hanley and McNeil 1982); this is three of them, for the farthest of three classifiers.
+"""How far from 0.5 the area under the curve may be: for n boxes of each kind that nothing tells
+apart its standard error is 1 / sqrt(6 n) = 0.024 (Hanley and McNeil 1982); this is three of them,
+for the farthest of three classifiers.
 """
 
 
 def areas_under_the_curve(true, false, rng):
-    """Of every classifier by name. `true` and `false` are tables of detections, one an episode; the first half of the
-    episodes is learned from, the other tested on.
+    """Of every classifier by name. `true` and `false` are tables of detections, one an episode; the
+    first half of the episodes is learned from, the other tested on.
     """
     half = len(true) // 2
     learned, tested = (
-        [_drawn(tables[part], rng) for tables in (true, false)] for part in (slice(half), slice(half, None))
+        [_drawn(tables[part], rng) for tables in (true, false)]
+        for part in (slice(half), slice(half, None))
     )
     seen, kinds = _features(np.concatenate(learned)), np.repeat([0.0, 1.0], BOXES)
     middle, spread = seen.mean(axis=0), seen.std(axis=0) + 1e-9
@@ -36,13 +40,27 @@ def _drawn(tables, rng):
 
 
 def _features(rows):
-    """Class, confidence, visible pixels and how far they are from a whole number, edges, size, pixels of the area."""
+    """Class, confidence, visible pixels and how far they are from a whole number, edges, size,
+    pixels of the area.
+    """
     label, sure, left, top, right, bottom, camera = rows[:, :7].astype(float).T
     width, height = right - left, bottom - top
     pixels = 36 * sure / np.maximum(1 - sure, 1e-9)
     classes = label[:, None] == np.arange(len(CLASSES))
-    numbers = (sure, np.log(pixels + 1), np.abs(pixels - np.rint(pixels)), left, top, right, bottom, width, height)
-    return np.column_stack([classes, *numbers, np.log(width * height), pixels / (width * height), camera])
+    numbers = (
+        sure,
+        np.log(pixels + 1),
+        np.abs(pixels - np.rint(pixels)),
+        left,
+        top,
+        right,
+        bottom,
+        width,
+        height,
+    )
+    return np.column_stack(
+        [classes, *numbers, np.log(width * height), pixels / (width * height), camera]
+    )
 
 
 def _area(positive, scores):
@@ -60,7 +78,9 @@ def _logistic(seen, kinds, new):
         value = np.mean(np.logaddexp(0, scores) - kinds * scores) + 1e-3 * weights @ weights
         return value, table(seen).T @ error / len(kinds) + 2e-3 * weights
 
-    return table(new) @ minimize(loss, np.zeros(1 + 2 * seen.shape[1]), jac=True, method="L-BFGS-B").x
+    return (
+        table(new) @ minimize(loss, np.zeros(1 + 2 * seen.shape[1]), jac=True, method="L-BFGS-B").x
+    )
 
 
 def _neighbours(seen, kinds, new, number=15):

@@ -1,4 +1,6 @@
-"""The official devkit scores what we export: `make test-official` makes its environment and runs these."""
+"""The official devkit scores what we export: `make test-official` makes its environment and runs
+these.
+"""
 
 import json
 import subprocess
@@ -24,7 +26,9 @@ pytestmark = [
 ]
 
 OTHERS = {"trailer", "construction_vehicle", "motorcycle", "traffic_cone", "barrier"}
-"""Official classes beyond the five: not annotated here, so that the devkit gives them 0 and an error of 1."""
+"""Official classes beyond the five: not annotated here, so that the devkit gives them 0 and an
+error of 1.
+"""
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,9 @@ def test_the_browser_is_installed_without_a_question(tmp_path):
         (programs / name).write_text(f'#!/bin/sh\necho "{name} $* $DEBIAN_FRONTEND" >>"{told}"\n')
         (programs / name).chmod(0o755)
     command = [shutil.which("bash"), str(ROOT / ".ci" / "run")]
-    done = subprocess.run(command, env={"PATH": str(programs)}, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, env={"PATH": str(programs)}, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     update, install, *made = told.read_text().splitlines()
     assert update == "apt-get update -qq noninteractive"

@@ -1,4 +1,6 @@
-"""README, site and notebook: their Python runs as it stands, commands are understood, links lead somewhere."""
+"""README, site and notebook: their Python runs as it stands, commands are understood, links lead
+somewhere.
+"""
 
 import os
 import re
@@ -55,7 +57,12 @@ def test_a_block_runs_on_its_own(block, tmp_path, drive):
     (tmp_path / "logs").symlink_to(drive.parent)
     paths = {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(
-        [sys.executable, "-c", block], cwd=tmp_path, env=os.environ | paths, capture_output=True, text=True, check=False
+        [sys.executable, "-c", block],
+        cwd=tmp_path,
+        env=os.environ | paths,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
@@ -105,7 +112,9 @@ def test_the_learner_in_one_file_learns(monkeypatch, capsys):
 
 
 def test_the_policy_has_twenty_lines_at_most():
-    (policy,) = (block for block in fenced(ROOT / "README.md", "python") if "class Corridor" in block)
+    (policy,) = (
+        block for block in fenced(ROOT / "README.md", "python") if "class Corridor" in block
+    )
     body = policy[policy.index("class Corridor") : policy.index("env = ")]
     assert len([line for line in body.splitlines() if line.strip()]) <= 20
 
@@ -124,20 +133,38 @@ def test_every_environment_has_a_page():
 
 def test_the_site_is_built_without_a_warning(tmp_path):
     pytest.importorskip("material")
-    command = [sys.executable, "-m", "mkdocs", "build", "-f", ".mkdocs.yml", "--site-dir", str(tmp_path / "site")]
+    command = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "-f",
+        ".mkdocs.yml",
+        "--site-dir",
+        str(tmp_path / "site"),
+    ]
     quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=ROOT, env=quiet, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stdout + done.stderr
     page = (tmp_path / "site" / "environments" / "dense.html").read_text()
-    for part in ("CARE-Dense-v0", "Reward", "Episode end", "lidar_dropout", "vehicles", "encroachment_s"):
+    for part in (
+        "CARE-Dense-v0",
+        "Reward",
+        "Episode end",
+        "lidar_dropout",
+        "vehicles",
+        "encroachment_s",
+    ):
         assert part in page
     watch = (tmp_path / "site" / "watch.html").read_text()
     assert [name for name in ENTITIES if f"<code>{name}</code>" not in watch] == []
     wrappers = (tmp_path / "site" / "api" / "wrappers.html").read_text()
     assert {*care_sim.wrappers.__all__} <= {*re.findall(r'<h2 id="[\w.]*\.(\w+)"', wrappers)}
     for page in (tmp_path / "site").rglob("*.html"):
-        loaded = re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page.read_text())
+        loaded = re.findall(
+            r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page.read_text()
+        )
         assert loaded == [], f"{page.name} asks the network"
 
 
@@ -148,11 +175,15 @@ def test_the_notebook_runs_from_top_to_bottom_and_is_kept_without_outputs():
     code = [cell for cell in book.cells if cell.cell_type == "code"]
     assert all(cell.outputs == [] and cell.execution_count is None for cell in code)
     client.NotebookClient(book, timeout=300, kernel_name="python3").execute()
-    texts = "".join(output.text for cell in code for output in cell.outputs if output.output_type == "stream")
+    texts = "".join(
+        output.text for cell in code for output in cell.outputs if output.output_type == "stream"
+    )
     found = [float(number) for number in re.findall(r"detects the person at ([\d.]+) m", texts)]
     assert len(found) == 3
     assert found[1] > found[0], "CARE sees the person before history does"
-    pictures = [output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})]
+    pictures = [
+        output for cell in code for output in cell.outputs if "image/png" in output.get("data", {})
+    ]
     assert len(pictures) == 2
 
 

@@ -32,7 +32,9 @@ def room(module):
 
 
 def test_the_map_names_every_room_and_the_root_holds_nothing_else():
-    folders = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"}
+    folders = {
+        path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"
+    }
     assert folders == set(ROOMS)
     assert {path.name for path in PACKAGE.glob("*.py")} == {"__init__.py", "cli.py", "wrappers.py"}
 
@@ -40,14 +42,23 @@ def test_the_map_names_every_room_and_the_root_holds_nothing_else():
 @pytest.mark.parametrize("name", ROOMS)
 def test_a_room_imports_none_that_comes_after_it(name):
     allowed = ROOMS[: ROOMS.index(name) + 1]
-    inside = {module: path for module, path in MODULES.items() if module.startswith(f"care_sim.{name}.")}
+    inside = {
+        module: path for module, path in MODULES.items() if module.startswith(f"care_sim.{name}.")
+    }
     outside = {
-        (module, other) for module, path in inside.items() for other in imported(path) if room(other) not in allowed
+        (module, other)
+        for module, path in inside.items()
+        for other in imported(path)
+        if room(other) not in allowed
     }
     assert outside == set()
 
 
 def test_no_module_needs_itself_by_way_of_others():
     packages = {module for module, path in MODULES.items() if path.name == "__init__.py"}
-    needs = {module: set(imported(path)) - packages for module, path in MODULES.items() if module not in packages}
+    needs = {
+        module: set(imported(path)) - packages
+        for module, path in MODULES.items()
+        if module not in packages
+    }
     TopologicalSorter(needs).prepare()

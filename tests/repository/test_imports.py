@@ -25,16 +25,28 @@ env.close()
 print(json.dumps(sorted(sys.modules)))
 """
 HEAVY = {
-    "dask", "distributed", "mujoco", "open3d", "plotly", "rerun", "rich", "sklearn",
-    "stable_baselines3", "torch", "tyro",
-}  # fmt: skip
-"""What an episode does not need. highway-env, whose roads and drivers it does, loads its own environments and with them
-pandas (with PyArrow), Matplotlib and pygame: 96 MB and a second of every worker, since no part of it comes without the rest."""
+    "dask",
+    "distributed",
+    "mujoco",
+    "open3d",
+    "plotly",
+    "rerun",
+    "rich",
+    "sklearn",
+    "stable_baselines3",
+    "torch",
+    "tyro",
+}
+"""What an episode does not need. highway-env, whose roads and drivers it does, loads its own
+environments and with them pandas (with PyArrow), Matplotlib and pygame: 96 MB and a second of every
+worker, since no part of it comes without the rest."""
 
 
 @pytest.mark.parametrize("engine", ["bullet", "fast"])
 def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
-    played = subprocess.run([sys.executable, "-c", EPISODE, engine], capture_output=True, text=True, check=True)
+    played = subprocess.run(
+        [sys.executable, "-c", EPISODE, engine], capture_output=True, text=True, check=True
+    )
     loaded = set(json.loads(played.stdout.splitlines()[-1]))
     assert {"care_sim", "gymnasium", "pybullet"} <= loaded
     assert {name.partition(".")[0] for name in loaded} & HEAVY == set()
@@ -42,7 +54,10 @@ def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
 
 
 def test_the_wrapper_that_records_loads_rerun_only_when_it_is_used():
-    line = "import sys; from care_sim.wrappers import RecordRerun; import care_sim.cli; print('rerun' in sys.modules)"
+    line = (
+        "import sys; from care_sim.wrappers import RecordRerun; import care_sim.cli; "
+        "print('rerun' in sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
@@ -50,7 +65,9 @@ def test_the_wrapper_that_records_loads_rerun_only_when_it_is_used():
 def test_only_the_viewer_imports_rerun():
     package = pathlib.Path(care_sim.__file__).parent
     importing = [
-        file for file in package.rglob("*.py") if re.search(r"^\s*(import|from) rerun\b", file.read_text(), re.M)
+        file
+        for file in package.rglob("*.py")
+        if re.search(r"^\s*(import|from) rerun\b", file.read_text(), re.M)
     ]
     assert importing
     assert {file.parent for file in importing} == {package / "viewer" / "recording"}

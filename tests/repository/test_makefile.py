@@ -11,8 +11,12 @@ from tests.helpers.places import ROOT
 def official(folder, *arguments):
     """Without a Python to install with, and with no environment installed."""
     command = ["make", "official", f"OFFICIAL={folder / 'environment'}", "PYTHON=false", *arguments]
-    surroundings = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
-    return subprocess.run(command, cwd=ROOT, env=surroundings, capture_output=True, text=True, check=False)
+    surroundings = {
+        name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))
+    }
+    return subprocess.run(
+        command, cwd=ROOT, env=surroundings, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.fixture
@@ -31,8 +35,15 @@ def test_what_is_missing_is_said_in_one_line_before_anything_is_installed(tmp_pa
         (): needs,
         (results,): needs,
         (data,): needs,
-        (f"RESULTS={tmp_path}", data): f"RESULTS={tmp_path} is no file; it must be one of care-sim export",
-        (results, data): f"{data} has no folder v1.0-trainval; it must be the root of nuScenes, VERSION the folder of "
+        (
+            f"RESULTS={tmp_path}",
+            data,
+        ): f"RESULTS={tmp_path} is no file; it must be one of care-sim export",
+        (
+            results,
+            data,
+        ): f"{data} has no folder v1.0-trainval; it must be the root of nuScenes, "
+        "VERSION the folder of "
         "its tables",
     }
     for arguments, message in wrong.items():

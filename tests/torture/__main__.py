@@ -26,10 +26,15 @@ def main():
         return int(bool(tally.failures))
     failed = False
     options.failures.parent.mkdir(parents=True, exist_ok=True)
-    with options.failures.open("w") as file, Field(options.workers, lambda failure: _write(file, failure)) as field:
+    with (
+        options.failures.open("w") as file,
+        Field(options.workers, lambda failure: _write(file, failure)) as field,
+    ):
         shares = sum(CAMPAIGNS[name] for name in options.campaigns)
         for name in options.campaigns:
-            seconds = options.seconds * CAMPAIGNS[name] / shares if options.seconds else float("inf")
+            seconds = (
+                options.seconds * CAMPAIGNS[name] / shares if options.seconds else float("inf")
+            )
             drawn = names(name, options.seed, options.first)
             drawn = islice(drawn, options.cases) if options.cases else drawn
             tally = field.play(drawn, time.monotonic() + seconds)

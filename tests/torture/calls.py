@@ -1,10 +1,11 @@
 """Campaign: random calls of the public interface, with values that nobody asked for.
 
-A call must return, or raise what `judge.call` allows. What returns has to be sound: observations lie in their space,
-rewards are finite and at most 0, no more cells fire than may, none twice.
+A call must return, or raise what `judge.call` allows. What returns has to be sound: observations
+lie in their space, rewards are finite and at most 0, no more cells fire than may, none twice.
 
-Doors (making, resetting, stepping, policies, beliefs, allocation, configurations) are given anything at all. The
-arithmetic of grid and tables is given arrays of the shape that it asks for, with any numbers in them.
+Doors (making, resetting, stepping, policies, beliefs, allocation, configurations) are given
+anything at all. The arithmetic of grid and tables is given arrays of the shape that it asks for,
+with any numbers in them.
 """
 
 from contextlib import suppress
@@ -69,7 +70,9 @@ def told(value):
 
 
 def draw(case, known, most=3):
-    """Arguments by name: `known` maps names to makers of values that fit, None where only hostile ones are drawn."""
+    """Arguments by name: `known` maps names to makers of values that fit, None where only hostile
+    ones are drawn.
+    """
     rng, drawn = case.rng, {}
     for name in rng.sample(sorted(known), rng.randint(0, min(most, len(known)))):
         fitting = known[name]
@@ -417,8 +420,11 @@ def wrapper(case):
     )
     case.tell(name)
     env = good_env() if case.rng.random() < 0.9 else some(case)
-    arguments = {"GridObservation": ("columns", "rows"), "RecordRerun": ("path", "policy", "name"),
-                 "ExportScans": ("path", "policy")}.get(name, ("azimuths", "elevations"))  # fmt: skip
+    arguments = {
+        "GridObservation": ("columns", "rows"),
+        "RecordRerun": ("path", "policy", "name"),
+        "ExportScans": ("path", "policy"),
+    }.get(name, ("azimuths", "elevations"))
     numbers = {one: (lambda: case.rng.choice((1, 2, 4, 8, 16, 32, 64))) for one in arguments}
     numbers |= {"path": lambda: "x/y", "policy": None, "name": None} if "path" in arguments else {}
     made = getattr(wrappers, name)(env, **draw(case, numbers))
@@ -498,7 +504,21 @@ def tables(case):
 
 
 ACTIONS = {
-    environment: 12, street: 2, replay: 2, policy: 6, belief: 6, allocation: 8, rig: 4, grid: 4, scenario: 4,
-    conditions: 4, wrapper: 3, vector: 1, configuration: 4, detector: 2, weights: 1, tables: 2,
-}  # fmt: skip
+    environment: 12,
+    street: 2,
+    replay: 2,
+    policy: 6,
+    belief: 6,
+    allocation: 8,
+    rig: 4,
+    grid: 4,
+    scenario: 4,
+    conditions: 4,
+    wrapper: 3,
+    vector: 1,
+    configuration: 4,
+    detector: 2,
+    weights: 1,
+    tables: 2,
+}
 """What is called, and how often."""

@@ -4,7 +4,16 @@ import importlib
 
 from tests.torture.case import FOUND, Name
 
-CAMPAIGNS = {"commands": 4, "shell": 2, "calls": 3, "files": 3, "journals": 1, "kills": 4, "writers": 1, "disk": 2}
+CAMPAIGNS = {
+    "commands": 4,
+    "shell": 2,
+    "calls": 3,
+    "files": 3,
+    "journals": 1,
+    "kills": 4,
+    "writers": 1,
+    "disk": 2,
+}
 
 
 def found(campaign):

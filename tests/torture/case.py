@@ -30,7 +30,7 @@ class Name(NamedTuple):
 
 
 class Fault(Exception):
-    """What must not happen: of a `kind`, somewhere in the code (`place`), told in full in `detail`."""
+    """What must not happen: of a `kind`, somewhere in the code (`place`), told in `detail`."""
 
     def __init__(self, kind, detail="", place=""):
         super().__init__(f"{kind} at {place}: {detail}" if place else f"{kind}: {detail}")
@@ -39,8 +39,8 @@ class Fault(Exception):
 
 @dataclass
 class Case:
-    """`folder` is empty and all its own, and the working folder; what is done there is told in `steps`, and to
-    `listener`, who hears it even where the process does not live to tell.
+    """`folder` is empty and all its own, and the working folder; what is done there is told in
+    `steps`, and to `listener`, who hears it even where the process does not live to tell.
     """
 
     name: Name

@@ -11,7 +11,7 @@ from tests.torture.judge import ending, exception
 
 LIMIT_S = 10.0
 HONEST_S = 0.7
-"""After this a command that may honestly take long is interrupted; it has to end as one that was."""
+"""After this a command that may take long is interrupted; it has to end as one that was."""
 ENCODINGS = ("utf-8",) * 12 + ("ascii", "latin-1")
 """Of stdout and stderr, as the environments of users have them."""
 
@@ -30,7 +30,9 @@ FOUND_CASES = (
     (("run", "dense", "--policy-parameters", "a={[1]}"), False, "utf-8"),
     (("run", "dense", "--policy-parameters", f"a={'-' * 5000}1"), False, "utf-8"),
 )
-"""Lines that once ended otherwise: arguments, whether they may honestly take long, the encoding of the terminal."""
+"""Lines that once ended otherwise: arguments, whether they may honestly take long, the encoding of
+the terminal.
+"""
 
 
 def line(name):
@@ -48,7 +50,9 @@ def drawn_line(rng):
 
 
 def prepare(name):
-    """Import what the case's command imports, before its time counts: an import that is interrupted leaves a mess."""
+    """Import what the case's command imports, before its time counts: an import that is interrupted
+    leaves a mess.
+    """
     import care_sim.reports.page.build
     import care_sim.reports.report
     import care_sim.sources.streets.recording
@@ -85,7 +89,8 @@ def _play_once():
 def play(case):
     arguments, long, encoding = line(case.name)
     case.tell(
-        f"care-sim {' '.join(_quoted(word) for word in arguments)}" + ("" if encoding == "utf-8" else f" ({encoding})")
+        f"care-sim {' '.join(_quoted(word) for word in arguments)}"
+        + ("" if encoding == "utf-8" else f" ({encoding})")
     )
     lay_out(arguments, case.folder)
     return run(arguments, encoding, HONEST_S if long else None)
@@ -126,4 +131,8 @@ def run(arguments, encoding="utf-8", interrupted_after=None):
 
 
 def _quoted(word):
-    return word if re.fullmatch(r"[\w./=:+-]+", word, re.ASCII) and len(word) < 200 else ascii(word)[:300]
+    return (
+        word
+        if re.fullmatch(r"[\w./=:+-]+", word, re.ASCII) and len(word) < 200
+        else ascii(word)[:300]
+    )

@@ -1,7 +1,8 @@
 """Campaign: the disk is full in the midst of writing.
 
-A case of an even number writes on a small file system in memory, where the user may mount one; all others, and where
-he may not, under a limit on the size of a file, which the operating system reports in the same place of the same calls.
+A case of an even number writes on a small file system in memory, where the user may mount one; all
+others, and where he may not, under a limit on the size of a file, which the operating system
+reports in the same place of the same calls.
 """
 
 import os
@@ -31,7 +32,8 @@ def play(case):
     size = case.rng.choice((0, 1, 100, 4096, 2**15, 2**17, case.rng.randrange(1, 2**19)))
     mounted = case.name.number % 2 == 0 and may_mount()
     case.tell(
-        f"care-sim {' '.join(line)}, room for {size} bytes {'on the disk' if mounted else 'in a file'}"
+        f"care-sim {' '.join(line)}, room for {size} bytes "
+        f"{'on the disk' if mounted else 'in a file'}"
     )
     with _small(case.folder, mounted) as folder:
         props.lay_out({"results"} & set(line), folder)
@@ -156,8 +158,17 @@ WRITER_LINES = {
 }
 WRITER_LINES_BY_LINE = {tuple(line): product for line, product in WRITER_LINES.values()}
 WRITERS = {
-    "study": 4, "picture": 1, "gif": 1, "png": 1, "film": 2, "recording": 2, "compared": 2, "scans": 2, "page": 2,
-    "report": 1, "curves": 1,
-}  # fmt: skip
+    "study": 4,
+    "picture": 1,
+    "gif": 1,
+    "png": 1,
+    "film": 2,
+    "recording": 2,
+    "compared": 2,
+    "scans": 2,
+    "page": 2,
+    "report": 1,
+    "curves": 1,
+}
 REMADE = {"tables.md", "tables.tex", "ballast"}
 """Files that a report makes again."""

@@ -1,7 +1,8 @@
 """Where campaigns are held: a few workers, a clock, and a list of what went wrong.
 
-A case hangs that takes longer than the campaign's `LIMIT_S` of processor time, or `processes.patience` times that on
-the clock, which forgives a busy machine. Its stack tells where; the worker is ended and another takes its place.
+A case hangs that takes longer than the campaign's `LIMIT_S` of processor time, or
+`processes.patience` times that on the clock, which forgives a busy machine. Its stack tells where;
+the worker is ended and another takes its place.
 """
 
 import importlib
@@ -64,7 +65,8 @@ class Tally:
         ends = ", ".join(f"{count} {ending}" for ending, count in sorted(self.endings.items()))
         distinct = len({failure.key for failure in self.failures})
         return (
-            f"{cases} cases in {self.seconds:.0f} s ({ends}); {len(self.failures)} faults, {distinct} distinct; "
+            f"{cases} cases in {self.seconds:.0f} s ({ends}); "
+            f"{len(self.failures)} faults, {distinct} distinct; "
             f"slowest {self.slowest[0]:.1f} s, {self.slowest[1]}"
         )
 
@@ -86,7 +88,9 @@ class Field:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def play(self, names, until=float("inf")):
-        """Play the cases of one campaign, until the clock (`time.monotonic`) says so; what came of them."""
+        """Play the cases of one campaign, until the clock (`time.monotonic`) says so; what came of
+        them.
+        """
         tally, names, started = Tally(), iter(names), time.monotonic()
         waiting = dict.fromkeys(self._workers)
         while waiting:
@@ -107,7 +111,13 @@ class Field:
         tally.endings[answer["ended"]] += 1
         tally.slowest = max(tally.slowest, (answer["seconds"], answer["name"]))
         if answer["ended"] == "fault":
-            failure = Failure(answer["name"], answer["kind"], answer["place"], answer["detail"], tuple(answer["steps"]))
+            failure = Failure(
+                answer["name"],
+                answer["kind"],
+                answer["place"],
+                answer["detail"],
+                tuple(answer["steps"]),
+            )
             tally.failures.append(failure)
             self._told(failure)
 
@@ -156,7 +166,9 @@ class _Worker:
             return time.monotonic() - self._handed > processes.patience() * PREPARES_S
         limit = importlib.import_module(f"tests.torture.{self._name.campaign}").LIMIT_S
         clock, busy = self._began
-        return time.monotonic() - clock > processes.patience() * limit or self._busy_s() - busy > limit
+        return (
+            time.monotonic() - clock > processes.patience() * limit or self._busy_s() - busy > limit
+        )
 
     def answers(self):
         """What it has to say of its case: nothing yet, or one answer."""
@@ -187,11 +199,14 @@ class _Worker:
 
     def _died(self):
         code = self._process.wait()
-        return self._lost("memory above 1 GB" if code == -signal.SIGKILL else f"the process died ({code})")
+        return self._lost(
+            "memory above 1 GB" if code == -signal.SIGKILL else f"the process died ({code})"
+        )
 
     def _lost(self, kind):
         stack, steps = (
-            path.read_text(errors="replace") if path.exists() else "" for path in (self._stacks, self._steps)
+            path.read_text(errors="replace") if path.exists() else ""
+            for path in (self._stacks, self._steps)
         )
         name, seconds = self._name, time.monotonic() - (self._began or (time.monotonic(),))[0]
         self.end()
@@ -203,12 +218,25 @@ class _Worker:
         self.end()
         path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
         environment = os.environ | {
-            "PYTHONPATH": path, "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "0", processes.MARK: self._mark,
-        }  # fmt: skip
+            "PYTHONPATH": path,
+            "OMP_NUM_THREADS": "1",
+            "PYTHONHASHSEED": "0",
+            processes.MARK: self._mark,
+        }
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.torture.worker", str(self._folder), str(self._stacks), str(self._steps)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, start_new_session=True,
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-m",
+                "tests.torture.worker",
+                str(self._folder),
+                str(self._stacks),
+                str(self._steps),
+            ],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+            start_new_session=True,
+        )
         self._played = 0
 
     def _busy_s(self):

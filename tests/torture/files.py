@@ -1,4 +1,6 @@
-"""Campaign: damaged, changed and foreign files, read by the commands and calls that read such files."""
+"""Campaign: damaged, changed and foreign files, read by the commands and calls that read such
+files.
+"""
 
 import json
 import os
@@ -59,7 +61,10 @@ def _spoilt(case, path, *own):
         return
     rng = case.rng
     others = [
-        file for name in ("results", "drive", "base") for file in props.template(name).rglob("*") if file.is_file()
+        file
+        for name in ("results", "drive", "base")
+        for file in props.template(name).rglob("*")
+        if file.is_file()
     ]
     others += [props.template(name) for name in ("scorer", "ppo", "recording")]
     roll = rng.random()
@@ -76,17 +81,34 @@ def _feather(rng, path):
     from pyarrow import feather
 
     return spoil.table(
-        rng, lambda: feather.read_table(path, memory_map=False), lambda table: feather.write_feather(table, path)
+        rng,
+        lambda: feather.read_table(path, memory_map=False),
+        lambda table: feather.write_feather(table, path),
     )
 
 
 def _parquet(rng, path):
     import pyarrow.parquet as pq
 
-    return spoil.table(rng, lambda: pq.read_table(path, memory_map=False), lambda table: pq.write_table(table, path))
+    return spoil.table(
+        rng,
+        lambda: pq.read_table(path, memory_map=False),
+        lambda table: pq.write_table(table, path),
+    )
 
 
-ONE_POLICY = ("--policies", "care", "--budgets", "0.1", "--floor-seeds", "1", "--workers", "1", "--out", "out")
+ONE_POLICY = (
+    "--policies",
+    "care",
+    "--budgets",
+    "0.1",
+    "--floor-seeds",
+    "1",
+    "--workers",
+    "1",
+    "--out",
+    "out",
+)
 
 
 def argoverse2(case):
@@ -100,7 +122,9 @@ def nuscenes(case):
     """A database: tables and sweeps."""
     folder = props.copy("base", case.folder / "base")
     if case.rng.random() < 0.75:
-        _spoilt(case, case.rng.choice(sorted(folder.rglob("*.json"))), spoil.json_node, spoil.json_node)
+        _spoilt(
+            case, case.rng.choice(sorted(folder.rglob("*.json"))), spoil.json_node, spoil.json_node
+        )
     else:
         _spoilt(case, case.rng.choice(sorted(folder.rglob("*.bin"))), spoil.points)
     return _recorded(case, "nuscenes:base", exporting=True)
@@ -121,7 +145,9 @@ def _replayed(source, **options):
     import care_sim
 
     try:
-        with gymnasium.make("CARE-Replay-v0", source=source, disable_env_checker=True, **options) as env:
+        with gymnasium.make(
+            "CARE-Replay-v0", source=source, disable_env_checker=True, **options
+        ) as env:
             policy = care_sim.make_policy("care", env)
             observation, _ = env.reset(seed=0)
             for _ in range(3):
@@ -142,10 +168,14 @@ def camera_detections(case):
     data = json.loads((root / "v1.0-trainval" / "sample_data.json").read_text())
     tokens = [row["token"] for row in data if "CAM" in row["token"]]
     coco = [
-        {"image_id": token, "category_id": 1, "bbox": [100.0, 100.0, 50.0, 40.0], "score": 0.9} for token in tokens[:5]
+        {"image_id": token, "category_id": 1, "bbox": [100.0, 100.0, 50.0, 40.0], "score": 0.9}
+        for token in tokens[:5]
     ]
     form = {
-        "results": {token: [{"bbox": [100, 100, 150, 140], "category_name": "car", "score": 0.8}] for token in tokens}
+        "results": {
+            token: [{"bbox": [100, 100, 150, 140], "category_name": "car", "score": 0.8}]
+            for token in tokens
+        }
     }
     path = case.folder / "boxes.json"
     path.write_text(json.dumps(case.rng.choice((coco, form))))
@@ -175,9 +205,15 @@ def results(case):
     """Results of a closed-loop study."""
     folder = props.copy("results", case.folder / "results")
     path = case.rng.choice(("episodes.parquet", "episodes.parquet", "config.json", "journal.jsonl"))
-    own = {"config.json": spoil.json_node, "journal.jsonl": spoil.json_lines_node}.get(path, _parquet)
+    own = {"config.json": spoil.json_node, "journal.jsonl": spoil.json_lines_node}.get(
+        path, _parquet
+    )
     _spoilt(case, folder / path, own)
-    return run(case.rng.choice((("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))))
+    return run(
+        case.rng.choice(
+            (("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))
+        )
+    )
 
 
 def plays(case):
@@ -185,21 +221,31 @@ def plays(case):
     folder = props.copy("protocol", case.folder / "results")
     path = case.rng.choice(("plays.parquet", "plays.parquet", "events.parquet", "config.json"))
     _spoilt(case, folder / path, spoil.json_node if path == "config.json" else _parquet)
-    return run(case.rng.choice((("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))))
+    return run(
+        case.rng.choice(
+            (("report", "results"), ("report", "results", "-o", "page.html", "--episodes", "0"))
+        )
+    )
 
 
 def training(case):
     """Folders of training runs."""
     folder = props.copy("trained", case.folder / "trained")
     path, own = case.rng.choice(
-        (("config.json", spoil.json_node), ("rules.json", spoil.json_node), ("curve.csv", spoil.csv))
+        (
+            ("config.json", spoil.json_node),
+            ("rules.json", spoil.json_node),
+            ("curve.csv", spoil.csv),
+        )
     )
     _spoilt(case, folder / path, own)
     return run(("train", "curves", "trained", "--out", "curve.png"))
 
 
 def recordings(case):
-    """A recording whose first bytes are not those of one; others are the viewer's, a process of its own."""
+    """A recording whose first bytes are not those of one; others are the viewer's, a process of its
+    own.
+    """
     path = props.copy("recording", case.folder / "out.rrd")
     _spoilt(case, path)
     if path.is_file() and path.stat().st_mode & 0o400 and path.read_bytes()[:3] == b"RRF":
@@ -208,7 +254,14 @@ def recordings(case):
 
 
 KINDS = {
-    argoverse2: 6, nuscenes: 6, camera_detections: 3, splits: 1, weights: 4, results: 4, plays: 2, training: 2,
+    argoverse2: 6,
+    nuscenes: 6,
+    camera_detections: 3,
+    splits: 1,
+    weights: 4,
+    results: 4,
+    plays: 2,
+    training: 2,
     recordings: 1,
-}  # fmt: skip
+}
 """What is read, and how often."""

@@ -1,4 +1,6 @@
-"""Command lines from the program's own commands: their options, by name and type, and values that fit or do not."""
+"""Command lines from the program's own commands: their options, by name and type, and values that
+fit or do not.
+"""
 
 import typing
 from dataclasses import MISSING, fields, is_dataclass
@@ -8,17 +10,82 @@ from types import UnionType
 from tests.torture import hostile
 
 PIECES = (
-    "dartout", "dense", "cutin", "care", "history", "full", "all-camera", "ppo", "learned-scorer", "random", "all",
-    "fast", "bullet", "returns", "cluster", "torchscript", "streets", "evaluation", "calibration", "val", "street-0000",
-    "CARE-Dense-v0", "CARE-Street-v0", "SectorScores", "0.03", "0.1", "1", "2", "3", "0", "0.5", "31",
-)  # fmt: skip
+    "dartout",
+    "dense",
+    "cutin",
+    "care",
+    "history",
+    "full",
+    "all-camera",
+    "ppo",
+    "learned-scorer",
+    "random",
+    "all",
+    "fast",
+    "bullet",
+    "returns",
+    "cluster",
+    "torchscript",
+    "streets",
+    "evaluation",
+    "calibration",
+    "val",
+    "street-0000",
+    "CARE-Dense-v0",
+    "CARE-Street-v0",
+    "SectorScores",
+    "0.03",
+    "0.1",
+    "1",
+    "2",
+    "3",
+    "0",
+    "0.5",
+    "31",
+)
 """Values that fit somewhere."""
 PATHS = (
-    "out", "out/deep/er", "results", "results/episodes.parquet", "results/config.json", "results/journal.jsonl",
-    "empty", "text", "text/under", "none", "link", "loop", "broken-link", "null", "zero", "full", "pipe", "locked",
-    "x.png", "x.gif", "x.webp", "x.mp4", "x.rrd", "x.html", "x.npz", "x.json", "x.", ".x", "x.PNG", "a b.png", "ü.png",
-    "\udcff.png", "n" * 300, "/proc/self/nothing/out", "", ".", "..", "x\x00y", "-x", "\x1b[31m.png",
-)  # fmt: skip
+    "out",
+    "out/deep/er",
+    "results",
+    "results/episodes.parquet",
+    "results/config.json",
+    "results/journal.jsonl",
+    "empty",
+    "text",
+    "text/under",
+    "none",
+    "link",
+    "loop",
+    "broken-link",
+    "null",
+    "zero",
+    "full",
+    "pipe",
+    "locked",
+    "x.png",
+    "x.gif",
+    "x.webp",
+    "x.mp4",
+    "x.rrd",
+    "x.html",
+    "x.npz",
+    "x.json",
+    "x.",
+    ".x",
+    "x.PNG",
+    "a b.png",
+    "ü.png",
+    "\udcff.png",
+    "n" * 300,
+    "/proc/self/nothing/out",
+    "",
+    ".",
+    "..",
+    "x\x00y",
+    "-x",
+    "\x1b[31m.png",
+)
 CLUSTERS = (
     "nonsense",
     "",
@@ -33,19 +100,51 @@ CLUSTERS = (
     "\n",
 )
 SOURCES = (
-    "streets", "argoverse2:drive", "nuscenes:base", "argoverse2:none", "nuscenes:empty", "argoverse2:", ":", "nuscenes",
-    "argoverse2:text", "nuscenes:\x00",
-)  # fmt: skip
+    "streets",
+    "argoverse2:drive",
+    "nuscenes:base",
+    "argoverse2:none",
+    "nuscenes:empty",
+    "argoverse2:",
+    ":",
+    "nuscenes",
+    "argoverse2:text",
+    "nuscenes:\x00",
+)
 WORK = {
-    "seeds", "scenes", "episodes", "steps", "repeats", "samples", "resets", "seconds", "floor_seeds", "evaluate_every",
-    "environments", "rollout", "epochs", "batch", "memory",
-}  # fmt: skip
-"""Options that say how much is to be done; a large value is an honest wish, which takes its time."""
+    "seeds",
+    "scenes",
+    "episodes",
+    "steps",
+    "repeats",
+    "samples",
+    "resets",
+    "seconds",
+    "floor_seeds",
+    "evaluate_every",
+    "environments",
+    "rollout",
+    "epochs",
+    "batch",
+    "memory",
+}
+"""Options that say how much is to be done; a large value honestly takes its time."""
 TINY = {
-    "workers": "1", "seeds": "1", "scenes": "1", "episodes": "0", "episode": "0",
-    "floor_seeds": "1", "steps": "64", "repeats": "1",
-    "samples": "1", "resets": "1", "seconds": "0.01", "environments": "1", "rollout": "8", "evaluate_every": "64",
-}  # fmt: skip
+    "workers": "1",
+    "seeds": "1",
+    "scenes": "1",
+    "episodes": "0",
+    "episode": "0",
+    "floor_seeds": "1",
+    "steps": "64",
+    "repeats": "1",
+    "samples": "1",
+    "resets": "1",
+    "seconds": "0.01",
+    "environments": "1",
+    "rollout": "8",
+    "evaluate_every": "64",
+}
 LONG = (
     "reproduce",
     "ablate",
@@ -81,7 +180,12 @@ def options(kind):
         if is_dataclass(hint):
             yield from options(hint)
         else:
-            yield field.name, hint, any("Positional" in repr(mark) for mark in marks), field.default is MISSING
+            yield (
+                field.name,
+                hint,
+                any("Positional" in repr(mark) for mark in marks),
+                field.default is MISSING,
+            )
 
 
 class Grammar:
@@ -99,12 +203,20 @@ class Grammar:
         words, kind = rng.choice(list(commands().items()))
         self.long = words[0] in LONG
         known = list(options(kind))
-        given = [one for one in known if one[2] or one[3] or rng.random() < min(1.0, 2.5 / len(known))]
-        tiny = [(name, TINY[name]) for name, *_ in known if name in TINY and name not in {one[0] for one in given}]
+        given = [
+            one for one in known if one[2] or one[3] or rng.random() < min(1.0, 2.5 / len(known))
+        ]
+        tiny = [
+            (name, TINY[name])
+            for name, *_ in known
+            if name in TINY and name not in {one[0] for one in given}
+        ]
         if any(name == "scenario_parameters" for name, *_ in known):
             tiny.append(("scenario_parameters", "duration_s=0.2"))
         arguments = [piece for one in given for piece in self._option(*one)]
-        rest = [piece for name, value in tiny if rng.random() < 0.97 for piece in (_flag(name), value)]
+        rest = [
+            piece for name, value in tiny if rng.random() < 0.97 for piece in (_flag(name), value)
+        ]
         line = [*words, *arguments, *rest]
         return self._spoilt(line) if rng.random() < 0.05 else line
 
@@ -114,13 +226,21 @@ class Grammar:
             return [_flag(name) if rng.random() < 0.5 else f"--no-{name.replace('_', '-')}"]
         if positional:
             return values
-        return [_flag(name), *values] if rng.random() < 0.95 else [f"{_flag(name)}={value}" for value in values[:1]]
+        return (
+            [_flag(name), *values]
+            if rng.random() < 0.95
+            else [f"{_flag(name)}={value}" for value in values[:1]]
+        )
 
     def _values(self, name, hint):
         """One value, several or none, as the option's type has it; now and then not."""
         several = typing.get_origin(hint) is tuple
         inner = typing.get_args(hint)[0] if several else hint
-        count = self._rng.choice((0, 1, 1, 1, 2, 3)) if several else (1 if self._rng.random() < 0.97 else 2)
+        count = (
+            self._rng.choice((0, 1, 1, 1, 2, 3))
+            if several
+            else (1 if self._rng.random() < 0.97 else 2)
+        )
         return [self._value(name, inner) for _ in range(count)]
 
     def _value(self, name, hint):
@@ -144,8 +264,16 @@ class Grammar:
         from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
 
-        names = {"scenario": [*SCENARIOS], "scenarios": [*SCENARIOS, "all"], "policy": policy_names()}
-        names |= {"policies": [*policy_names(), "all"], "also": policy_names(), "engine": ["fast", "bullet"]}
+        names = {
+            "scenario": [*SCENARIOS],
+            "scenarios": [*SCENARIOS, "all"],
+            "policy": policy_names(),
+        }
+        names |= {
+            "policies": [*policy_names(), "all"],
+            "also": policy_names(),
+            "engine": ["fast", "bullet"],
+        }
         return names.get(name, []) * 6
 
     def _parameter(self, option):
@@ -154,7 +282,9 @@ class Grammar:
         if rng.random() < 0.1:
             return self._text()
         name = rng.choice(_parameter_names(option))
-        value = rng.choice((*hostile.LITERALS, *hostile.NUMBERS, *hostile.NUMBERS, *hostile.TEXTS, *PIECES, *PATHS))
+        value = rng.choice(
+            (*hostile.LITERALS, *hostile.NUMBERS, *hostile.NUMBERS, *hostile.TEXTS, *PIECES, *PATHS)
+        )
         if name in ("duration_s", "vehicles"):
             self.long = True
         return f"{name}={value}"
@@ -188,7 +318,9 @@ def is_safe(line):
     """Whether what it writes stays where the case is: no absolute path but those of `PATHS`."""
     pieces = (part for argument in line for part in argument.split("=", 1))
     return all(
-        not part.lstrip().startswith(("/", "~")) or part in PATHS for whole in pieces for part in whole.split(":", 1)
+        not part.lstrip().startswith(("/", "~")) or part in PATHS
+        for whole in pieces
+        for part in whole.split(":", 1)
     )
 
 
@@ -208,8 +340,26 @@ def _parameter_names(option):
 
     if option in ("scenario_parameters", "env_parameters"):
         names = [field.name for scenario in SCENARIOS.values() for field in fields(scenario)]
-        return [*names, "budget", "keyframe_s", "render_mode", "detector", "source", "reward_weights", "floor", "self"]
+        return [
+            *names,
+            "budget",
+            "keyframe_s",
+            "render_mode",
+            "detector",
+            "source",
+            "reward_weights",
+            "floor",
+            "self",
+        ]
     if option == "detector_parameters":
         return ["file", "min_returns", "grid", "x", "self"]
     names = [text.partition("=")[0] for make in BUILT_IN.values() for text in parameters_of(make)]
-    return [*names, *(f"care-sbf.{name}" for name in names), "path", "ppo.path", "learned-scorer.path", "none.x", "rig"]
+    return [
+        *names,
+        *(f"care-sbf.{name}" for name in names),
+        "path",
+        "ppo.path",
+        "learned-scorer.path",
+        "none.x",
+        "rig",
+    ]

@@ -1,4 +1,6 @@
-"""Campaign: a torn or damaged journal; the same command must give the same rows, or say in one line why not."""
+"""Campaign: a torn or damaged journal; the same command must give the same rows, or say in one line
+why not.
+"""
 
 import json
 import shutil
@@ -100,19 +102,34 @@ def lines_swapped(rng, data):
 
 
 def blank_lines(rng, data):
-    return b"".join(line + rng.choice((b"", b"", b"\n", b" \n", b"\r\n")) for line in data.splitlines(keepends=True))
+    return b"".join(
+        line + rng.choice((b"", b"", b"\n", b" \n", b"\r\n"))
+        for line in data.splitlines(keepends=True)
+    )
 
 
 def zeros_after_a_crash(rng, data):
-    """What some file systems leave when the power fails: the length is right, the last block is zeros."""
+    """What some file systems leave when the power fails: the length is right, the last block is
+    zeros.
+    """
     at = rng.randrange(len(data))
     return data[:at] + bytes(rng.choice((len(data) - at, 512)))
 
 
 ODD_LINES = (
-    b"null", b"[]", b"{}", b'{"digest": 5}', b'{"digest": []}', b'{"digest": "x"}', b"NaN", b"[" * 100_000, b"\xff\xfe",
-    b'{"digest": {"a": 1}}', b"1e999", b"9" * 5000,
-)  # fmt: skip
+    b"null",
+    b"[]",
+    b"{}",
+    b'{"digest": 5}',
+    b'{"digest": []}',
+    b'{"digest": "x"}',
+    b"NaN",
+    b"[" * 100_000,
+    b"\xff\xfe",
+    b'{"digest": {"a": 1}}',
+    b"1e999",
+    b"9" * 5000,
+)
 
 
 def foreign_lines(rng, data):
@@ -130,6 +147,16 @@ def glued(rng, data):
 
 
 CHANGES = {
-    cut: 4, bits_flipped: 6, digits_changed: 5, keys_changed: 2, digests_swapped: 1, lines_doubled: 2, lines_lost: 2,
-    lines_swapped: 1, blank_lines: 1, zeros_after_a_crash: 2, foreign_lines: 3, glued: 2,
-}  # fmt: skip
+    cut: 4,
+    bits_flipped: 6,
+    digits_changed: 5,
+    keys_changed: 2,
+    digests_swapped: 1,
+    lines_doubled: 2,
+    lines_lost: 2,
+    lines_swapped: 1,
+    blank_lines: 1,
+    zeros_after_a_crash: 2,
+    foreign_lines: 3,
+    glued: 2,
+}

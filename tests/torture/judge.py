@@ -1,15 +1,16 @@
 """What a command or a call may answer, and what is a fault.
 
-A command ends with code 0 (done), 1 (something failed or was left out), 2 (bad input), 130 (interrupted) or 141 (nobody
-reads its output any more). 70, a fault of the software itself, is always one. On stderr stand whole lines:
-`care-sim: ...`, or how far a study is. With 2 and 130 the last line says why, and it is the only one
-of its kind but for what was left out before; with 1 there is at least one. No line holds control codes, rules of a box
-or a Python traceback.
+A command ends with code 0 (done), 1 (something failed or was left out), 2 (bad input), 130
+(interrupted) or 141 (nobody reads its output any more). 70, a fault of the software itself, is
+always one. On stderr stand whole lines: `care-sim: ...`, or how far a study is. With 2 and 130 the
+last line says why, and it is the only one of its kind but for what was left out before; with 1
+there is at least one. No line holds control codes, rules of a box or a Python traceback.
 
-A call returns, or raises InvalidInput or MissingExtra with one line, or Gymnasium's own error for a step without a
-reset. TypeError is Python's own where the call itself does not fit the signature (a keyword that there is not, a
-missing or surplus argument), and only there: a wrong value is InvalidInput. What Gymnasium itself refuses, before
-anything of ours is called, it says in its own words.
+A call returns, or raises InvalidInput or MissingExtra with one line, or Gymnasium's own error for a
+step without a reset. TypeError is Python's own where the call itself does not fit the signature (a
+keyword that there is not, a missing or surplus argument), and only there: a wrong value is
+InvalidInput. What Gymnasium itself refuses, before anything of ours is called, it says in its own
+words.
 """
 
 import re
@@ -21,8 +22,8 @@ from tests.torture.case import DONE, INTERRUPTED, REFUSED, Fault
 OF_THE_SOFTWARE, UNREAD = 70, 141
 ENDINGS = {0: DONE, 1: REFUSED, 2: REFUSED, 130: INTERRUPTED, UNREAD: INTERRUPTED}
 BY_SIGNAL = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGQUIT)
-"""Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said why, or where all
-was said and done and Python was about to leave."""
+"""Ends by a signal, which a shell shows as 130 and the like: as good as 130 where a line has said
+why, or where all was said and done and Python was about to leave."""
 NOTICES = (
     r"(episodes|plays) \d+/\d+.*",
     r"\d+ lines? of .* passed over, damaged or .*",
@@ -37,19 +38,29 @@ NOTICES = (
 )
 """What a command may say on stderr about how far it is, beside lines of its own name."""
 OWN_SIGNATURE = re.compile(
-    r"unexpected keyword argument|required (positional|keyword-only) argument|positional arguments? but"
-    r"|takes no (keyword )?arguments|takes no arguments|multiple values for|keywords must be strings"
+    r"unexpected keyword argument|required (positional|keyword-only) argument"
+    r"|positional arguments? but"
+    r"|takes no (keyword )?arguments|takes no arguments|multiple values for"
+    r"|keywords must be strings"
     r"|must be a mapping, not|positional-only"
 )
 """Python's words for a call that does not fit the signature."""
 
-OWN_EXCEPTION = re.compile(r": ([A-Z]\w+(?:Error|Exception)): .*\((\w+\.py), line \d+\)|refuses .*: ([A-Z]\w+Error):")
-"""How a command tells of an exception in a policy that is not its own; where there are only its own, it is a fault."""
+OWN_EXCEPTION = re.compile(
+    r": ([A-Z]\w+(?:Error|Exception)): .*\((\w+\.py), line \d+\)|refuses .*: ([A-Z]\w+Error):"
+)
+"""How a command tells of an exception in a policy that is not its own; where there are only its
+own, it is a fault.
+"""
 
 
 def exception(error):
     """The fault that an exception is which nobody caught."""
-    return Fault(type(error).__name__, "".join(traceback.format_exception(error))[-6000:], place(error.__traceback__))
+    return Fault(
+        type(error).__name__,
+        "".join(traceback.format_exception(error))[-6000:],
+        place(error.__traceback__),
+    )
 
 
 def place(trace):
@@ -84,7 +95,9 @@ def ending(code, out, err, arguments=()):
     own = [line for line in lines if line.startswith("care-sim: ")]
     for line in lines:
         if line not in own and not any(re.fullmatch(notice, line) for notice in NOTICES):
-            raise Fault("a line on stderr that is neither its own nor progress", told, _kind_of(line))
+            raise Fault(
+                "a line on stderr that is neither its own nor progress", told, _kind_of(line)
+            )
     for line in own:
         _check_line(line, told)
     _check_control_codes(err, told, "stderr")
@@ -95,7 +108,8 @@ def ending(code, out, err, arguments=()):
 def _ending(code, out, lines, own, told):
     if code in BY_SIGNAL and own:
         code = 130
-    # The system ends a command that has said all: its results are whole, and Python is taking itself down.
+    # The system ends a command that has said all: its results are whole, and Python is taking
+    # itself down.
     if code in BY_SIGNAL and out.strip() and (not lines or (not own and SAID_ALL in out)):
         return INTERRUPTED
     if code not in ENDINGS:
@@ -111,7 +125,9 @@ def _check_count(code, lines, own, told):
         return
     if not own or lines[-1] != own[-1]:
         raise Fault(f"exit code {code} without a last line that says why", told)
-    if any(not line.startswith(("care-sim: left out: ", "care-sim: failed: ")) for line in own[:-1]):
+    if any(
+        not line.startswith(("care-sim: left out: ", "care-sim: failed: ")) for line in own[:-1]
+    ):
         raise Fault("more than one line", told)
 
 
@@ -124,7 +140,11 @@ def _check_line(line, told):
     if re.match(r"(?:[A-Z]\w+Error|Exception)\b", text):
         raise Fault("a line that is a bare exception", told, text.split(":")[0])
     if hidden := OWN_EXCEPTION.search(text):
-        raise Fault("an exception told as if it were a reason", told, " ".join(filter(None, hidden.groups())))
+        raise Fault(
+            "an exception told as if it were a reason",
+            told,
+            " ".join(filter(None, hidden.groups())),
+        )
 
 
 def _check_control_codes(text, told, stream):
@@ -137,7 +157,9 @@ def _check_control_codes(text, told, stream):
 def _raise_traceback(text, told):
     frames = re.findall(r'File "([^"]*/care_sim/[^"]*)", line \d+, in (\S+)', text)
     last = [
-        line for line in text.splitlines() if re.match(r"[\w.]*(Error|Exception|Interrupt|Input|Exit|Warning)\b", line)
+        line
+        for line in text.splitlines()
+        if re.match(r"[\w.]*(Error|Exception|Interrupt|Input|Exit|Warning)\b", line)
     ]
     kind = last[-1].split(":")[0] if last else "a traceback"
     raise Fault(kind, told, _told(*frames[-1]) if frames else "outside the package")
@@ -154,7 +176,9 @@ def _shown(arguments):
 
 
 def call(error):
-    """How a call ended that raised: REFUSED. Raises Fault for anything but a documented error of one line."""
+    """How a call ended that raised: REFUSED. Raises Fault for anything but a documented error of
+    one line.
+    """
     import gymnasium
 
     from care_sim.base.errors import InvalidInput, MissingExtra
@@ -163,7 +187,11 @@ def call(error):
         text = str(error)
         if not text.strip() or "\n" in text:
             raise Fault("not one line", repr(text[:2000]), place(error.__traceback__)) from error
-    elif isinstance(error, TypeError) and OWN_SIGNATURE.search(str(error)) and _raised_by_the_call(error):
+    elif (
+        isinstance(error, TypeError)
+        and OWN_SIGNATURE.search(str(error))
+        and _raised_by_the_call(error)
+    ):
         pass
     elif not (isinstance(error, gymnasium.error.Error) or _gymnasiums_own(error)):
         raise exception(error) from error
@@ -171,12 +199,20 @@ def call(error):
 
 
 def _raised_by_the_call(error):
-    """Whether the call itself was refused: no frame of the package stands between, but constructors that hand on."""
-    names = [frame.name for frame in traceback.extract_tb(error.__traceback__) if "/care_sim/" in frame.filename]
+    """Whether the call itself was refused: no frame of the package stands between, but constructors
+    that hand on.
+    """
+    names = [
+        frame.name
+        for frame in traceback.extract_tb(error.__traceback__)
+        if "/care_sim/" in frame.filename
+    ]
     return all(name == "__init__" for name in names)
 
 
 def _gymnasiums_own(error):
     """Whether Gymnasium refused an argument of its own."""
     files = [frame.filename for frame in traceback.extract_tb(error.__traceback__)]
-    return not any("/care_sim/" in file for file in files) and any("/gymnasium/" in file for file in files)
+    return not any("/care_sim/" in file for file in files) and any(
+        "/gymnasium/" in file for file in files
+    )

@@ -79,7 +79,10 @@ def _wait(case, command, out):
         command.until(lambda: False, more)
         return f"{more:.2f} s after row {rows}"
     if stage == "ending":
-        name, more = rng.choice(("config.json", study.ROWS_FILE, "tables.md", "tables.tex")), rng.uniform(0, 0.4)
+        name, more = (
+            rng.choice(("config.json", study.ROWS_FILE, "tables.md", "tables.tex")),
+            rng.uniform(0, 0.4),
+        )
         command.until((out / name).exists)
         command.until(lambda: False, more)
         return f"{more:.2f} s after {name} is there"

@@ -1,7 +1,8 @@
-"""Real processes of `care-sim`: started as the installed command is, watched, and looked for when they should be gone.
+"""Real processes of `care-sim`: started as the installed command is, watched, and looked for when
+they should be gone.
 
-Every process that a case starts carries a mark in its environment, which those that it starts inherit, fork servers and
-workers among them; marks of the one who started it stand before it.
+Every process that a case starts carries a mark in its environment, which those that it starts
+inherit, fork servers and workers among them; marks of the one who started it stand before it.
 """
 
 import os
@@ -60,7 +61,9 @@ def _state(entry):
 
 
 def patience():
-    """How many times longer a thing may take by the clock: where many wait for a core, all are slow."""
+    """How many times longer a thing may take by the clock: where many wait for a core, all are
+    slow.
+    """
     return 2 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
@@ -68,14 +71,18 @@ def entry_point():
     """Python code that does what the command `care-sim` does, under its name."""
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
     module, function = scripts["care-sim"].split(":")
-    return f"import sys; sys.argv[0] = 'care-sim'; from {module} import {function}; sys.exit({function}())"
+    return (
+        f"import sys; sys.argv[0] = 'care-sim'; "
+        f"from {module} import {function}; sys.exit({function}())"
+    )
 
 
 class Command:
-    """`care-sim` with arguments, in a session of its own; a context manager that leaves nothing behind.
+    """`care-sim` with arguments, in a session of its own; a context manager that leaves nothing
+    behind.
 
-    `file_bytes`: the largest file that it may write, which stands in for a full disk. `stdout`: a device in its place,
-    or a "closed pipe".
+    `file_bytes`: the largest file that it may write, which stands in for a full disk. `stdout`: a
+    device in its place, or a "closed pipe".
     """
 
     def __init__(self, arguments, folder, file_bytes=None, stdout=None, **environment):
@@ -90,14 +97,21 @@ class Command:
         usual[MARK] = f"{os.environ.get(MARK, '')}/{self.mark}"
         output = _output(stdout)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", entry_point(), *self.arguments], cwd=folder, stdin=subprocess.DEVNULL,
-            stdout=output, stderr=subprocess.PIPE, env=os.environ | usual | environment,
-            start_new_session=True, preexec_fn=limited,
-        )  # fmt: skip
+            [sys.executable, "-c", entry_point(), *self.arguments],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.PIPE,
+            env=os.environ | usual | environment,
+            start_new_session=True,
+            preexec_fn=limited,
+        )
         if stdout is not None:
             os.close(output)
         self._said = [bytearray(), bytearray()]
-        for stream, said in zip((self.process.stdout, self.process.stderr), self._said, strict=True):
+        for stream, said in zip(
+            (self.process.stdout, self.process.stderr), self._said, strict=True
+        ):
             if stream:
                 threading.Thread(target=_listen, args=(stream, said), daemon=True).start()
         self.started = time.monotonic()
@@ -116,14 +130,24 @@ class Command:
             time.sleep(POLL_S)
 
     def wait(self, seconds=HANGS_S):
-        """Its exit code; a fault where it takes longer than `seconds`, or more memory than is allowed."""
+        """Its exit code; a fault where it takes longer than `seconds`, or more memory than is
+        allowed.
+        """
         deadline = time.monotonic() + seconds * patience()
         while self.process.poll() is None:
             if time.monotonic() > deadline:
-                raise Fault("hang", f"{self.arguments}\n{self.said()}\n{self.stacks()}", "a process of its own")
+                raise Fault(
+                    "hang",
+                    f"{self.arguments}\n{self.said()}\n{self.stacks()}",
+                    "a process of its own",
+                )
             for pid in marked(self.mark):
                 if (held := _resident(pid)) > MEMORY:
-                    raise Fault("memory above 1 GB", f"{held} bytes: {self.arguments}", "a process of its own")
+                    raise Fault(
+                        "memory above 1 GB",
+                        f"{held} bytes: {self.arguments}",
+                        "a process of its own",
+                    )
             time.sleep(5 * POLL_S)
         return self.process.returncode
 
@@ -175,7 +199,12 @@ def _resident(pid):
 
 def _told(pid):
     with suppress(OSError):
-        line = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode("utf-8", "replace")
+        line = (
+            Path(f"/proc/{pid}/cmdline")
+            .read_bytes()
+            .replace(b"\0", b" ")
+            .decode("utf-8", "replace")
+        )
         return f"{line[:200]} ({Path(f'/proc/{pid}/wchan').read_text()})"
     return ""
 
@@ -184,4 +213,7 @@ def _kinds(pids):
     """What kinds of processes they are, for a fault's place."""
     lines = [_told(pid) for pid in pids]
     kinds = ("forkserver", "resource_tracker", "spawn_main", "rerun", "ffmpeg")
-    return ", ".join(kind for kind in kinds if any(kind in line for line in lines)) or "the command itself"
+    return (
+        ", ".join(kind for kind in kinds if any(kind in line for line in lines))
+        or "the command itself"
+    )

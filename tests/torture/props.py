@@ -1,4 +1,5 @@
-"""Things that lie about in the folder of a case: small results, recordings, weights, and what is no file at all.
+"""Things that lie about in the folder of a case: small results, recordings, weights, and what is no
+file at all.
 
 Templates are made once a process, by the program itself, and copied where a case wants them.
 """

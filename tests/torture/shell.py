@@ -1,6 +1,7 @@
 """Campaign: random command lines as real processes, in the surroundings that people have.
 
-Their terminals speak other encodings, their disks and pipes are full or gone, and the viewer shows damaged recordings.
+Their terminals speak other encodings, their disks and pipes are full or gone, and the viewer shows
+damaged recordings.
 """
 
 import os
@@ -15,13 +16,34 @@ LIMIT_S = 120.0
 HONEST_S = 4.0
 """As in `commands`, with the start of the program."""
 SURROUNDINGS = (
-    {}, {}, {}, {"LC_ALL": "C"}, {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
-    {"PYTHONIOENCODING": "ascii"}, {"PYTHONIOENCODING": "latin-1"}, {"COLUMNS": "1"},
-    {"COLUMNS": "x"}, {"HOME": "/nowhere"}, {"TMPDIR": "/nowhere"}, {"TERM": "dumb"}, {"NO_COLOR": "1"},
-    {"FORCE_COLOR": "1"}, {"OMP_NUM_THREADS": "x"}, {"MPLBACKEND": "svg"},
-    {"TZ": "nowhere"}, {"PYTHONHASHSEED": "7"}, {"PYTHONOPTIMIZE": "2"},
-)  # fmt: skip
-LISTS = (["policies"], ["scenarios"], ["detectors"], ["--help"], ["sweep", "--help"], ["report", "results"])
+    {},
+    {},
+    {},
+    {"LC_ALL": "C"},
+    {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    {"PYTHONIOENCODING": "ascii"},
+    {"PYTHONIOENCODING": "latin-1"},
+    {"COLUMNS": "1"},
+    {"COLUMNS": "x"},
+    {"HOME": "/nowhere"},
+    {"TMPDIR": "/nowhere"},
+    {"TERM": "dumb"},
+    {"NO_COLOR": "1"},
+    {"FORCE_COLOR": "1"},
+    {"OMP_NUM_THREADS": "x"},
+    {"MPLBACKEND": "svg"},
+    {"TZ": "nowhere"},
+    {"PYTHONHASHSEED": "7"},
+    {"PYTHONOPTIMIZE": "2"},
+)
+LISTS = (
+    ["policies"],
+    ["scenarios"],
+    ["detectors"],
+    ["--help"],
+    ["sweep", "--help"],
+    ["report", "results"],
+)
 """What people pipe into something that stops reading."""
 
 
@@ -75,7 +97,11 @@ def _viewed(case):
     path = props.copy("recording", case.folder / "out.rrd")
     if case.rng.random() < 0.7:
         case.tell(f"out.rrd: {spoil.raw(case.rng, path)}")
-    after, number, whom = case.rng.uniform(0.5, 5), case.rng.choice(ENDS), case.rng.choice(("parent", "group"))
+    after, number, whom = (
+        case.rng.uniform(0.5, 5),
+        case.rng.choice(ENDS),
+        case.rng.choice(("parent", "group")),
+    )
     case.tell(f"care-sim view out.rrd --web, {number.name} to the {whom} after {after:.1f} s")
     with Command(["view", "out.rrd", "--web"], case.folder) as command:
         command.until(lambda: False, after)
@@ -96,11 +122,15 @@ ENDS = (signal.SIGINT, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 def _bytes(word):
     """A word as the operating system hands it over: it ends at a NUL, and is bytes."""
-    return os.fsdecode(word.partition("\0")[0].encode("utf-8", "surrogateescape" if _escaped(word) else "replace"))
+    return os.fsdecode(
+        word.partition("\0")[0].encode("utf-8", "surrogateescape" if _escaped(word) else "replace")
+    )
 
 
 def _escaped(word):
-    return all(not 0xD800 <= ord(letter) <= 0xDFFF or 0xDC80 <= ord(letter) <= 0xDCFF for letter in word)
+    return all(
+        not 0xD800 <= ord(letter) <= 0xDFFF or 0xDC80 <= ord(letter) <= 0xDCFF for letter in word
+    )
 
 
 def _shown(surroundings):

@@ -9,15 +9,44 @@ import numpy as np
 
 DEEP = 100_000
 PLAIN = (
-    None, True, 0, -1, 1, 0.5, 1e308, -1e308, 10**22, 2**63, float("nan"), float("inf"), "", "x", "care", "\ud800",
-    "\x00", "\x1b[31m", "x" * 100_000, [], {}, [[]], [1, 2], {"a": 1}, "<script>", "$x_1$", "2**9", [None], [[1, [2]]],
+    None,
+    True,
+    0,
+    -1,
+    1,
+    0.5,
+    1e308,
+    -1e308,
+    10**22,
+    2**63,
+    float("nan"),
+    float("inf"),
+    "",
+    "x",
+    "care",
+    "\ud800",
+    "\x00",
+    "\x1b[31m",
+    "x" * 100_000,
+    [],
+    {},
+    [[]],
+    [1, 2],
+    {"a": 1},
+    "<script>",
+    "$x_1$",
+    "2**9",
+    [None],
+    [[1, [2]]],
     5e-324,
-)  # fmt: skip
+)
 """What may stand in JSON where something else belongs."""
 
 
 def raw(rng, path, others=()):
-    """Damage bytes; `others` are files whose content may take the place of this one's. Says what was done."""
+    """Damage bytes; `others` are files whose content may take the place of this one's. Says what
+    was done.
+    """
     data = bytearray(path.read_bytes())
     change = rng.choice(_RAW)
     path.write_bytes(change(rng, data, others))
@@ -49,7 +78,17 @@ def _blank(rng, data, _):
 def _insert(rng, data, _):
     at = rng.randrange(len(data) + 1)
     data[at:at] = rng.choice(
-        (b"\0", b"\xff\xfe", b"[" * 1000, b"9" * 400, b"\n", b'"', b"\r\n", b"NaN", rng.randbytes(64))
+        (
+            b"\0",
+            b"\xff\xfe",
+            b"[" * 1000,
+            b"9" * 400,
+            b"\n",
+            b'"',
+            b"\r\n",
+            b"NaN",
+            rng.randbytes(64),
+        )
     )
     return data
 
@@ -77,7 +116,11 @@ def _noise(rng, data, _others):
     return rng.randbytes(min(len(data), 5000))
 
 
-_RAW = (_flip_bits,) * 6 + (_cut,) * 3 + (_cut_the_front, _blank, _blank, _insert, _insert, _repeat, _repeat)
+_RAW = (
+    (_flip_bits,) * 6
+    + (_cut,) * 3
+    + (_cut_the_front, _blank, _blank, _insert, _insert, _repeat, _repeat)
+)
 _RAW += (_of_another, _nothing, _deep, _noise)
 
 
@@ -144,7 +187,20 @@ def table(rng, read, write):
     import pyarrow as pa
 
     whole = read()
-    change = rng.choice(("drop", "rename", "values", "values", "values", "no rows", "rows", "double", "type", "notes"))
+    change = rng.choice(
+        (
+            "drop",
+            "rename",
+            "values",
+            "values",
+            "values",
+            "no rows",
+            "rows",
+            "double",
+            "type",
+            "notes",
+        )
+    )
     name = rng.choice(whole.column_names)
     at = whole.column_names.index(name)
     count = len(whole)
@@ -152,7 +208,11 @@ def table(rng, read, write):
         whole = whole.drop_columns([name])
     elif change == "rename":
         whole = whole.rename_columns(
-            [*whole.column_names[:at], rng.choice(("x", "", "\x1b[31m", "seed")), *whole.column_names[at + 1 :]]
+            [
+                *whole.column_names[:at],
+                rng.choice(("x", "", "\x1b[31m", "seed")),
+                *whole.column_names[at + 1 :],
+            ]
         )
     elif change == "no rows":
         whole = whole.slice(0, 0)
@@ -162,7 +222,9 @@ def table(rng, read, write):
         whole = pa.concat_tables([whole, whole])
     elif change == "notes":
         notes = {
-            key: rng.choice((b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]"))
+            key: rng.choice(
+                (b"", b"x", b"\xff", b"[", b"[1", b"[[", b"{}", b"5", b"[null]", b"[[[1]]]")
+            )
             for key in whole.schema.metadata or {b"a": b""}
         }
         whole = whole.replace_schema_metadata(notes)
@@ -231,7 +293,11 @@ def _card(rng, path, entries):
 def _array(rng, path, entries):
     name = rng.choice(list(entries))
     array = entries.pop(name)
-    odd = [array.astype(rng.choice((np.float64, np.int8, complex, object, "U4"))), array[..., None], array.ravel()[:3]]
+    odd = [
+        array.astype(rng.choice((np.float64, np.int8, complex, object, "U4"))),
+        array[..., None],
+        array.ravel()[:3],
+    ]
     if array.dtype.kind == "f":
         odd += [np.full_like(array, value) for value in (np.nan, np.inf, 3e38, -3e38)]
     if rng.random() < 0.8:
@@ -264,7 +330,8 @@ def _giant_header(rng, path, entries):
     """An array that says it has billions of numbers."""
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(
-        header, {"descr": "<f4", "fortran_order": False, "shape": (rng.choice((2**31, 2**40, 2**62)),)}
+        header,
+        {"descr": "<f4", "fortran_order": False, "shape": (rng.choice((2**31, 2**40, 2**62)),)},
     )
     with open(path, "wb") as out:
         np.savez(out, **entries)

@@ -1,4 +1,6 @@
-"""A small real study, its rows when nobody disturbs it, and the question whether a folder holds those, each once."""
+"""A small real study, its rows when nobody disturbs it, and the question whether a folder holds
+those, each once.
+"""
 
 import json
 from functools import lru_cache
@@ -10,9 +12,17 @@ MEASURED = {"wall_s", "peak_rss_mb"}
 """Columns that time and memory decide."""
 SEEDS = 6
 ARGUMENTS = (
-    "sweep", "--scenarios", "dartout", "--policies", "history", "care", "--seeds", str(SEEDS), "--scenario-parameters",
+    "sweep",
+    "--scenarios",
+    "dartout",
+    "--policies",
+    "history",
+    "care",
+    "--seeds",
+    str(SEEDS),
+    "--scenario-parameters",
     "duration_s=0.5",
-)  # fmt: skip
+)
 ROWS = 2 * SEEDS
 JOURNAL, ROWS_FILE = "journal.jsonl", "episodes.parquet"
 
@@ -39,12 +49,15 @@ def steady(folder):
     from care_sim.study.rows import read_rows
 
     return [
-        {name: value for name, value in row.items() if name not in MEASURED} for row in read_rows(folder / ROWS_FILE)
+        {name: value for name, value in row.items() if name not in MEASURED}
+        for row in read_rows(folder / ROWS_FILE)
     ]
 
 
 def check_whole(folder, once=True):
-    """A fault unless the folder holds every row of the study once, in order, equal to the undisturbed ones."""
+    """A fault unless the folder holds every row of the study once, in order, equal to the
+    undisturbed ones.
+    """
     rows = steady(folder)
     key = [(row["policy"], row["seed"]) for row in rows]
     wanted = [(row["policy"], row["seed"]) for row in expected()]
@@ -55,11 +68,15 @@ def check_whole(folder, once=True):
     for ours, theirs in zip(rows, expected(), strict=True):
         names = sorted(ours | theirs)
         wrong = {
-            name: (ours.get(name), theirs.get(name)) for name in names if repr(ours.get(name)) != repr(theirs.get(name))
+            name: (ours.get(name), theirs.get(name))
+            for name in names
+            if repr(ours.get(name)) != repr(theirs.get(name))
         }
         if wrong:
             raise Fault(
-                "a row wrong", f"{theirs['policy']} {theirs['seed']}: (is, should be) {wrong}", ", ".join(wrong)
+                "a row wrong",
+                f"{theirs['policy']} {theirs['seed']}: (is, should be) {wrong}",
+                ", ".join(wrong),
             )
     if once:
         _check_played_once(folder)

@@ -1,4 +1,6 @@
-"""The short form of the campaigns: a few cases of each, the same every time, and those that once went wrong."""
+"""The short form of the campaigns: a few cases of each, the same every time, and those that once
+went wrong.
+"""
 
 from itertools import islice
 
@@ -11,7 +13,16 @@ from tests.torture.judge import ending
 from tests.torture.processes import Command
 from tests.torture.wrong import KINDS, WAYS
 
-SHORT = {"commands": 45, "shell": 4, "calls": 300, "files": 40, "journals": 8, "kills": 1, "writers": 1, "disk": 2}
+SHORT = {
+    "commands": 45,
+    "shell": 4,
+    "calls": 300,
+    "files": 40,
+    "journals": 8,
+    "kills": 1,
+    "writers": 1,
+    "disk": 2,
+}
 """Cases of each campaign: 50 seconds together, on two cores."""
 
 
@@ -45,7 +56,10 @@ def test_what_went_wrong_once_stays_right(field, campaign):
 
 
 def test_a_case_is_its_name(tmp_path):
-    one, again, other = (Case(Name.of(name), tmp_path).rng.random() for name in ("files:1:2", "files:1:2", "files:2:1"))
+    one, again, other = (
+        Case(Name.of(name), tmp_path).rng.random()
+        for name in ("files:1:2", "files:1:2", "files:2:1")
+    )
     assert one == again != other
     assert str(Name.of("files:1:2")) == "files:1:2"
 
@@ -77,7 +91,12 @@ def test_the_judge_knows_a_fault(code, err, kind):
     [
         (0, "", "done"),
         (0, "2 of 9 episodes found in x\nepisodes 3/9, 5 s left\n", "done"),
-        (0, "1 line of x/journal.jsonl passed over, damaged or of a version that wrote no checksums\n", "done"),
+        (
+            0,
+            "1 line of x/journal.jsonl passed over, "
+            "damaged or of a version that wrote no checksums\n",
+            "done",
+        ),
         (141, "", "interrupted"),
         (1, "care-sim: left out: policy torn cannot be loaded\n", "refused"),
         (2, "care-sim: budget must lie in (0, 1], got 2\n", "refused"),
@@ -104,7 +123,10 @@ def test_the_field_sees_a_hang_before_a_case_begins(monkeypatch):
 
 def test_a_process_left_behind_is_seen(tmp_path, monkeypatch):
     monkeypatch.setattr("tests.torture.processes.LEAVES_S", 0.3)
-    leaves = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])"
+    leaves = (
+        "import subprocess, sys; "
+        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])"
+    )
     monkeypatch.setattr("tests.torture.processes.entry_point", lambda: leaves)
     with Command([], tmp_path) as command:
         assert command.wait() == 0

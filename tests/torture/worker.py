@@ -1,7 +1,9 @@
-"""A process that plays cases, one after the other, under limits; `care_sim` lives and, if so, dies in here.
+"""A process that plays cases, one after the other, under limits; `care_sim` lives and, if so, dies
+in here.
 
-It reads names of cases on stdin, a line each, and answers with JSON lines: that a case begins, and how it ended. A case
-may take `MEMORY` bytes more than the process had before it. Who reads the answers ends it when a case hangs.
+It reads names of cases on stdin, a line each, and answers with JSON lines: that a case begins, and
+how it ended. A case may take `MEMORY` bytes more than the process had before it. Who reads the
+answers ends it when a case hangs.
 """
 
 import contextlib
@@ -27,7 +29,9 @@ MEMORY = 2**30
 
 
 class Streams:
-    """Files in the place of stdout and stderr, for C code too; what a case wrote to them can be read."""
+    """Files in the place of stdout and stderr, for C code too; what a case wrote to them can be
+    read.
+    """
 
     def __init__(self):
         self._files = [tempfile.TemporaryFile() for _ in range(2)]  # noqa: SIM115
@@ -40,7 +44,9 @@ class Streams:
         for file in self._files:
             file.truncate(0)
             os.lseek(file.fileno(), 0, os.SEEK_SET)
-        sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), encoding, "strict", write_through=True)
+        sys.stdout = io.TextIOWrapper(
+            io.FileIO(1, "w", closefd=False), encoding, "strict", write_through=True
+        )
         sys.stderr = io.TextIOWrapper(
             io.FileIO(2, "w", closefd=False), encoding, "backslashreplace", write_through=True
         )
@@ -87,7 +93,9 @@ def _judged(module, case):
 
 @contextlib.contextmanager
 def _restored():
-    """What a case may have changed, as it was: working folder, handlers of signals, environment, memory limit."""
+    """What a case may have changed, as it was: working folder, handlers of signals, environment,
+    memory limit.
+    """
     handlers = {number: signal.getsignal(number) for number in _SIGNALS}
     environment = dict(os.environ)
     gc.collect(1)
@@ -115,7 +123,9 @@ def _data_bytes():
 
 
 def _has_children():
-    """Whether a case left processes to this one, as a pool does: the next case gets a worker of its own."""
+    """Whether a case left processes to this one, as a pool does: the next case gets a worker of its
+    own.
+    """
     return bool(Path(f"/proc/self/task/{os.getpid()}/children").read_text().strip())
 
 

@@ -1,4 +1,4 @@
-"""Campaign: two or three of the same study in one folder at once, or of one picture into one file."""
+"""Campaign: two or three of one study in one folder at once, or of one picture in one file."""
 
 import time
 
@@ -51,7 +51,9 @@ def _watched(commands, out):
             study.check_not_torn(out)
         time.sleep(0.05)
         if time.monotonic() - commands[0].started > 120:
-            raise Fault("hang", "\n".join(command.stacks() for command in commands), "several writers")
+            raise Fault(
+                "hang", "\n".join(command.stacks() for command in commands), "several writers"
+            )
 
 
 def _ending(command):
@@ -65,11 +67,20 @@ def _ending(command):
 
 def _same_file(case):
     name = case.rng.choice(("x.gif", "x.webp", "x.png", "x.rrd"))
-    option = {"gif": "--video", "webp": "--video", "png": "--video", "rrd": "--record"}[name.split(".")[1]]
+    option = {"gif": "--video", "webp": "--video", "png": "--video", "rrd": "--record"}[
+        name.split(".")[1]
+    ]
     commands = []
     try:
-        _started(case, ["run", "dartout", option, name, "--scenario-parameters", "duration_s=0.6"], commands)
-        endings = [judge.ending(command.wait(60), *command.said(), command.arguments) for command in commands]
+        _started(
+            case,
+            ["run", "dartout", option, name, "--scenario-parameters", "duration_s=0.6"],
+            commands,
+        )
+        endings = [
+            judge.ending(command.wait(60), *command.said(), command.arguments)
+            for command in commands
+        ]
     finally:
         for command in commands:
             command.__exit__()

@@ -1,4 +1,6 @@
-"""A campaign that goes wrong on purpose, in as many ways as it has cases: the field has to see each."""
+"""A campaign that goes wrong on purpose, in as many ways as it has cases: the field has to see
+each.
+"""
 
 import os
 import signal
