@@ -69,7 +69,7 @@ def files_below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
     """The regular files below a folder, in order of name, behind links too, but for links back to a
     folder above.
     """
-    real = folder.resolve()
+    real = _real(folder)
     if real in above or _is_of_the_system(real):
         return
     try:
@@ -109,7 +109,7 @@ def files_named_in(files: Collection[Path]) -> dict[str, Path]:
     """The further files that texts in the code among these name, wherever they stand in it:
     relative names from here and from the code. A folder that a text happens to name is left out.
     """
-    own = {file.resolve() for file in files}
+    own = {_real(file) for file in files}
     found = {
         f"{source.name} {text} {number}": path
         for source in files
@@ -117,9 +117,7 @@ def files_named_in(files: Collection[Path]) -> dict[str, Path]:
         for text in _read(source)[0]
         for number, path in enumerate(_named_by(text, (source.parent,)))
     }
-    return {
-        name: path for name, path in found.items() if path.is_file() and path.resolve() not in own
-    }
+    return {name: path for name, path in found.items() if path.is_file() and _real(path) not in own}
 
 
 def paths_in(value: object) -> Iterator[Path]:
@@ -180,7 +178,7 @@ def _reached(module: ModuleType, entry: EntryPoint) -> tuple[tuple[Name, Path, b
     loaded = {name: each for name, each in sys.modules.items() if isinstance(each, ModuleType)}
     places = {name: vars(each).get("__file__") or "" for name, each in loaded.items()}
     own = {
-        name: Path(file).parent.resolve()
+        name: _real(Path(file).parent)
         for name, file in places.items()
         if os.path.realpath(file) in files or entry.module.startswith(f"{name}.")
     }
@@ -193,14 +191,21 @@ def _reached(module: ModuleType, entry: EntryPoint) -> tuple[tuple[Name, Path, b
 
 
 def _holds(folder: Path, *places: Path) -> bool:
-    real = folder.resolve()
+    real = _real(folder)
     return any(place.is_relative_to(real) for place in places)
 
 
 def _is_of_the_system(path: Path) -> bool:
     return any(
-        each.is_relative_to(place) for each in (path, path.resolve()) for place in _OF_THE_SYSTEM
+        each.is_relative_to(place) for each in (path, _real(path)) for place in _OF_THE_SYSTEM
     )
+
+
+def _real(path: Path) -> Path:
+    """The path without links. A link that leads back to itself stays what it is: it has no content,
+    and `Path.resolve` would raise.
+    """
+    return Path(os.path.realpath(path))
 
 
 def _roots(top: str) -> list[Path]:
@@ -219,7 +224,7 @@ def _project(entry: EntryPoint) -> Path | None:
     try:
         told = json.loads((entry.dist and entry.dist.read_text("direct_url.json")) or "")
         return (
-            Path(url2pathname(urlsplit(told["url"]).path)).resolve()
+            _real(Path(url2pathname(urlsplit(told["url"]).path)))
             if told["dir_info"]["editable"]
             else None
         )
@@ -229,7 +234,7 @@ def _project(entry: EntryPoint) -> Path | None:
 
 def _is_of(project: Path, roots: Collection[Path]) -> bool:
     """Whether code lies in a project, and not in an environment within it."""
-    real = [root.resolve() for root in roots]
+    real = [_real(root) for root in roots]
     return bool(real) and all(
         root.is_relative_to(project) and _SITES.isdisjoint(root.parts) for root in real
     )

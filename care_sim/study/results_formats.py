@@ -21,6 +21,7 @@ from care_sim.study.row_schema import (
     SEED,
     SHARE,
     SUM,
+    TALLY,
     TEXT,
     Column,
     Schema,
@@ -66,7 +67,8 @@ _PLAYS = Schema(
         "floor_seed": COUNT,
         "ttfds": Column("lists of whole numbers", least=0),
     }
-    | dict.fromkeys((*plays.SUMS, "tracks", "explained"), SUM)
+    | dict.fromkeys(plays.SUMS, TALLY)
+    | dict.fromkeys(("tracks", "explained"), SUM)
     | dict.fromkeys(("differing_keyframes", "differing_cells"), as_optional(COUNT)),
     _WRITER_COLUMNS
     | dict.fromkeys(("recording", "camera_detections", "presence"), as_optional(TEXT))

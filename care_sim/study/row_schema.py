@@ -55,13 +55,15 @@ _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": p
 class Column:
     """A column of one of `KINDS`, its numbers within `least` and `most`.
 
-    Where it is `optional`, rows may hold nothing in it.
+    Where it is `optional`, rows may hold nothing in it. Numbers that are `whole` count something,
+    whatever type a file holds them in.
     """
 
     kind: str
     optional: bool = False
     least: float = -MOST
     most: float = MOST
+    whole: bool = False
 
     @property
     def type(self) -> pa.DataType:
@@ -96,6 +98,8 @@ class Column:
             or not (ends["max"] or self.least) <= self.most
         ):
             yield f"must hold {self.kind} from {self.least:g} to {self.most:g}"
+        elif self.whole and pc.all(pc.equal(pc.round(values), values)).as_py() is False:
+            yield "must hold whole numbers"
 
 
 TEXT = Column("text")
@@ -103,6 +107,8 @@ FLAG = Column("true or false")
 COUNT = Column("whole numbers", least=0)
 SEED = Column("whole numbers", least=0, most=math.inf)
 SUM = Column("numbers", least=0)
+TALLY = Column("numbers", least=0, whole=True)
+"""Events and frames, and how many of them: numerators and denominators of the ratios in tables."""
 SHARE = Column("numbers", least=1e-9, most=1)
 PARAMETER = Column(_ANY, optional=True)
 _OF_TYPES = {
@@ -161,7 +167,7 @@ class Schema:
         """What a column must be; a sum of a stratum, where nothing else is said."""
         if name.startswith(PARAMETERS):
             return {**self.further, **self.needed}.get(name, PARAMETER)
-        return {**self.further, **self.needed}.get(name, SUM)
+        return {**self.further, **self.needed}.get(name, TALLY)
 
     def _strata(self, names: list[str]) -> set[str]:
         """All columns of the strata of which one is there."""

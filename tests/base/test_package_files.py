@@ -222,3 +222,10 @@ def test_what_a_policy_holds_only_once_it_has_played_leaves_its_key(lay):
     before = config.digest()
     package_files._reached.cache_clear()
     assert run_episode(config)["digest"] == before
+
+
+def test_a_link_that_leads_back_to_itself_is_no_file(tmp_path):
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "file").write_text("content")
+    assert [path.name for path in package_files.files_below(tmp_path)] == ["file"]
+    assert file_digest(tmp_path / "loop") == ""

@@ -64,6 +64,7 @@ def complaint(folder):
         ("sweep", "budget", "a tenth", "column budget must hold numbers, got string"),
         ("sweep", "budget", 0.0, "column budget must hold numbers from 1e-09 to 1"),
         ("sweep", "seed", 0.5, "column seed must hold whole numbers, got double"),
+        ("protocol", "frames", 5e-324, "column frames must hold whole numbers"),
         ("sweep", "policy", 3, "column policy must hold text, got int64"),
         ("sweep", "policy", None, "column policy must hold text, got null"),
         ("sweep", "braked", 1, "column braked must hold true or false, got int64"),
