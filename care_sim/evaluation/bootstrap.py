@@ -69,6 +69,7 @@ def ratio_of_sums(
     """
     groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
     value = _difference_of_ratios(groups, [np.arange(len(numerators)) for numerators, _ in groups])
+    # Whatever is resampled, it has this value.
     if all(_constant(*sums) for sums in groups):
         return Interval(float(value), float(value), float(value))
     if any(len(numerators) < 2 for numerators, _ in groups):
@@ -90,6 +91,7 @@ def _difference_of_ratios(
     groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Integers], axis: int = -1
 ) -> Floats:
     """Ratio of the drawn scenes of the first group, less that of the second where there is one."""
+    # Scenes lie along `axis`; SciPy draws many resamples at once along the other.
     first, *second = (
         numerators[rows].sum(axis) / denominators[rows].sum(axis)
         for (numerators, denominators), rows in zip(groups, drawn, strict=True)
@@ -99,6 +101,7 @@ def _difference_of_ratios(
 
 def _constant(numerators: Floats, denominators: Floats) -> bool:
     ratios = numerators / denominators
+    # Equal but for the last bits of their division.
     return bool(np.ptp(ratios) <= 1e-12 * max(1.0, float(np.abs(ratios).max())))
 
 

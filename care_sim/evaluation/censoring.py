@@ -80,6 +80,8 @@ def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
     ranked = [-1.0] * censored + sorted(
         reading.value for reading in readings if not reading.censored
     )
+    # Any number below 0 ranks below every distance. A quartile whose lower neighbour is censored is
+    # not known: the value that is interpolated with that number is dropped.
     shares = (0.25, 0.5, 0.75)
     values = np.quantile(ranked, shares).tolist()
     low, median, high = (
@@ -92,6 +94,7 @@ def quartiles(readings: Sequence[Reading]) -> Quartiles | None:
 def difference(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Difference:
     """Mean of `ours - theirs`, entry by entry. Raises InvalidInput as `paired_difference` does."""
     interval = paired_difference(_most(ours), _most(theirs))
+    # What speaks most against a difference: ours as small as may be where ours seems larger.
     against = (_least(ours), _most(theirs)) if interval.mean > 0 else (_most(ours), _least(theirs))
     missed = any(reading.censored for reading in ours), any(reading.censored for reading in theirs)
     bounds = {(True, False): Bound.AT_MOST, (False, True): Bound.AT_LEAST, (True, True): Bound.OPEN}

@@ -57,6 +57,7 @@ def _optimal(distances: Floats) -> NDArray[np.intp]:
 
 
 def _by_score(distances: Floats, scores: Floats) -> list[int]:
+    # Stable, so that of equally sure detections the first reported chooses first.
     free = distances.copy()
     served: list[int] = []
     for detection in np.argsort(-scores, kind="stable") if len(distances) else ():

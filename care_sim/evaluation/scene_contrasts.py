@@ -105,6 +105,7 @@ def scene_contrast(
     if not pairs:
         return None
     a, b, weights = _columns(ratio, pairs)
+    # The sum of differences over the sum of events is the difference of the pooled measures.
     by_event = ratio_of_sums((a - b, weights), seed=seed)
     by_scene = paired_difference(a / weights, b / weights, seed=seed)
     return SceneContrast(ratio, by_event, by_scene, len(pairs), float(weights.sum()))

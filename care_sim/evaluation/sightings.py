@@ -141,6 +141,7 @@ def check_presence(presence: object) -> None:
 
 def _appearing(frames: ObjectFrames) -> Cells:
     """(n,) the first row of every object that has none at the first keyframe, ascending."""
+    # Rows are in order of keyframe, so the first row of an object is its first keyframe.
     _, first = np.unique(frames.objects, return_index=True)
     return np.sort(first[frames.keyframes[first] > 0]).astype(np.int64)
 
@@ -166,6 +167,7 @@ def _table(keyframes: Sequence[Annotations]) -> ObjectFrames:
 
 def _check(scene: str, rows: ObjectFrames) -> None:
     lost = np.flatnonzero(~np.isfinite(rows.ranges))
+    # Sorted by keyframe, then object: an object that is annotated twice follows itself.
     order = np.lexsort((rows.objects, rows.keyframes))
     again = order[1:][(np.diff(rows.keyframes[order]) == 0) & (np.diff(rows.objects[order]) == 0)]
     for fault, faulty in (("has no finite centre", lost), ("is annotated more than once", again)):

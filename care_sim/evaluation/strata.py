@@ -46,6 +46,7 @@ def thirds(counts: Mapping[str, float]) -> dict[str, list[str]]:
     The parts differ by a scene at most; scenes of equal number stand in the order of their names.
     """
     ranked = sorted(counts, key=lambda scene: (counts[scene], scene))
+    # Rounded bounds spread the remainder, so that no third is larger than another by two.
     bounds = [
         round(part * len(ranked) / len(SCENE_THIRDS)) for part in range(len(SCENE_THIRDS) + 1)
     ]

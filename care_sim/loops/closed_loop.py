@@ -53,6 +53,8 @@ class ClosedLoop:
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
         self._track_objects = TrackObjects()
+        # The controller steers by the sensor, which sits behind the middle of the car: the front
+        # bumper is farther from it than half a length.
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
             world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
@@ -62,16 +64,20 @@ class ClosedLoop:
 
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
-        world, sensor, in_view = self.world, self.sensor, self._in_view()
+        # The record is of the time of the scan: it is taken before the world moves on.
+        world, sensor = self.world, self.sensor
+        in_view = self._in_view()
+        distance = self._distance_to_first_sighting(sensor)
         index, time, speed = self.index, world.time, world.ego_motion.speed
 
+        # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
         detections, detected = self._detector.detect(bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, detected)
         command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
 
-        distance = self._distance_to_first_sighting(sensor)
+        # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
         self.index += 1
         self._memory.predict()
@@ -110,12 +116,14 @@ class ClosedLoop:
         return self._lidar.peek(self.sensor)
 
     def detectable(self) -> bool:
-        """Whether a scan of every cell would detect the first-sighting actor now. Truth: for the
-        reward alone.
+        """Whether a scan of every cell would detect the first-sighting actor now.
+
+        Truth: for the reward alone.
         """
         target = self.world.first_sighting
         if target is None or target.label is None:
             return False
+        # No cell outside its hull can hit it, so these stand for all.
         (cells,) = self.rig.hulls(self._local_boxes(np.array([target.body], np.int64)))
         return self._lidar.hits(target.body, cells, self.sensor) >= self._min_returns
 
@@ -126,6 +134,8 @@ class ClosedLoop:
         boxes = self._local_boxes(self._reported)
         (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
+        # The scoring sees the world through the camera as designed, the detector through the one
+        # that is mounted; without an error of the mount one picture serves both.
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
         self.seen = faultless_detections([taken], self._labels)
         """What the camera as it is mounted shows, before misses, false boxes and delay. Truth: for

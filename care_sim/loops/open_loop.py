@@ -85,6 +85,7 @@ class OpenLoop:
     def keyframe(self, fired: Cells) -> OpenLoopKeyframe:
         """Fire `fired`, detect on what came back, and go on to the next keyframe."""
         index, shot = self.index, self.shot
+        # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)

@@ -21,7 +21,7 @@ from care_sim.sensors.camera import faultless_detections
 
 
 @dataclass(frozen=True)
-class Situation:
+class TrueSituation:
     """What is there when the cells of a keyframe are chosen.
 
     Truth: for people and scoring, never for a policy.
@@ -53,7 +53,7 @@ class WatchedKeyframe:
     return), and the record for the scoring.
     """
 
-    situation: Situation
+    situation: TrueSituation
     shares: NDArray[np.uint8]
     ranges: NDArray[np.float32]
     frame: Keyframe
@@ -79,11 +79,11 @@ class EpisodeWatcher:
             actor.body: actor.label for actor in loop.world.actors if actor.label is not None
         }
 
-    def situation(self) -> Situation:
+    def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""
         loop, world = self._loop, self._loop.world
         shown = loop.belief.detections
-        return Situation(
+        return TrueSituation(
             time_s=world.time,
             sensor=loop.sensor,
             ego=world.boxes_of(np.array([world.ego_body]))[0],
@@ -98,7 +98,7 @@ class EpisodeWatcher:
         )
 
     def watched(
-        self, situation: Situation, action: Action, demand: Demand | None, frame: Keyframe
+        self, situation: TrueSituation, action: Action, demand: Demand | None, frame: Keyframe
     ) -> WatchedKeyframe:
         """The keyframe that the loop has played since the situation."""
         loop = self._loop

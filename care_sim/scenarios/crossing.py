@@ -75,12 +75,12 @@ class CrossingScenario(Scenario):
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
+        # The order of the draws is part of what a seed means.
         ego_speed, crossing_x = draw(rng, self.ego_speed_mps), draw(rng, self.crossing_m)
         traffic = Traffic((1, -1), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, ego_speed)
-        self._add_person(
-            world, self._add_occluder(world, crossing_x, rng), crossing_x, ego_speed, rng
-        )
+        start_y = self._add_occluder(world, crossing_x, rng)
+        self._add_person(world, start_y, crossing_x, ego_speed, rng)
         self.furnish(world, crossing_x, rng)
         front = LEFT_PARKING_Y + PARKING_WIDTH_M / 2 + PAVEMENT_WIDTH_M
         line_with_terraces(world, LANE_WIDTH_M - front, front)
@@ -109,6 +109,7 @@ class CrossingScenario(Scenario):
         speed, encroachment = draw(rng, self.run_mps), draw(rng, self.encroachment_s)
         ego_length, ego_width, _ = world.ego_kind.size
         person_length, person_width, _ = CATALOGUE["pedestrian"].size
+        # The way from the start until the person's back has left the ego's path, whose middle is 0.
         clear = -start_y + (ego_width + person_length) / 2
         walk = Walk(
             start=(crossing_x, start_y),
@@ -117,6 +118,8 @@ class CrossingScenario(Scenario):
             acceleration=self.run_up_mps2,
             length_m=LEFT_PARKING_Y - start_y + PARKING_WIDTH_M,
         )
+        # An ego that never brakes arrives with its bumper at the person's line. The person has then
+        # been out of its path for the drawn time.
         arrival = (crossing_x - (person_width + ego_length) / 2) / ego_speed
         walk = walk.setting_off(arrival - encroachment - walk.duration_to(clear))
         world.first_sighting = world.add("person", "pedestrian", walk.pose)

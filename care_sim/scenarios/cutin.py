@@ -44,6 +44,7 @@ class CutIn(Scenario):
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
+        # The order of the draws is part of what a seed means.
         ego_speed, stop_x = draw(rng, self.ego_speed_mps), draw(rng, self.stop_m)
         traffic = Traffic((1, 1), ego_lane=1, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
         world = World(traffic, ego_speed)
@@ -54,6 +55,7 @@ class CutIn(Scenario):
         rear_x = stop_x + draw(rng, self.gap_m)
         driver = traffic.add_parked_driver(rear_x + car.size[0] / 2, -1, car, SPEED_LIMIT_MPS)
         world.first_sighting = world.add("cutting-in car", "car", driver)
+        # When the bumper of an ego that never brakes comes to where the rear of the car stands.
         arrival = (rear_x - world.ego_kind.size[0] / 2) / ego_speed
         world.at(arrival - draw(rng, self.pull_out_s), lambda: driver.pull_out(0))
 

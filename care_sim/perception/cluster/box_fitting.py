@@ -81,6 +81,7 @@ def _closeness(along: Floats) -> Floats:
     to_lows, to_highs = (
         np.round(np.linalg.norm(one, axis=2), DECIMALS) for one in (to_low, to_high)
     )
+    # Along each axis the shown side is the one that the points lie nearer to, all together.
     low_is_shown = to_lows <= to_highs
     distance = np.where(low_is_shown[..., None], to_low, to_high).min(axis=1)
     return np.asarray((1.0 / np.maximum(distance, ON_THE_SIDE_M)).sum(axis=1))

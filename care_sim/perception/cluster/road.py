@@ -54,6 +54,7 @@ def _bounded(free: Floats) -> tuple[Floats, Floats]:
     below SETTLING_M, from three free numbers; and its derivatives (3, 3).
     """
     departure, derivatives = np.empty(3), np.zeros((3, 3))
+    # u / sqrt(1 + |u|^2) maps all vectors into the unit disc, alike in every direction.
     for part, most in ((slice(2), STEEPEST), (slice(2, 3), SETTLING_M)):
         u = free[part]
         scale = np.sqrt(1 + u @ u)

@@ -104,6 +104,7 @@ def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
     middle where the sensor is level with the side. The heading is known but for half a turn: it
     points away from the sensor.
     """
+    # A body is at least as large as it looks; what is hidden of it is that of its class.
     extents = np.maximum(seen, _ALONG[which])
     half = extents[:2] / 2
     along = np.where(
@@ -111,6 +112,7 @@ def _completed(sides: Sides, seen: Floats, which: int, road_z: float) -> Floats:
     )
     centre = along @ sides.axes
     forward = which // len(_CLASSED)
+    # Rounded: a body straight abeam points one way, whatever the last bits.
     heading = sides.axes[forward] * (
         1.0 if np.round(sides.middle[forward], DECIMALS) >= 0 else -1.0
     )

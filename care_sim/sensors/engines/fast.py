@@ -7,7 +7,7 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
-from care_sim.sensors.engines.picture_kernels import draw_bodies
+from care_sim.sensors.engines.picture_kernels import render_bodies
 from care_sim.sensors.engines.ray_kernels import cast_rays
 from care_sim.world.bullet import FAR_M, BulletWorld, PixelWindow
 
@@ -53,7 +53,7 @@ class Fast:
         lens = camera.focal, camera.width / 2, camera.height / 2
         depths = NEAR_M, FAR_M
         placed = camera.stance(sensor)
-        return draw_bodies(
+        return render_bodies(
             placed, lens, window, depths, world.polyhedra.tables, world.primitives.poses
         )
 

@@ -56,7 +56,7 @@ class BodyInCamera(NamedTuple):
 
 
 @compiled(error_model="numpy")
-def draw_bodies(
+def render_bodies(
     camera: tuple[Floats, Floats],
     lens: tuple[float, float, float],
     window: PixelWindow,

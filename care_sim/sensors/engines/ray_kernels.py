@@ -34,7 +34,7 @@ class Fan(NamedTuple):
     down: Floats
 
 
-class Road(NamedTuple):
+class RoadPlane(NamedTuple):
     """The plane z = 0 of the world: the world's `up` (3,) in the frame of the sensor, the `height`
     of the sensor in metres, and the `body` id of the ground, NO_BODY without one.
     """
@@ -81,7 +81,7 @@ def cast_rays(
     placed = place_parts(pose, solids, poses, GridSpacing(*spacing))
     columns = len(rays.across)
     starts = _row_starts(cells, len(rays.down), columns)
-    ranges, ids = _road_hits(cells, starts, rays, reach, Road(placed.up, z, ground))
+    ranges, ids = _road_hits(cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
 
     for part, (first, last, upper, lower) in enumerate(placed.windows):
         solid = _solid(part, solids, placed.centres, placed.axes)
@@ -101,7 +101,7 @@ def cast_rays(
 
 @compiled(error_model="numpy")
 def _road_hits(
-    cells: Cells, starts: Integers, fan: Fan, reach: float, road: Road
+    cells: Cells, starts: Integers, fan: Fan, reach: float, road: RoadPlane
 ) -> tuple[Floats, Integers]:
     """Ranges and body ids in a world of road alone."""
     ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NO_BODY)

@@ -10,7 +10,7 @@ from care_sim.core.frames import Floats
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.loops.watcher import Situation, WatchedKeyframe
+from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane
 from care_sim.viewer.recording.outlines import outlines
@@ -66,7 +66,7 @@ class PictureLog:
         self._log_detections(watched.situation)
         self._log_grid(watched)
 
-    def _log_detections(self, situation: Situation) -> None:
+    def _log_detections(self, situation: TrueSituation) -> None:
         seen = situation.belief.detections
         names = [
             f"false {name}" if false else name

@@ -11,7 +11,7 @@ from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.driving.braking import BrakingRules
-from care_sim.loops.watcher import Situation, WatchedKeyframe
+from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 
@@ -72,7 +72,7 @@ class SpaceLog:
                 kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, CORNERS]
             )
 
-    def _log_bodies(self, situation: Situation, state: str) -> None:
+    def _log_bodies(self, situation: TrueSituation, state: str) -> None:
         colours = [
             entities.NO_CLASS if label is None else entities.BODY_COLOURS[CLASSES[label]]
             for label in situation.labels
@@ -90,7 +90,7 @@ class SpaceLog:
                 box_batch(around, colors=entities.ACTOR_COLOURS[state], labels=text),
             )
 
-    def _log_ego(self, situation: Situation) -> None:
+    def _log_ego(self, situation: TrueSituation) -> None:
         self._lane.log("world/ego", box_batch(situation.ego[None]))
         self._driven.append(np.array([*situation.ego[:2], 0.03]))
         self._lane.log("world/driven", rr.LineStrips3D([self._driven]))
@@ -104,7 +104,7 @@ class SpaceLog:
         colours = SHARE_COLOUR_ARRAY[watched.shares.ravel()[cells[::step]]]
         self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
 
-    def _log_tracks(self, situation: Situation) -> None:
+    def _log_tracks(self, situation: TrueSituation) -> None:
         tracks = situation.belief.tracks
         colours = [
             entities.COASTING_RGB if misses else entities.EXPLAINED_RGB for misses in tracks.misses
