@@ -29,7 +29,7 @@ main()
 """
 IN_A_FINALISER = """
 import os, signal, sys, time
-from care_sim import interrupts
+from care_sim.base import interrupts
 
 class Interrupted:
     def __del__(self):
@@ -70,7 +70,7 @@ def test_an_interrupt_that_a_finaliser_swallows_comes_again():
 IN_A_LONG_IMPORT = """
 import os, signal, sys
 from importlib.abc import MetaPathFinder
-from care_sim import interrupts
+from care_sim.base import interrupts
 
 class Interrupts(MetaPathFinder):
     def find_spec(self, name, path, target=None):
