@@ -355,8 +355,8 @@ def rig(case):
     known = _fields_of(Rig) | {"grid": AngularGrid, "cameras": lambda: (FRONT_CAMERA,)}
     made = Rig(**draw(case, known))
     made.hulls(_boxes(case))
-    made.wedges(_bundles(case))
-    _ = made.lenses
+    made.grid.wedges(_bundles(case), made.azimuth_margin, made.elevation_margin)
+    _ = made.camera_models
 
 
 def _boxes(case):
