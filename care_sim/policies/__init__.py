@@ -4,12 +4,12 @@
 
 import gymnasium
 
-from care_sim.base.checks import check_known
 from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra
+from care_sim.base.plugins import Plugins
 from care_sim.base.text import shown
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.seed_finder import SeedFinder
-from care_sim.policies.installed import ENTRY_POINTS, entries, load
+from care_sim.policies.installed import policy_faults
 from care_sim.policies.learned.learned_scorer import LearnedScorer
 from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
 from care_sim.policies.paper.all_camera import AllCamera
@@ -29,7 +29,7 @@ from care_sim.policies.parameters import PolicyMaker, check_parameters, is_privi
 
 __all__ = [
     "BUILT_IN",
-    "ENTRY_POINTS",
+    "POLICIES",
     "check_policy",
     "contenders",
     "make_policy",
@@ -60,10 +60,12 @@ BUILT_IN: dict[str, PolicyMaker] = {
     )
 }
 
+POLICIES: Plugins[Policy] = Plugins("policy", "care_sim.policies", BUILT_IN, policy_faults)
+
 
 def policy_names() -> list[str]:
     """Names that `make_policy` knows: the built-in ones, then those of installed packages."""
-    return [*BUILT_IN, *sorted(set(entries()) - set(BUILT_IN))]
+    return POLICIES.names()
 
 
 def contenders() -> list[str]:
@@ -73,8 +75,7 @@ def contenders() -> list[str]:
 
 def check_policy(name: str) -> None:
     """Raise InvalidInput for a name that is not a policy."""
-    if not (isinstance(name, str) and name in BUILT_IN):
-        check_known("policy", name, policy_names())
+    POLICIES.check(name)
 
 
 def tags_of(name: str) -> tuple[str, ...]:
@@ -104,10 +105,8 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
     check_parameters(name, make, parameters)
     if is_privileged(make):
         given.append(_of_environment(name, env, "truth"))
-    if make is SeedFinder:
-        # A rig does not say through which scenario it drives, and scenarios share their first
-        # speeds.
-        parameters = {"scenario": getattr(env.unwrapped, "scenario_name", None), **parameters}
+    for parameter, attribute in getattr(make, "told", Policy.told).items():
+        parameters.setdefault(parameter, getattr(env.unwrapped, attribute, None))
     try:
         policy = make(*given, **parameters)
     except (InvalidInput, MissingExtra):
@@ -124,10 +123,7 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
 
 def maker(name: str) -> PolicyMaker:
     """What makes the policy. Raises InvalidInput with the reason for one that cannot be loaded."""
-    if name in BUILT_IN:
-        return BUILT_IN[name]
-    check_known("policy", name, policy_names())
-    return load(entries()[name])
+    return POLICIES.maker(name)
 
 
 def _check_bare(name: str, env: gymnasium.Env) -> None:

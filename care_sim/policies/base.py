@@ -1,6 +1,7 @@
 """What a policy is: a Belief in, a Demand out; the shared allocator does the rest."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar
 
 from care_sim.base.errors import InvalidInput
@@ -22,13 +23,15 @@ class Policy(ABC):
     """A scripted policy. Subclasses state the idea and its source, and implement `demand`.
 
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
-    keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `demanded` is what
-    `demand` last answered a call with, for those who watch.
+    keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
+    parameters to the attributes of the environment that `make_policy` fills them from, unless they
+    are given. `demanded` is what `demand` last answered a call with, for those who watch.
     """
 
     name: ClassVar[str] = ""
     tags: ClassVar[tuple[str, ...]] = ("causal",)
     source: ClassVar[str] = ""
+    told: ClassVar[Mapping[str, str]] = {}
     demanded: Demand | None = None
 
     def __init__(self, rig: Rig):

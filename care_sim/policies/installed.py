@@ -1,49 +1,16 @@
-"""Policies of installed packages, found through the entry-point group `care_sim.policies`.
-
-The entry's name is the policy's, its object a `Policy` subclass or another callable that takes a
-`Rig` and parameters. Of two entries with one name the first on the path counts, as for modules.
+"""What an entry of the group `care_sim.policies` must be: a `Policy` subclass, or another callable
+that takes a `Rig` and parameters.
 """
 
 import inspect
 from collections.abc import Iterator
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from care_sim.base.errors import InvalidInput
 from care_sim.policies.base import TAGS, Policy
-from care_sim.policies.parameters import PolicyMaker
-
-ENTRY_POINTS = "care_sim.policies"
 
 
-def all_entries() -> list[EntryPoint]:
-    """Every entry, in order of name."""
-    return sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name)
-
-
-def entries() -> dict[str, EntryPoint]:
-    """The entry that counts, by name."""
-    return {entry.name: entry for entry in reversed(all_entries())}
-
-
-def load(entry: EntryPoint) -> PolicyMaker:
-    """What makes the policy. Raises InvalidInput with the reason when there is no using it."""
-    try:
-        made = entry.load()
-    except (Exception, SystemExit) as error:
-        raise InvalidInput(f"{type(error).__name__}: {' '.join(str(error).split())}") from error
-    for fault in _faults(made):
-        raise InvalidInput(f"{entry.value} {fault}")
-    make: PolicyMaker = made
-    return make
-
-
-def package_of(entry: EntryPoint) -> str:
-    """The distribution with its version, or the module of an entry that belongs to none."""
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.module
-
-
-def _faults(made: Any) -> Iterator[str]:
+def policy_faults(made: Any) -> Iterator[str]:
+    """In which ways a loaded object makes no policy, as `care_sim.base.plugins.Plugins` asks."""
     if not callable(made) or (inspect.isclass(made) and not issubclass(made, Policy)):
         yield "is no Policy"
     if inspect.isabstract(made):

@@ -6,9 +6,9 @@ from importlib.metadata import EntryPoint
 from textwrap import wrap
 
 from care_sim.base.errors import InvalidInput
+from care_sim.base.plugins import package_of
 from care_sim.base.text import one_line
-from care_sim.policies import BUILT_IN, maker, policy_names, tags_of
-from care_sim.policies.installed import all_entries, entries, package_of
+from care_sim.policies import BUILT_IN, POLICIES, maker, policy_names, tags_of
 from care_sim.policies.parameters import PolicyMaker, settable
 
 TEXT_WIDTH = 80
@@ -18,13 +18,8 @@ def policy_paragraphs() -> Iterator[str]:
     """One paragraph per policy, then the entries that another policy of the same name hides."""
     for name in policy_names():
         yield _paragraph(name)
-    counting: dict[str, EntryPoint] = {}
-    for entry in all_entries():
-        first = counting.setdefault(entry.name, entry)
-        if entry.name in BUILT_IN:
-            yield _hidden(entry, "the built-in one")
-        elif first is not entry:
-            yield _hidden(entry, f"that of {package_of(first)}")
+    for entry, winner in POLICIES.hidden_entries():
+        yield _hidden(entry, f"that of {package_of(winner)}" if winner else "the built-in one")
 
 
 def parameters_of(make: PolicyMaker) -> list[str]:
@@ -42,7 +37,7 @@ def _paragraph(name: str) -> str:
     try:
         make = maker(name)
     except InvalidInput as error:
-        return _lines(f"{name} (broken)", f"{error} [{package_of(entries()[name])}]")
+        return _lines(f"{name} (broken)", f"{error} [{package_of(POLICIES.entries()[name])}]")
     return _lines(
         f"{name} ({', '.join(tags_of(name))})",
         _summary(name, make),
@@ -58,7 +53,7 @@ def _summary(name: str, make: PolicyMaker) -> str:
     if name in BUILT_IN:
         return (inspect.getdoc(inspect.getmodule(make)) or "").partition("\n")[0]
     said = (make.__doc__ or "").strip().partition("\n")[0]
-    return f"{said} [{package_of(entries()[name])}]".strip()
+    return f"{said} [{package_of(POLICIES.entries()[name])}]".strip()
 
 
 def _hidden(entry: EntryPoint, winner: str) -> str:

@@ -12,8 +12,7 @@ import care_sim
 from care_sim.base import package_files
 from care_sim.base.digests import combined_digest, content_digest, file_digest
 from care_sim.perception.detectors import DETECTORS
-from care_sim.policies import BUILT_IN
-from care_sim.policies.installed import entries
+from care_sim.policies import POLICIES
 
 LIBRARIES = (
     "gymnasium",
@@ -51,7 +50,7 @@ def policy_digest(policy: str) -> str | None:
     package, and those that its defaults, constants and code name (`care_sim.base.package_files`).
     Empty for a built-in policy, None where there are no files to read.
     """
-    return "" if policy in BUILT_IN else _entry_digest(entries()[policy])
+    return "" if policy in POLICIES.built_in else _entry_digest(POLICIES.entries()[policy])
 
 
 def detector_digest(detector: str) -> str | None:

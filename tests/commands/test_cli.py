@@ -1,8 +1,8 @@
 import inspect
-import resource
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -304,17 +304,15 @@ def test_the_defaults_are_those_of_an_episode():
     "command", ["", "run", "sweep", "reproduce", "ablate", "faults", "crowding", "report"]
 )
 def test_help_is_quick_and_complete(command):
-    """In processor time, so that what else the machine does is not counted."""
     code = "import sys; from care_sim.cli import main; main(sys.argv[1:])"
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    started = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", code, *command.split(), "--help"],
         capture_output=True,
         text=True,
         check=True,
     )
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 5
+    assert time.perf_counter() - started < 5
     assert "--help" in done.stdout
     assert "pyarrow" not in done.stderr
 

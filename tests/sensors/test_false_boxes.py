@@ -284,17 +284,14 @@ def dartout():
     return keyframes_of("CARE-Dartout-v0", 2.0, range(32))
 
 
-TOLD = {"dense": 0.55, "cutin": 0.63, "dartout": 0.52, "streets": 0.53}
-"""Area under the curve, the median of the three classifiers, measured with as many boxes as there
-were, up to 1,000 of each kind (24, 60, 60 and 4 drives of CARE at 10%; never less than 513 boxes).
-No world may tell more than that and what chance adds to 300 boxes.
+TOLD = {"dense": 0.5, "cutin": 0.63, "dartout": 0.5, "streets": 0.5}
+"""Area under the curve of single boxes, 0.5 where nothing is told. In the cut-in the median of the
+three classifiers was 0.63, measured with 60 drives of CARE at 10%.
 """
 
 
 @pytest.mark.parametrize("world", TOLD)
-def test_small_classifiers_of_single_boxes_tell_false_from_true_as_badly_as_they_did(
-    world, request
-):
+def test_small_classifiers_of_single_boxes_tell_no_more_than_they_did(world, request):
     """With 300 boxes of each kind. What else tells them apart, and how well, is in
     `docs/concepts.md`.
     """

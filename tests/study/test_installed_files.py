@@ -7,7 +7,7 @@ import pytest
 
 from care_sim.base import package_files
 from care_sim.commands.shared.conduct import conduct
-from care_sim.policies.installed import entries
+from care_sim.policies import POLICIES
 from care_sim.sources.scenes import source_of
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import JOURNAL, Journal
@@ -171,7 +171,7 @@ def test_a_text_in_code_names_no_folder_and_nothing_of_the_system(install, tmp_p
     )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs.d").mkdir()
-    files = package_files.shipped_files(entries()["mine"]).values()
+    files = package_files.shipped_files(POLICIES.entries()["mine"]).values()
     assert package_files.files_named_in(files) == {}
     assert [*package_files.paths_in(("/proc/self/status", {"a": ["/dev/null"]}))] == []
 

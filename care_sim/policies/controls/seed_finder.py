@@ -1,8 +1,9 @@
 """A warning: it finds the seed by the car's first speed and knows the episode from then on."""
 
+from collections.abc import Mapping
 from contextlib import closing
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -40,6 +41,8 @@ class SeedFinder(Policy):
     name = "seed-finder"
     tags = ("generator", "control")
     source = "own: what public seeds give away"
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario_name"}
+    """A rig does not say through which scenario it drives, and scenarios share first speeds."""
 
     def __init__(self, rig: Rig, scenario: str | None = None, seeds: int = 30):
         from care_sim.scenarios import SCENARIOS
