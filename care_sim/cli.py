@@ -10,8 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 from care_sim.base import interrupts
-from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.base.text import one_line, shortened, shown
+from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
 from care_sim.commands.shared.parsing import chosen_command
 
 BAD_INPUT, UNEXPECTED, UNREAD = 2, 70, 141

@@ -10,8 +10,7 @@ from dataclasses import Field, field, fields
 from typing import Any
 
 from care_sim.base.checks import check_flag, check_number, check_range, check_whole, is_number
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 
 _BOUNDS = "bounds"
 _ANY = (float("-inf"), float("inf"))

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, unknown
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown, unknown
 
 LARGEST_INTEGER = 2**31 - 1
 """What a whole number may be where nothing else is said."""

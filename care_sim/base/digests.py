@@ -1,15 +1,19 @@
-"""Hashes of files and folders."""
+"""Hashes of files and folders, and which files lie below a folder."""
 
 import hashlib
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 
-from care_sim.base.package_files import files_below
-
 MOST_FILES = 10_000
 """A folder with more files is not read: hashing so many takes a second."""
+
+_OF_THE_SYSTEM = tuple(
+    map(Path, ("/proc", "/sys", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"))
+)
+"""No files of anybody: they change from one moment to the next."""
 
 
 def file_digest(path: Path) -> str | None:
@@ -19,6 +23,7 @@ def file_digest(path: Path) -> str | None:
     found = [path] if path.is_file() else [*islice(files_below(path), MOST_FILES + 1)]
     if len(found) > MOST_FILES:
         return None
+    # Compiled Python is left out: the interpreter writes it while a policy plays.
     hashes = [
         f"{file.relative_to(path)} {content_digest(file)}"
         for file in sorted(found)
@@ -27,9 +32,20 @@ def file_digest(path: Path) -> str | None:
     return combined_digest(hashes) if hashes else ""
 
 
+def data_digest(paths: Iterable[Path]) -> str:
+    """Hash of the content of several files."""
+    return combined_digest(str(file_digest(path)) for path in paths)
+
+
+def combined_digest(digests: Iterable[str]) -> str:
+    """One hash of several, in their order."""
+    return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
+
+
 def content_digest(path: Path) -> str:
     """Hash of a file as it is now."""
     stat = path.stat()
+    # A file that is written anew keeps neither of its times; the last one no program can set back.
     return _hashed(path, stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
 
 
@@ -40,11 +56,33 @@ def _hashed(path: Path, *_identity: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
-def combined_digest(digests: Iterable[str]) -> str:
-    """One hash of several, in their order."""
-    return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
+def files_below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
+    """The regular files below a folder, in order of name, behind links too, but for links back to a
+    folder above.
+    """
+    real = real_path(folder)
+    if real in above or is_of_the_system(real):
+        return
+    try:
+        inner = sorted(folder.iterdir())
+    except OSError:
+        return
+    for path in inner:
+        if os.path.isdir(path):
+            yield from files_below(path, (*above, real))
+        elif os.path.isfile(path) and not (path.is_symlink() and is_of_the_system(path)):
+            yield path
 
 
-def data_digest(paths: Iterable[Path]) -> str:
-    """Hash of the content of several files."""
-    return combined_digest(str(file_digest(path)) for path in paths)
+def is_of_the_system(path: Path) -> bool:
+    """Whether a path, or what it links to, is none of anybody's files but a view of the system."""
+    return any(
+        each.is_relative_to(place) for each in (path, real_path(path)) for place in _OF_THE_SYSTEM
+    )
+
+
+def real_path(path: Path) -> Path:
+    """The path without links. A link that leads back to itself stays what it is: it has no content,
+    and `Path.resolve` would raise.
+    """
+    return Path(os.path.realpath(path))

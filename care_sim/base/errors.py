@@ -1,9 +1,12 @@
-"""Errors a user can act on: one line that names the thing and what is allowed."""
+"""What a user is told when something is wrong: errors of one line that name the thing and what is
+allowed, and text made fit to be shown.
+"""
 
 import sys
 from collections.abc import Iterable, Sequence
 
-from care_sim.base.text import one_line, shown
+_QUOTED = 120
+"""Characters of a value that a message quotes."""
 
 
 class InvalidInput(ValueError):
@@ -25,6 +28,52 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InvalidInput:
 
 
 def report_problems(problems: Sequence[str]) -> None:
-    """Print them, a line each, where complaints go."""
+    """Print them, one per line, where complaints go."""
     for problem in problems:
         print(f"care-sim: {one_line(problem)}", file=sys.stderr)
+
+
+def error_line(error: BaseException) -> str:
+    """The type of an error and what it says, on one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def shown(value: object) -> str:
+    """A value as a message quotes it: on one line, its middle left out where it is long."""
+    try:
+        text = one_line(repr(value))
+    except Exception:  # whatever a foreign object does; an int of 4,300 digits refuses, too
+        text = f"{'an' if isinstance(value, int) else 'a value of type'} {type(value).__name__}"
+    return shortened(text, _QUOTED)
+
+
+def shortened(text: str, most: int) -> str:
+    """The text, its middle left out where it is longer than `most` characters."""
+    # Three dots and the last 17 characters: what tells two long paths apart is often their end.
+    return text if len(text) <= most else f"{text[: most - 20]}...{text[-17:]}"
+
+
+def one_line(text: str) -> str:
+    """The text on one line; what a terminal would not show is written as escapes."""
+    return printable(" ".join(text.split()))
+
+
+def printable(text: str) -> str:
+    """The text with what a terminal or a file would obey rather than show (control codes,
+    directions, halves of characters) written as escapes.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text
+    )
+
+
+def percent(budget: float) -> str:
+    """A budget as people read it."""
+    return f"{100 * budget:.3g}%"
+
+
+def counted(count: int, unit: str) -> str:
+    """A number of things, as a sentence says it."""
+    return f"{count:,} {unit}{'' if count == 1 else 's'}"

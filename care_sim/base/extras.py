@@ -1,6 +1,11 @@
-"""Optional dependencies, imported where they are used; a missing one is named in one line."""
+"""Libraries of others: optional ones, imported where they are used, with one line that names the
+extra where one is missing; and silence for those that print from C.
+"""
 
 import ctypes
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
 
@@ -8,6 +13,7 @@ from care_sim.base.errors import MissingExtra
 
 OPEN3D_PACKAGES = "libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0"
 """Debian packages with the system libraries that Open3D loads."""
+STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
 
 
 def import_open3d() -> ModuleType:
@@ -75,6 +81,7 @@ def _import(module: str, name: str, extra: str) -> ModuleType:
 
 def _load_libusb() -> None:
     """Give Open3D the libusb of the wheel `libusb-package`, for systems without their own."""
+    # A library that is loaded already is the one that others get who need one of its name.
     try:
         import libusb_package
     except ImportError:
@@ -82,3 +89,22 @@ def _load_libusb() -> None:
     library = libusb_package.get_library_path()
     if library is not None:
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+
+
+@contextmanager
+def silenced(descriptor: int) -> Iterator[None]:
+    """Nothing that is written to a file descriptor comes through while this lasts."""
+    # C keeps a buffer of its own. What it holds from before must leave it while the descriptor
+    # still leads out, and what is printed meanwhile must leave it before the descriptor does again.
+    c_library = ctypes.CDLL(None)
+    c_library.fflush(None)
+    kept = os.dup(descriptor)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    try:
+        yield
+    finally:
+        c_library.fflush(None)
+        os.dup2(kept, descriptor)
+        os.close(kept)
+        os.close(nowhere)

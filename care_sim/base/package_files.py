@@ -1,33 +1,32 @@
-"""The files that decide what an installed policy or detector does: every regular file of its
-distribution, and every one that a default, constant or text of its code names.
+"""The files that an installed policy or detector came with: every regular file of its distribution,
+and of the code of its project.
 
-Not seen are names that code puts together while it plays, or reads from elsewhere.
+What else it reads is told by `care_sim.base.named_files`.
 """
 
 import ast
 import json
-import os
-import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
-from inspect import signature
 from pathlib import Path
-from types import ModuleType
+from typing import NamedTuple
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-from care_sim.base.checks import LONGEST_PATH
-from care_sim.base.code_texts import Name, names
+from care_sim.base.digests import files_below, real_path
 
 _OF_INSTALLERS = (".dist-info", ".egg-info")
 _SCRIPTS = (["bin"], ["Scripts"])
 _SITES = {"site-packages", "dist-packages"}
-_OF_THE_SYSTEM = tuple(
-    map(Path, ("/proc", "/sys", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"))
-)
-"""No files of anybody: they change from one moment to the next."""
+
+
+class SourceNames(NamedTuple):
+    """What a file of code names: `texts` of one line, and the top `modules` that it imports."""
+
+    texts: tuple[str, ...] = ()
+    modules: frozenset[str] = frozenset()
 
 
 def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
@@ -35,28 +34,22 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
     package, or beside its module where no list names it; and of the code of the same project that
     it imports, where that is installed for editing. None where the code has no files to read.
     """
-    files, project, first = _listed(entry), _project(entry), entry.module.partition(".")[0]
+    files = _listed(entry)
+    project = _project(entry)
+    first = entry.module.partition(".")[0]
+
+    # The list of tops grows while it is gone through: code of the project imports more of it.
     tops = [first]
     for top in tops:
         roots = _roots(top)
         if top == first and not roots:
             return None
         for root in roots:
-            if root.is_dir():
-                new = {f"{root.name}/{file.relative_to(root)}": file for file in files_below(root)}
-            else:
-                beside = (
-                    root.parent.iterdir() if top == first and root.name not in files else [root]
-                )
-                new = {file.name: file for file in beside}
+            new = _files_at(root, beside=top == first and root.name not in files)
             files |= new
             if project:
-                imported = sorted(
-                    set().union(*(_read(file)[1] for file in new.values() if file.suffix == ".py"))
-                )
-                tops += [
-                    name for name in imported if name not in tops and _is_of(project, _roots(name))
-                ]
+                tops += _further_tops(new.values(), project, tops)
+
     site = Path(str(entry.dist.locate_file(""))) if entry.dist else None
     return {
         name: file
@@ -65,92 +58,13 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
     }
 
 
-def files_below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
-    """The regular files below a folder, in order of name, behind links too, but for links back to a
-    folder above.
-    """
-    real = _real(folder)
-    if real in above or _is_of_the_system(real):
-        return
-    try:
-        inner = sorted(folder.iterdir())
-    except OSError:
-        return
-    for path in inner:
-        if os.path.isdir(path):
-            yield from files_below(path, (*above, real))
-        elif os.path.isfile(path) and not (path.is_symlink() and _is_of_the_system(path)):
-            yield path
-
-
-def files_named_by(entry: EntryPoint) -> dict[str, Path]:
-    """The files and folders that the defaults and constants in an entry point's code name; relative
-    names from here and from their module. Nothing of code that cannot be loaded.
-
-    A folder that holds the module, or the place where it is played, names no file in particular;
-    nor does the relative default of a function other than the entry and `__init__`.
-    """
-    try:
-        entry.load()
-    except (Exception, SystemExit):
-        return {}
-    here = Path.cwd()
-    found = (
-        path
-        for name, home, loose in _reached(sys.modules[entry.module], entry)
-        for path in _named_by(name, (home,))
-        if path.is_file()
-        or not ((loose and not os.path.isabs(_filled(name))) or _holds(path, home, here))
-    )
-    return {f"named {number}": path for number, path in enumerate(found)}
-
-
-def files_named_in(files: Collection[Path]) -> dict[str, Path]:
-    """The further files that texts in the code among these name, wherever they stand in it:
-    relative names from here and from the code. A folder that a text happens to name is left out.
-    """
-    own = {_real(file) for file in files}
-    found = {
-        f"{source.name} {text} {number}": path
-        for source in files
-        if source.suffix == ".py"
-        for text in _read(source)[0]
-        for number, path in enumerate(_named_by(text, (source.parent,)))
-    }
-    return {name: path for name, path in found.items() if path.is_file() and _real(path) not in own}
-
-
-def paths_in(value: object) -> Iterator[Path]:
-    """What a value names of files and folders that are there, from here; of structures what they
-    hold.
-    """
-    for name, _, _ in names([(value, Path(), False)], {}):
-        yield from _named_by(name, ())
-
-
-def _named_by(value: Name, places: Iterable[Path]) -> Iterator[Path]:
-    name = _filled(value)
-    if 0 < len(name) <= LONGEST_PATH:
-        for path in dict.fromkeys(
-            [str(value), name, *(os.path.join(place, name) for place in places)]
-        ):
-            if (os.path.isfile(path) or os.path.isdir(path)) and not _is_of_the_system(Path(path)):
-                yield Path(path)
-
-
-def _filled(name: Name) -> str:
-    return os.path.expanduser(os.path.expandvars(str(name)))
-
-
 @cache
-def _read(source: Path) -> tuple[tuple[str, ...], frozenset[str]]:
-    """The texts of one line in a file of code, and the modules that it imports; once a process,
-    which has it loaded.
-    """
+def source_names(source: Path) -> SourceNames:
+    """What a file of code names; read once per process, which has it loaded."""
     try:
         nodes = [*ast.walk(ast.parse(source.read_bytes()))]
     except (OSError, ValueError, SyntaxError, RecursionError):
-        return (), frozenset()
+        return SourceNames()
     texts = {
         node.value
         for node in nodes
@@ -164,48 +78,29 @@ def _read(source: Path) -> tuple[tuple[str, ...], frozenset[str]]:
         for node in nodes
         if isinstance(node, ast.ImportFrom) and node.module and not node.level
     ]
-    return tuple(sorted(filter(str.isprintable, texts))), frozenset(
-        name.partition(".")[0] for name in imported
+    return SourceNames(
+        tuple(sorted(filter(str.isprintable, texts))),
+        frozenset(name.partition(".")[0] for name in imported),
     )
 
 
-@cache
-def _reached(module: ModuleType, entry: EntryPoint) -> tuple[tuple[Name, Path, bool], ...]:
-    """What the values of an entry point's code name, as it is when first looked at: it may load
-    more while it plays.
+def _files_at(root: Path, beside: bool) -> dict[str, Path]:
+    """The files of a package's folder, or the file of a module, by name; all that lie beside that
+    one where nobody lists it.
     """
-    files = {os.path.realpath(file) for file in (shipped_files(entry) or {}).values()}
-    loaded = {name: each for name, each in sys.modules.items() if isinstance(each, ModuleType)}
-    places = {name: vars(each).get("__file__") or "" for name, each in loaded.items()}
-    own = {
-        name: _real(Path(file).parent)
-        for name, file in places.items()
-        if os.path.realpath(file) in files or entry.module.startswith(f"{name}.")
-    }
-    home, make = own.get(entry.module, Path()), entry.load()
-    try:
-        given = [parameter.default for parameter in signature(make).parameters.values()]
-    except (TypeError, ValueError):
-        given = []
-    return tuple(names([(value, home, False) for value in (given, make, module)], own))
+    if root.is_dir():
+        return {f"{root.name}/{file.relative_to(root)}": file for file in files_below(root)}
+    return {file.name: file for file in (root.parent.iterdir() if beside else [root])}
 
 
-def _holds(folder: Path, *places: Path) -> bool:
-    real = _real(folder)
-    return any(place.is_relative_to(real) for place in places)
-
-
-def _is_of_the_system(path: Path) -> bool:
-    return any(
-        each.is_relative_to(place) for each in (path, _real(path)) for place in _OF_THE_SYSTEM
+def _further_tops(files: Iterable[Path], project: Path, tops: Collection[str]) -> list[str]:
+    """The packages and modules of the project that files of code import, in order of name, beyond
+    the known `tops`.
+    """
+    imported = sorted(
+        set().union(*(source_names(file).modules for file in files if file.suffix == ".py"))
     )
-
-
-def _real(path: Path) -> Path:
-    """The path without links. A link that leads back to itself stays what it is: it has no content,
-    and `Path.resolve` would raise.
-    """
-    return Path(os.path.realpath(path))
+    return [name for name in imported if name not in tops and _is_of(project, _roots(name))]
 
 
 def _roots(top: str) -> list[Path]:
@@ -224,7 +119,7 @@ def _project(entry: EntryPoint) -> Path | None:
     try:
         told = json.loads((entry.dist and entry.dist.read_text("direct_url.json")) or "")
         return (
-            _real(Path(url2pathname(urlsplit(told["url"]).path)))
+            real_path(Path(url2pathname(urlsplit(told["url"]).path)))
             if told["dir_info"]["editable"]
             else None
         )
@@ -234,7 +129,7 @@ def _project(entry: EntryPoint) -> Path | None:
 
 def _is_of(project: Path, roots: Collection[Path]) -> bool:
     """Whether code lies in a project, and not in an environment within it."""
-    real = [_real(root) for root in roots]
+    real = [real_path(root) for root in roots]
     return bool(real) and all(
         root.is_relative_to(project) and _SITES.isdisjoint(root.parts) for root in real
     )

@@ -11,8 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
 from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import error_line
+from care_sim.base.errors import InvalidInput, error_line
 
 Made = TypeVar("Made")
 

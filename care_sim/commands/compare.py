@@ -13,8 +13,7 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
-from care_sim.base.errors import InvalidInput, report_problems
-from care_sim.base.text import printable
+from care_sim.base.errors import InvalidInput, printable, report_problems
 from care_sim.commands.shared.options import USUAL, Options
 from care_sim.commands.shared.running import DONE, FAILED, console, playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording

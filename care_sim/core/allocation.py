@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole, is_number
 from care_sim.base.compiled import compiled
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.grid import Cells, cell_indices
 from care_sim.core.types import Demand
 

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_number
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core import pinhole_kernels as kernels
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.pinhole_kernels import CameraModel, CameraModels

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action

@@ -5,8 +5,7 @@ return there is.
 from collections.abc import Mapping
 
 from care_sim.base.checks import check_known, check_number
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.loops.records import Keyframe
 
 KEEP_CLEAR_M = 2.0

@@ -11,9 +11,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_flag, check_seed
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.random_streams import check_secret, streams
-from care_sim.base.text import shown
 from care_sim.core.actions import fired_cells
 from care_sim.core.allocation import RandomFloor, budget_cells
 from care_sim.core.belief import Belief

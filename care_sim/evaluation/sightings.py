@@ -33,8 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations

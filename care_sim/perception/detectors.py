@@ -10,9 +10,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from care_sim.base.checks import check_known
-from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
-from care_sim.base.text import error_line, printable, shown
 from care_sim.perception.cluster.detector import ClusterDetector
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
 from care_sim.perception.proxy import Detector, ReturnsProxy

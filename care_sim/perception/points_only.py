@@ -9,8 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput, MissingExtra
-from care_sim.base.text import error_line
+from care_sim.base.errors import InvalidInput, MissingExtra, error_line
 from care_sim.core.frames import Floats, turned
 from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Detections

@@ -4,9 +4,8 @@
 
 import gymnasium
 
-from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
-from care_sim.base.text import shown
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.seed_finder import SeedFinder
 from care_sim.policies.installed import policy_faults

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from textwrap import wrap
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.plugins import package_of
-from care_sim.base.text import one_line
 from care_sim.policies import BUILT_IN, POLICIES, maker, policy_names, tags_of
 from care_sim.policies.parameters import PolicyMaker, settable
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, printable
 from care_sim.base.files import write_text
-from care_sim.base.text import printable
 from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, Study, study_of

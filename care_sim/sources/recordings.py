@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from care_sim.base.checks import check_known, check_path
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.loops.film import Film
 from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.argoverse2.tables import ANNOTATION_FILES, POSE_FILE

@@ -5,8 +5,7 @@ from typing import Any, NamedTuple, Protocol
 
 from care_sim.base.checks import check_known
 from care_sim.base.digests import data_digest, file_digest
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shortened
+from care_sim.base.errors import InvalidInput, shortened
 from care_sim.loops.film import Film
 from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
 from care_sim.sources.streets.recording import record

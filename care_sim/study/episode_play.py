@@ -13,9 +13,8 @@ import gymnasium
 import numpy as np
 
 import care_sim
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.portable_hash import portable_bytes
-from care_sim.base.text import one_line
 from care_sim.core.belief import Observation
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe

@@ -17,9 +17,8 @@ from multiprocessing import get_context
 from multiprocessing.context import BaseContext
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.errors import InvalidInput, MissingExtra, one_line
 from care_sim.base.processes import end_with_parent, starting
-from care_sim.base.text import one_line
 
 if TYPE_CHECKING:
     from dask.distributed import Client

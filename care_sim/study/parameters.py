@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import one_line, shown
+from care_sim.base.errors import InvalidInput, one_line, shown
 
 Parameters = tuple[tuple[str, Any], ...]
 """Names and values, of a scenario's physics, a policy or a detector."""

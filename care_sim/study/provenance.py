@@ -9,8 +9,9 @@ from pathlib import Path
 from uuid import uuid4
 
 import care_sim
-from care_sim.base import package_files
 from care_sim.base.digests import combined_digest, content_digest, file_digest
+from care_sim.base.named_files import files_named_by, files_named_in
+from care_sim.base.package_files import shipped_files
 from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
 
@@ -47,7 +48,7 @@ def code_digest() -> str:
 
 def policy_digest(policy: str) -> str | None:
     """Hash of the files that decide what an installed policy does: those of its distribution and
-    package, and those that its defaults, constants and code name (`care_sim.base.package_files`).
+    package, and those that its defaults, constants and code name (`care_sim.base.named_files`).
     Empty for a built-in policy, None where there are no files to read.
     """
     return "" if policy in POLICIES.built_in else _entry_digest(POLICIES.entries()[policy])
@@ -59,14 +60,14 @@ def detector_digest(detector: str) -> str | None:
 
 
 def _entry_digest(entry: EntryPoint) -> str | None:
-    files = package_files.shipped_files(entry)
+    files = shipped_files(entry)
     if files is None:
         return None
     shipped = [
         f"{name} {_loaded(file) if file.suffix in CODE else content_digest(file)}"
         for name, file in files.items()
     ]
-    further = package_files.files_named_by(entry) | package_files.files_named_in(files.values())
+    further = files_named_by(entry) | files_named_in(files.values())
     named = [(name, file_digest(path)) for name, path in further.items()]
     if any(digest is None for _, digest in named):
         return None

@@ -3,7 +3,7 @@
 To connect a client costs more than to empty one.
 """
 
-from care_sim.base.quiet_output import STANDARD_ERROR, silenced
+from care_sim.base.extras import STANDARD_ERROR, silenced
 
 with silenced(STANDARD_ERROR):  # where it prints its build time
     import pybullet

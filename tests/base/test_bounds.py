@@ -13,8 +13,7 @@ import pytest
 import care_sim
 from care_sim.base.bounds import allowed, bounded, check_fields
 from care_sim.base.checks import check_path, check_whole
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import one_line, shown
+from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.commands.shared.options import seeds_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief

@@ -9,7 +9,8 @@ from uuid import uuid4
 
 import pytest
 
-from care_sim.base import package_files
+from care_sim.base import named_files
+from care_sim.base.digests import files_below
 from care_sim.study import provenance
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
@@ -201,8 +202,8 @@ def test_a_file_in_shared_memory_counts(lay, shared):
 def test_what_is_no_file_of_anybody_does_not_count(tmp_path):
     (tmp_path / "status").symlink_to("/proc/self/status")
     given = ["/dev/null", "/dev/stdout", "/proc/self", "/sys", "/dev/fd", str(tmp_path / "status")]
-    assert [*package_files.paths_in(given)] == []
-    assert [*package_files.files_below(tmp_path)] == []
+    assert [*named_files.paths_in(given)] == []
+    assert [*files_below(tmp_path)] == []
 
 
 def test_a_relative_folder_that_a_helper_writes_to_is_none_of_the_policys(lay, monkeypatch):
@@ -220,12 +221,12 @@ def test_what_a_policy_holds_only_once_it_has_played_leaves_its_key(lay):
     lay({INIT: code, "data/w.npz": "1"})
     config = EpisodeConfig("dartout", "mine", scenario_parameters=(("duration_s", 0.1),))
     before = config.digest()
-    package_files._reached.cache_clear()
+    named_files._reached.cache_clear()
     assert run_episode(config)["digest"] == before
 
 
 def test_a_link_that_leads_back_to_itself_is_no_file(tmp_path):
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "file").write_text("content")
-    assert [path.name for path in package_files.files_below(tmp_path)] == ["file"]
+    assert [path.name for path in files_below(tmp_path)] == ["file"]
     assert file_digest(tmp_path / "loop") == ""

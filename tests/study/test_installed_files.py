@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from care_sim.base import package_files
+from care_sim.base.named_files import files_named_in, paths_in
+from care_sim.base.package_files import shipped_files
 from care_sim.commands.shared.conduct import conduct
 from care_sim.policies import POLICIES
 from care_sim.sources.scenes import source_of
@@ -171,15 +172,15 @@ def test_a_text_in_code_names_no_folder_and_nothing_of_the_system(install, tmp_p
     )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs.d").mkdir()
-    files = package_files.shipped_files(POLICIES.entries()["mine"]).values()
-    assert package_files.files_named_in(files) == {}
-    assert [*package_files.paths_in(("/proc/self/status", {"a": ["/dev/null"]}))] == []
+    files = shipped_files(POLICIES.entries()["mine"]).values()
+    assert files_named_in(files) == {}
+    assert [*paths_in(("/proc/self/status", {"a": ["/dev/null"]}))] == []
 
 
 def test_structures_that_hold_themselves_end():
     cycle = {}
     cycle["a"] = [cycle, "/"]
-    assert set(package_files.paths_in(cycle)) == {Path("/")}
+    assert set(paths_in(cycle)) == {Path("/")}
 
 
 def test_data_files_of_a_wheel_count_and_scripts_do_not(site, tmp_path):

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_sim.base.checks import check_whole
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import write_text
-from care_sim.base.text import counted
 from care_sim.commands.shared.takeover import check_journal, check_kind, check_results, lost
 from care_sim.reports.report import Report
 from care_sim.reports.studies import SWEEP, Study

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import Conditions
 from care_sim.study.parameters import parameters
 from care_sim.study.run_config import MOST_TASKS

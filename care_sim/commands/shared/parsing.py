@@ -9,8 +9,7 @@ from typing import Any
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 
 NUMBERS = ConstructorRegistry()
 """How numbers are read: as tyro reads them, with complaints in plain words."""

@@ -5,8 +5,7 @@ it.
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import counted
+from care_sim.base.errors import InvalidInput, counted
 from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.reports.studies import SWEEP, Study

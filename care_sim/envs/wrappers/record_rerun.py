@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 
 from care_sim.base.checks import check_path
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.extras import import_rerun
-from care_sim.base.text import shown
 from care_sim.core.types import Action
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop

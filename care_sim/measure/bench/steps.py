@@ -11,8 +11,7 @@ import gymnasium
 from gymnasium.utils.performance import benchmark_init, benchmark_step
 
 from care_sim.base.errors import MissingExtra
-from care_sim.base.extras import import_panda_gym
-from care_sim.base.quiet_output import STANDARD_OUTPUT, silenced
+from care_sim.base.extras import STANDARD_OUTPUT, import_panda_gym, silenced
 from care_sim.core.conditions import DEFAULTS
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.driven import Environment, driven

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from care_sim.base.text import printable
+from care_sim.base.errors import printable
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row

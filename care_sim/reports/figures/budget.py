@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.figures.styles import FULL, Style, styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.summary import Cell, summarise

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.formatting import mean
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd

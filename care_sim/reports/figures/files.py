@@ -9,8 +9,8 @@ from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from care_sim.base.errors import printable
 from care_sim.base.files import PNG, SVG, check_output, replacing
-from care_sim.base.text import printable
 
 _FORMATS = (".png", ".svg")
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import altair as alt
 
-from care_sim.base.text import counted, percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.figures.budget import DODGE, SPREAD
 from care_sim.reports.formatting import marked, spread, tag_notes
 from care_sim.reports.page.chart import (

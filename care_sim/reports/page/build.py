@@ -13,9 +13,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import care_sim
+from care_sim.base.errors import counted
 from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
-from care_sim.base.text import counted
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts

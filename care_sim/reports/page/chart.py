@@ -9,7 +9,7 @@ from typing import Any
 import altair as alt
 from matplotlib.colors import to_hex
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.figures.styles import FULL, Style, styles
 from care_sim.reports.formatting import marked
 from care_sim.reports.page.shapes import outline

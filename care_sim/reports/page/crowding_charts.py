@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import altair as alt
 
-from care_sim.base.text import counted, percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.figures.crowding import PALE
 from care_sim.reports.formatting import interval, mean
 from care_sim.reports.page.chart import Chart, inline, specification

@@ -7,7 +7,7 @@ from typing import Any
 
 import altair as alt
 
-from care_sim.base.text import counted
+from care_sim.base.errors import counted
 from care_sim.reports.cells import StudyCells
 from care_sim.reports.figures.faults import MEASURES, CurveMeasure
 from care_sim.reports.figures.styles import FULL, styles

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode
 from care_sim.reports.page.replay import packed

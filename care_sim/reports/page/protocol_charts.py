@@ -5,7 +5,7 @@ from typing import Any
 
 import altair as alt
 
-from care_sim.base.text import counted, percent
+from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.protocol_budgets import APART, DODGE, SPREAD
 from care_sim.reports.figures.protocol_frontier import Point, frontier, recalls

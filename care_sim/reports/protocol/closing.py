@@ -4,7 +4,7 @@ met.
 
 from collections.abc import Mapping, Sequence
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.reports.contrasts import GATE_POINTS
 from care_sim.reports.formatting import interval

@@ -5,7 +5,7 @@ to either.
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import PAPER

@@ -4,7 +4,7 @@ numbers stand.
 
 from collections.abc import Collection, Iterable, Iterator
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.sightings import ANNOTATED, VISIBLE

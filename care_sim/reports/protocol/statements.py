@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.formatting import ends
 from care_sim.reports.protocol.differences import Comparison, MeasuredDifference, SceneThird
 from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, judged, verdict

@@ -4,7 +4,7 @@ allocations.
 
 from collections.abc import Iterator
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import SCENE_THIRDS

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import (
     FIRST_SIGHTING,
     OVERALL,

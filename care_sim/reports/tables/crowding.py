@@ -4,7 +4,7 @@ grows.
 
 from collections.abc import Sequence
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.reports.cells import StudyCells
 from care_sim.reports.contrasts import Contrast
 from care_sim.reports.formatting import interval, mean, median

@@ -4,7 +4,7 @@ have over each.
 
 from collections.abc import Sequence
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
 from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
 from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned

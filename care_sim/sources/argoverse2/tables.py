@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput, unknown
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown, unknown
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.sources.argoverse2.feather import Columns, read_columns

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from care_sim.base.text import percent
+from care_sim.base.errors import percent
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.row_reading import Key, key_of
 from care_sim.study.run_config import Row
