@@ -15,7 +15,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.random_streams import check_secret, streams
 from care_sim.core.actions import fired_cells
 from care_sim.core.allocation import RandomFloor, budget_cells
-from care_sim.core.belief import Belief
+from care_sim.core.belief import OBSERVED, Belief
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
@@ -175,3 +175,9 @@ def sensing(env: gymnasium.Env[Any, Any]) -> SensingEnv[Any]:
     if not (isinstance(env, gymnasium.Env) and isinstance(inner, SensingEnv)):
         raise InvalidInput(f"wrappers of CARE-Sim need one of its environments, got {shown(env)}")
     return inner
+
+
+def shows_belief(env: gymnasium.Env[Any, Any]) -> bool:
+    """Whether observations have the form of CARE-Sim's environments, whatever wrappers did."""
+    space = env.observation_space
+    return isinstance(space, spaces.Dict) and set(OBSERVED) <= set(space.keys())

@@ -76,11 +76,13 @@ def test_writing_into_what_was_given_changes_nothing_that_is_seen_fired_or_kept(
     assert clean == written
 
 
-def test_wrappers_act_on_and_show_what_was_seen_not_what_was_written(make):
-    def wrapped(env):
-        return GridObservation(SectorReserve(env))
+@pytest.mark.parametrize("wrap", [SectorReserve, lambda env: GridObservation(SectorReserve(env))])
+def test_writing_into_what_wrappers_gave_changes_nothing_that_they_act_on_or_show(make, wrap):
+    clean, written = (played(make(wrap), touch) for touch in (lambda *_: None, scrawl))
+    assert clean == written
 
-    clean = played(make(wrapped), lambda *_: None)
+
+def test_writing_into_an_observation_that_a_wrapper_passed_on_is_too_late_for_it(make):
     seen = []
 
     def meddling(env):
@@ -89,9 +91,14 @@ def test_wrappers_act_on_and_show_what_was_seen_not_what_was_written(make):
             scrawl(*observation.values())
             return observation
 
-        return wrapped(gymnasium.wrappers.TransformObservation(env, meddle, env.observation_space))
+        inner = SectorReserve(env)
+        return gymnasium.wrappers.TransformObservation(inner, meddle, env.observation_space)
 
-    assert played(make(meddling), lambda *_: None) == clean
+    def fired(told):
+        return [one for one in told if isinstance(one, list)]
+
+    clean = fired(played(make(SectorReserve), lambda *_: None))
+    assert fired(played(make(meddling), lambda *_: None)) == clean
     assert len(seen) == KEYFRAMES + 1
 
 

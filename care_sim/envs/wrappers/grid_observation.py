@@ -8,7 +8,10 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from care_sim.envs.sensing import sensing
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
+from care_sim.core.belief import OBSERVED, Belief, Observation
+from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.policies.learned.grid_features import EGO_INPUTS, GridFeatures
 
 GridArrays = dict[str, NDArray[np.float32]]
@@ -42,25 +45,47 @@ class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], Record
 
     ### Arguments
     `columns` (64) and `rows` (8) of blocks; each must divide the grid, 512 x 32: a block of 8 x 4
-    cells is 5.6 by 5.3 degrees, about the width of a person's wedge at 15 m. Composes with the
-    other wrappers in any order, since it reads the observation of the unwrapped environment, and
-    nothing but it. Raises `care_sim.InvalidInput` for blocks that do not divide the grid or an
-    environment that is none of CARE-Sim.
+    cells is 5.6 by 5.3 degrees, about the width of a person's wedge at 15 m.
+
+    It draws the observation that it is given and reads nothing else. A wrapper between it and the
+    environment therefore counts: one that hides a detection hides it in the pictures. Such a
+    wrapper must show an observation of the same form. `SectorReserve` and `SectorScores` may stand
+    inside or outside.
+
+    Raises `care_sim.InvalidInput` for blocks that do not divide the grid, for an environment that
+    is none of CARE-Sim or that shows another form of observation, and for an observation that no
+    sensor can give.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], columns: int = 64, rows: int = 8):
-        self._sensing = sensing(env)
-        self.features = GridFeatures(self._sensing.rig, columns, rows)
+        self._rig = sensing(env).rig
+        if not shows_belief(env):
+            raise InvalidInput(
+                "GridObservation needs the observation of CARE-Sim's environments, with "
+                f"{', '.join(OBSERVED)}; {shown(env)} shows another"
+            )
+        self.features = GridFeatures(self._rig, columns, rows)
+        self._given: Belief | None = None
         RecordConstructorArgs.__init__(self, columns=columns, rows=rows)
         gymnasium.ObservationWrapper.__init__(self, env)
-        shown: spaces.Space[Any] = spaces.Dict(
+        pictures: spaces.Space[Any] = spaces.Dict(
             {
                 "grid": spaces.Box(0.0, 1.0, (int(np.prod(self.features.shape)),), np.float32),
                 "ego": spaces.Box(-1.0, 1.0, (len(EGO_INPUTS),), np.float32),
             }
         )
-        self.observation_space = shown
+        self.observation_space = pictures
 
-    def observation(self, observation: Any) -> GridArrays:
-        """The pictures of what the unwrapped environment shows now."""
-        return dict(self.features(self._sensing.belief))
+    @property
+    def belief(self) -> Belief:
+        """What the pictures were last drawn of, for wrappers outside. Raises
+        gymnasium.error.ResetNeeded before the first reset.
+        """
+        if self._given is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping")
+        return self._given
+
+    def observation(self, observation: Observation) -> GridArrays:
+        """The pictures of the observation that was given. Raises InvalidInput for another form."""
+        self._given = self._rig.read(observation)
+        return dict(self.features(self._given))

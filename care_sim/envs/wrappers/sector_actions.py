@@ -1,6 +1,6 @@
 """Actions of a few numbers instead of one per cell: scores of azimuth x elevation sectors."""
 
-from typing import Any
+from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
@@ -8,11 +8,15 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
 from care_sim.core.actions import scores_of
 from care_sim.core.allocation import allocate
+from care_sim.core.belief import Belief
 from care_sim.core.types import Action, Demand
-from care_sim.envs.sensing import sensing
+from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.spaces import checked_scores
+from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
 from care_sim.policies.learned.tiling import Tiling
 
@@ -21,15 +25,15 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
     """One score per sector, from -1 to 1: the range that learners are made for."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
-        self._sensing = sensing(env)
-        self.sectors = Tiling(self._sensing.rig.grid, azimuths, elevations)
+        self._rig = sensing(env).rig
+        self.sectors = Tiling(self._rig.grid, azimuths, elevations)
         RecordConstructorArgs.__init__(self, azimuths=azimuths, elevations=elevations)
         gymnasium.ActionWrapper.__init__(self, env)
         self.action_space = spaces.Box(-1.0, 1.0, self.sectors.shape, np.float32)
 
     def _cells(self, demand: Demand) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
-        rig = self._sensing.rig
+        rig = self._rig
         return scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
 
 
@@ -53,21 +57,52 @@ class SectorReserve(_Sectors):
     everywhere are the `history` policy, cell for cell.
 
     ### Observation
-    That of the wrapped environment.
+    That of the wrapped environment, unchanged. The forecasts are read from it, so a wrapper between
+    this one and the environment counts: if it hides a track, that track has no hull. Outside
+    `GridObservation`, which shows no forecasts, they are those that its pictures were drawn of.
 
     ### Arguments
     `azimuths` (32) and `elevations` (4), which must divide the grid, 512 x 32: a sector is 16 x 8
-    cells, 11.25 by 10.7 degrees; of the reserve of 3%, 148 cells, it takes 128. Raises
-    `care_sim.InvalidInput` for other numbers, for an action of another shape or with values that
-    are not finite, or an environment that is none of CARE-Sim.
+    cells, 11.25 by 10.7 degrees; of the reserve of 3%, 148 cells, it takes 128.
+
+    Raises `care_sim.InvalidInput` for other numbers, for an action of another shape or with values
+    that are not finite, for an environment that is none of CARE-Sim or whose observation no longer
+    tells the forecasts.
     """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
+        super().__init__(env, azimuths, elevations)
+        self._pictures = None if shows_belief(env) else _pictures_inside(env)
+        self._belief: Belief | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = super().reset(seed=seed, options=options)
+        self._read(observation)
+        return observation, info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Fire what `action` makes of the scores and go on to the next keyframe."""
+        answer = super().step(action)
+        self._read(answer[0])
+        return answer
 
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         scores = checked_scores(action, self.sectors.shape)
-        return self._cells(
-            reserve_demand(self._sensing.belief, self._sensing.rig, self.sectors, scores)
-        )
+        if self._belief is None:
+            raise gymnasium.error.ResetNeeded("call reset() before stepping")
+        return self._cells(reserve_demand(self._belief, self._rig, self.sectors, scores))
+
+    def _read(self, observation: Any) -> None:
+        # At once, not when the next action comes: until then the observation is the caller's, who
+        # may write into it.
+        pictures = self._pictures
+        self._belief = self._rig.read(observation) if pictures is None else pictures.belief
 
 
 class SectorScores(_Sectors):
@@ -93,7 +128,18 @@ class SectorScores(_Sectors):
     def action(self, action: NDArray[np.float32]) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         return self._cells(
-            sector_demand(
-                self._sensing.rig, self.sectors, checked_scores(action, self.sectors.shape)
-            )
+            sector_demand(self._rig, self.sectors, checked_scores(action, self.sectors.shape))
         )
+
+
+def _pictures_inside(env: gymnasium.Env[Any, Any]) -> GridObservation:
+    """The outermost `GridObservation` of an environment. Raises InvalidInput if there is none."""
+    layer = env
+    while isinstance(layer, gymnasium.Wrapper):
+        if isinstance(layer, GridObservation):
+            return layer
+        layer = layer.env
+    raise InvalidInput(
+        f"SectorReserve needs the forecasts, and the observation of {shown(env)} does not tell "
+        "them: put it inside the wrapper that changes the observation"
+    )

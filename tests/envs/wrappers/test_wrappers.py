@@ -1,6 +1,7 @@
 """Sectors as actions and coarse pictures as observation, over the environments of both loops."""
 
 import warnings
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -8,8 +9,11 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import Belief
+from care_sim.core.types import ImageDetections
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
+from care_sim.policies.learned.grid_features import GridFeatures
 
 NAMES = ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-Street-v0", "CARE-Replay-v0"]
 ORDERS = [
@@ -112,6 +116,74 @@ def test_wrapping_leaves_the_environment_as_it_is(env):
     wrapped = GridObservation(SectorReserve(env))
     fired(wrapped, [wrapped.action_space.sample()] * 3)
     assert fired(env, [care] * 5) == before
+
+
+class Hidden(gymnasium.ObservationWrapper):
+    """Hides rows of a table from whatever stands around it."""
+
+    def __init__(self, env, table, rows=slice(None)):
+        super().__init__(env)
+        self.table = table
+        self.rows = rows
+
+    def observation(self, observation):
+        table = observation[self.table].copy()
+        table[self.rows, 0] = -1
+        return observation | {self.table: table}
+
+
+def a_keyframe_with_a_residual(wrap):
+    """Six channels of blocks at the first keyframe of a street that has an unexplained box."""
+    env = wrap(gymnasium.make("CARE-Street-v0", disable_env_checker=True, budget=0.1))
+    channels = env.reset(seed=0)[0]["grid"].reshape(6, 8, 64)
+    env.close()
+    return channels
+
+
+@pytest.mark.parametrize("wrap", [GridObservation, lambda env: GridObservation(SectorReserve(env))])
+def test_a_detection_that_a_wrapper_in_between_hides_vanishes_from_the_residual(wrap):
+    plain, without_first, blind = (
+        a_keyframe_with_a_residual(lambda env, rows=rows: wrap(Hidden(env, "detections", rows)))
+        for rows in (slice(0), 0, slice(None))
+    )
+    env = gymnasium.make("CARE-Street-v0", disable_env_checker=True, budget=0.1)
+    observation, _ = env.reset(seed=0)
+    belief = Belief.from_observation(observation)
+    fewer = replace(belief, detections=ImageDetections.from_rows(belief.detections.rows()[1:]))
+    features = GridFeatures(env.unwrapped.rig)
+    env.close()
+    assert not belief.tracks.ids.size, "no forecast explains anything at the first keyframe"
+    np.testing.assert_array_equal(plain.ravel(), features(belief)["grid"])
+    np.testing.assert_array_equal(without_first.ravel(), features(fewer)["grid"])
+    assert without_first[1].sum() < plain[1].sum()
+    assert plain[1].any()
+    assert not blind[1].any()
+
+
+@pytest.mark.parametrize("wrap", [SectorReserve, lambda env: SectorReserve(GridObservation(env))])
+def test_a_track_that_a_wrapper_in_between_hides_has_no_hull(wrap):
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True, budget=0.03)
+    nothing = [np.zeros((4, 32), np.float32)] * 8
+    random = fired(env, [care_sim.make_policy("random", env)] * 8)
+    assert fired(wrap(Hidden(env, "tracks")), nothing) == random
+    assert fired(wrap(env), nothing) != random
+    env.close()
+
+
+def test_an_observation_that_tells_no_belief_is_refused_in_one_line():
+    env = gymnasium.make("CARE-Dense-v0", disable_env_checker=True)
+    flat = gymnasium.wrappers.FlattenObservation(env)
+    with pytest.raises(InvalidInput, match="GridObservation needs the observation of CARE-Sim's"):
+        GridObservation(flat)
+    with pytest.raises(InvalidInput, match="put it inside the wrapper that changes"):
+        SectorReserve(flat)
+    SectorScores(flat)
+    # The space is as before, but what comes is something else.
+    liar = gymnasium.wrappers.TransformObservation(env, lambda _: {}, env.observation_space)
+    for wrapper in (GridObservation, SectorReserve):
+        with pytest.raises(InvalidInput, match="an observation of CARE-Sim's environments"):
+            wrapper(liar).reset(seed=0)
+    env.close()
 
 
 @pytest.mark.parametrize("wrapper", [SectorReserve, SectorScores, GridObservation])
