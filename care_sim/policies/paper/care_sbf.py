@@ -1,7 +1,5 @@
 """CARE with safety-bounded forgetting."""
 
-from inspect import Parameter, Signature, signature
-
 from care_sim.core.belief import Belief
 from care_sim.core.forgetting import Forgetting, ForgettingRules
 from care_sim.core.residual import camera_layers
@@ -14,25 +12,36 @@ class CareSbf(Policy):
     """CARE+SBF of the paper (Sec. 4.3, Algorithm 3): hulls of harmless tracks shrink and are served
     after the full ones; the reserve layers are (U, M).
 
-    Parameters are the fields of `ForgettingRules`, for example `k_safe=0` for unguarded forgetting.
+    Parameters are the fields of `ForgettingRules`, with their units and bounds, for example
+    `k_safe=0` for unguarded forgetting. Raises InvalidInput for a value out of its bounds.
     """
 
     name = "care-sbf"
     source = "CARE paper, Sec. 4.3, Algorithm 3"
 
-    def __init__(self, rig: Rig, **rules: float):
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        k_safe: float = ForgettingRules.k_safe,
+        standstill_m: float = ForgettingRules.standstill_m,
+        headway_s: float = ForgettingRules.headway_s,
+        static_mps: float = ForgettingRules.static_mps,
+        receding_mps: float = ForgettingRules.receding_mps,
+        position_sigma_m: float = ForgettingRules.position_sigma_m,
+        decay_per_keyframe: float = ForgettingRules.decay_per_keyframe,
+    ):
         super().__init__(rig)
-        self._rules = ForgettingRules(**rules)
+        self._rules = ForgettingRules(
+            k_safe=k_safe,
+            standstill_m=standstill_m,
+            headway_s=headway_s,
+            static_mps=static_mps,
+            receding_mps=receding_mps,
+            position_sigma_m=position_sigma_m,
+            decay_per_keyframe=decay_per_keyframe,
+        )
         self.reset()
-
-    # The listing and the check of parameters read the rules and their defaults here.
-    __init__.__signature__ = Signature(  # type: ignore[attr-defined]
-        [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("self", "rig")]
-        + [
-            rule.replace(kind=Parameter.KEYWORD_ONLY)
-            for rule in signature(ForgettingRules).parameters.values()
-        ]
-    )
 
     def reset(self) -> None:
         """Forget the streaks."""
