@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from contextlib import closing
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-
-if TYPE_CHECKING:
-    from care_sim.world.world import World
-
+from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.world.world import World
 
 FALLBACK_SCENARIO = "dense"
 """The scenario that it knows where it is told none."""
@@ -45,8 +44,6 @@ class SeedFinder(Policy):
     """A rig does not say through which scenario it drives, and scenarios share first speeds."""
 
     def __init__(self, rig: Rig, scenario: str | None = None, seeds: int = 30):
-        from care_sim.scenarios import SCENARIOS
-
         scenario = FALLBACK_SCENARIO if scenario is None else scenario
         check_known("scenario", scenario, SCENARIOS)
         check_whole("seeds", seeds, 1, 10**6)
@@ -83,8 +80,6 @@ class SeedFinder(Policy):
         """(n, 7) the box of the hidden actor in the sensor frame, if it is known; the road is
         straight.
         """
-        from care_sim.sensors.lidar import LIDAR_POSITION
-
         sensor = Frame.mounted((self._x, 0.0, 0.0), LIDAR_POSITION)
         return sensor.boxes_to_local(self._hidden[self._keyframe : self._keyframe + 1])
 
@@ -104,8 +99,6 @@ def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
     """(k, 7) where the hidden actor is at every keyframe, in the world frame: it does not
     react to the ego.
     """
-    from care_sim.scenarios import SCENARIOS
-
     boxes: list[Floats] = []
     with closing(_world(scenario, seed)) as world:
         hidden = [world.first_sighting] if world.first_sighting else []
@@ -115,8 +108,6 @@ def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
     return np.array(boxes).reshape(-1, 7)
 
 
-def _world(scenario: str, seed: int) -> "World":
+def _world(scenario: str, seed: int) -> World:
     """The world of a seed, as the environment builds it."""
-    from care_sim.scenarios import make_scenario
-
     return make_scenario(scenario).build(np.random.default_rng(streams((seed,), 1)[0]))
