@@ -126,7 +126,7 @@ class Folder:
             kind="ppo",
             grid=rig.grid,
             budget=rig.budget if len(config.budget) == 1 else None,
-            wrapper=str(config.wrapping),
+            wrapper=config.wrapping,
             scenario=config.env,
             data="episodes of the environment",
             seeds={

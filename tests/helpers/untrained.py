@@ -12,7 +12,7 @@ USUAL = Wrapping()
 
 
 def shapes(wrapping, hidden=5):
-    tall, wide = wrapping.blocks_a_sector
+    tall, wide = wrapping.blocks_per_sector
     return {
         "window.weight": (hidden, len(CHANNELS), tall + 2 * BLOCK_MARGIN, wide + 2 * BLOCK_MARGIN),
         "window.bias": (hidden,),
@@ -33,6 +33,6 @@ def untrained(path, wrapping=USUAL, seed=0, **card):
     save_weights(
         path,
         arrays,
-        Card(**{"kind": "ppo", "grid": AngularGrid(), "wrapper": str(wrapping)} | card),
+        Card(**{"kind": "ppo", "grid": AngularGrid(), "wrapper": wrapping} | card),
     )
     return path

@@ -3,6 +3,7 @@
 from os import PathLike
 from typing import ClassVar
 
+from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -12,7 +13,6 @@ from care_sim.policies.learned.score_map import ScoreMap
 from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
 from care_sim.policies.learned.tiling import Tiling
 from care_sim.policies.learned.weights import load_weights, shipped_weights
-from care_sim.policies.learned.wrapping import Wrapping
 
 
 class PpoPolicy(Policy):
@@ -36,7 +36,9 @@ class PpoPolicy(Policy):
         super().__init__(rig)
         file = load_weights(shipped_weights(self.weights) if path is None else path)
         file.check(PpoPolicy.name, rig)
-        wrapping = Wrapping.parse(file.card.wrapper)
+        wrapping = file.card.wrapper
+        if wrapping is None:
+            raise InvalidInput(f"weights {file.path}: the card names no wrapper")
         self._reserve_alone = wrapping.action == "SectorReserve"
         self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
         self._sectors = Tiling(rig.grid, wrapping.azimuths, wrapping.elevations)

@@ -29,7 +29,7 @@ class ScoreMap:
 
     def __init__(self, weights: Weights, wrapping: Wrapping):
         self._shape = len(CHANNELS), wrapping.rows, wrapping.columns
-        self._stride = wrapping.blocks_a_sector
+        self._stride = wrapping.blocks_per_sector
         self._window = tuple(blocks + 2 * BLOCK_MARGIN for blocks in self._stride)
         kernel = weights.array("window.weight", None, len(CHANNELS), *self._window)
         hidden = len(kernel)

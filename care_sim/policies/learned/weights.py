@@ -22,6 +22,7 @@ from care_sim.base.files import ZIP, replacing
 from care_sim.base.json_text import parsed
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.policies.learned.wrapping import Wrapping, wrapping_of_line
 
 FORMAT = "care-sim weights 1"
 MOST_UNPACKED_BYTES = 2**26
@@ -39,16 +40,16 @@ Arrays = dict[str, NDArray[np.float32]]
 class Card:
     """What a file of weights is, what it fits, and how it was made.
 
-    `kind` names the policy. `grid` is the one that was trained on, `budget` the cells a keyframe,
-    None where any will do; `wrapper` are the wrappers that it was trained behind in one text, None
-    without. `scenario`, `data`, `seeds`, `steps`, `machine`, `versions` and `result` tell people
-    how the weights were trained and what they reached.
+    `kind` names the policy. `grid` is the one that was trained on. `budget` is the number of cells
+    per keyframe, None if any will do. `wrapper` says behind which wrappers the weights were
+    trained, None without. `scenario`, `data`, `seeds`, `steps`, `machine`, `versions` and `result`
+    tell people how the weights were trained and what they reached.
     """
 
     kind: str
     grid: AngularGrid
     budget: int | None = None
-    wrapper: str | None = None
+    wrapper: Wrapping | None = None
     scenario: str | None = None
     data: str = ""
     seeds: Mapping[str, Any] = field(default_factory=dict)
@@ -72,7 +73,8 @@ class Card:
         for name, value in plain.items():
             if not isinstance(value, _TYPES[name]) or isinstance(value, bool):
                 raise ValueError(f"its card says {name} {value!r}")
-        card = cls(**plain | {"grid": _grid(plain["grid"])})
+        made = {"grid": _grid(plain["grid"]), "wrapper": _wrapping(plain["wrapper"])}
+        card = cls(**plain | made)
         if card.budget is not None and not 0 < card.budget <= card.grid.size:
             raise ValueError(f"its card says budget {card.budget}")
         return card
@@ -82,7 +84,7 @@ _TYPES: dict[str, Any] = {column.name: str for column in fields(Card)}
 _TYPES |= {
     "grid": dict,
     "budget": int | None,
-    "wrapper": str | None,
+    "wrapper": dict | str | None,
     "scenario": str | None,
     "steps": int,
 }
@@ -183,6 +185,12 @@ def _grid(plain: dict[str, Any]) -> AngularGrid:
     ):
         raise ValueError(f"its card says grid {plain!r}")
     return AngularGrid(**plain)
+
+
+def _wrapping(stored: dict[str, Any] | str | None) -> Wrapping | None:
+    if isinstance(stored, str):
+        return wrapping_of_line(stored)
+    return None if stored is None else Wrapping.from_plain(stored)
 
 
 def _checked(arrays: dict[str, NDArray[Any]]) -> Arrays:

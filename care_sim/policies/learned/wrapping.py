@@ -1,15 +1,16 @@
-"""The wrappers that weights were trained behind, in one line of text, so that a policy acts and
-sees as its learner.
+"""The wrappers that weights were trained behind, as plain data, so that a policy acts and sees as
+its learner did.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 from care_sim.base.checks import check_known, check_whole
 from care_sim.base.errors import InvalidInput
 
 ACTION_WRAPPERS = ("SectorReserve", "SectorScores")
-_TEXT = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")
 
 
 @dataclass(frozen=True)
@@ -38,23 +39,31 @@ class Wrapping:
                     f"{getattr(self, blocks)}"
                 )
 
-    def __str__(self) -> str:
-        return (
-            f"{self.action} {self.azimuths} x {self.elevations}, GridObservation {self.columns} "
-            f"x {self.rows}"
-        )
-
     @classmethod
-    def parse(cls, text: str | None) -> "Wrapping":
-        """Read text back. Raises InvalidInput for another."""
-        found = _TEXT.fullmatch(text or "")
-        if not found:
-            raise InvalidInput(f"wrapper {text!r} is none of the form '{cls()}'")
-        action, *sizes = found.groups()
-        names = [field.name for field in fields(cls)][1:]
-        return cls(action, **dict(zip(names, map(int, sizes), strict=True)))
+    def from_plain(cls, plain: Mapping[str, Any]) -> "Wrapping":
+        """Read what `dataclasses.asdict` made of one. Raises InvalidInput for anything else."""
+        names = [field.name for field in fields(cls)]
+        if set(plain) != set(names):
+            raise InvalidInput(f"wrapper must have {', '.join(names)}, got {plain!r}")
+        return cls(**plain)
 
     @property
-    def blocks_a_sector(self) -> tuple[int, int]:
+    def blocks_per_sector(self) -> tuple[int, int]:
         """Rows and columns."""
         return self.rows // self.elevations, self.columns // self.azimuths
+
+
+def wrapping_of_line(line: str) -> Wrapping:
+    """Read the form of cards up to 0.2.0, the shipped ones among them: one line of text such as
+    "SectorReserve 32 x 4, GridObservation 64 x 8". Raises InvalidInput for another.
+    """
+    found = _LINE.fullmatch(line)
+    if not found:
+        raise InvalidInput(
+            f"wrapper {line!r} is none of the form 'SectorReserve 32 x 4, GridObservation 64 x 8'"
+        )
+    action, *sizes = found.groups()
+    return Wrapping(action, *map(int, sizes))
+
+
+_LINE = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")

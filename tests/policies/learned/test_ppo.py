@@ -4,6 +4,7 @@ without PyTorch.
 
 import subprocess
 import sys
+from dataclasses import asdict
 
 import gymnasium
 import numpy as np
@@ -148,6 +149,7 @@ def test_it_acts_without_torch(tmp_path):
         ({"budget": 819}, r"budget is 819 cells \(0.04999\), needed is 492"),
         ({"grid": AngularGrid(columns=256)}, "grid is columns 256"),
         ({"kind": "learned-scorer"}, "kind is 'learned-scorer', needed is 'ppo'"),
+        ({"wrapper": None}, "the card names no wrapper"),
         (
             {"wrapper": "GridObservation"},
             "wrapper 'GridObservation' is none of the form 'SectorReserve 32 x 4, Grid",
@@ -156,12 +158,17 @@ def test_it_acts_without_torch(tmp_path):
             {"wrapper": "SectorReserve 16 x 4, GridObservation 64 x 8"},
             "array 'window.weight' has the shape",
         ),
+        ({"wrapper": Wrapping(azimuths=16)}, "array 'window.weight' has the shape"),
         (
             {"wrapper": "SectorReserve 0 x 4, GridObservation 64 x 8"},
             "azimuths must be a whole number >= 1",
         ),
         (
             {"wrapper": "SectorReserve 32 x 4, GridObservation 48 x 8"},
+            "azimuths must divide columns, got 32 and 48",
+        ),
+        (
+            {"wrapper": asdict(Wrapping()) | {"columns": 48}},
             "azimuths must divide columns, got 32 and 48",
         ),
     ],

@@ -2,6 +2,7 @@
 line.
 """
 
+import json
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -22,13 +23,14 @@ from care_sim.policies.learned.weights import (
     save_weights,
     shipped_weights,
 )
+from care_sim.policies.learned.wrapping import Wrapping
 
 ARRAYS = {"weight": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.zeros(3, np.float32)}
 CARD = Card(
     "learned-scorer",
     AngularGrid(),
     budget=492,
-    wrapper="SectorReserve 32 x 4",
+    wrapper=Wrapping("SectorScores", 16, 2, 32, 4),
     seeds={"train": [1]},
 )
 RIG = Rig(budget=492)
@@ -48,6 +50,43 @@ def test_what_is_written_is_read_back_bit_for_bit(saved):
     for name, array in ARRAYS.items():
         assert weights.arrays[name].dtype == np.float32
         np.testing.assert_array_equal(weights.arrays[name], array)
+
+
+def in_the_first_form(path: Path, arrays, card, line: str) -> None:
+    """Write weights as up to 0.2.0, when a card named the wrappers in one line of text."""
+    save_weights(path, arrays, replace(card, wrapper=None))
+    with np.load(path) as file:
+        entries = dict(file)
+    plain = json.loads(bytes(entries["card"])) | {"wrapper": line}
+    entries["card"] = np.frombuffer(json.dumps(plain, indent=1).encode(), np.uint8)
+    np.savez(path, **entries)
+
+
+def test_wrappers_are_plain_data_and_cards_of_the_first_form_are_still_read(tmp_path):
+    card = json.loads(CARD.to_json())
+    assert card["wrapper"] == {
+        "action": "SectorScores",
+        "azimuths": 16,
+        "elevations": 2,
+        "columns": 32,
+        "rows": 4,
+    }
+    line = "SectorScores 16 x 2, GridObservation 32 x 4"
+    in_the_first_form(tmp_path / "old.npz", ARRAYS, CARD, line)
+    assert load_weights(tmp_path / "old.npz").card == CARD
+    for other in ("GridObservation", "SectorScores 0 x 2, GridObservation 32 x 4", ""):
+        in_the_first_form(tmp_path / "old.npz", ARRAYS, CARD, other)
+        with pytest.raises(InvalidInput, match=r"wrapper|azimuths") as refusal:
+            load_weights(tmp_path / "old.npz")
+        assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", ["ppo-dense", "ppo-dartout"])
+def test_shipped_weights_are_of_the_first_form_and_tell_the_usual_wrappers(name):
+    with np.load(shipped_weights(name)) as file:
+        stored = json.loads(bytes(file["card"]))["wrapper"]
+    assert stored == "SectorReserve 32 x 4, GridObservation 64 x 8"
+    assert load_weights(shipped_weights(name)).card.wrapper == Wrapping()
 
 
 def test_the_same_weights_give_the_same_bytes(saved, tmp_path):
@@ -201,6 +240,10 @@ def one_array(path: Path) -> None:
         other('"columns": 512', '"columns": "x"'),
         other('"columns": 512', '"column": 512'),
         other('"steps": 0', '"steps": "x"'),
+        other('"azimuths": 16', '"azimuths": 16.0'),
+        other('"azimuths": 16', '"azimuths": 3'),
+        other('"azimuths": 16', '"sectors": 16'),
+        other('"action": "SectorScores"', '"action": "Scores"'),
         large,
         twice,
         squeezed,
