@@ -8,8 +8,8 @@ CLOSED_LOOP = {
     "CARE-CutIn-v0": "care_sim.envs.closed_loop:CutInEnv",
 }
 OPEN_LOOP = {
-    "CARE-Street-v0": "care_sim.envs.open_loop:StreetEnv",
-    "CARE-Replay-v0": "care_sim.envs.open_loop:ReplayEnv",
+    "CARE-Street-v0": "care_sim.envs.scenes:StreetEnv",
+    "CARE-Replay-v0": "care_sim.envs.scenes:ReplayEnv",
 }
 IDS = CLOSED_LOOP | OPEN_LOOP
 """Entry points of all environments, by id."""

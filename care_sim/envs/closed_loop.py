@@ -20,6 +20,7 @@ from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.world.world import WORLD_STEP_S, whole_steps
 
 LONGEST_KEYFRAME_S = 1.0
@@ -172,8 +173,6 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """A picture (H, W, 3) of the last keyframe: chase view, camera, fired cells."""
         if self.render_mode is None:
             return None
-        from care_sim.viewer.pictures.keyframe import draw_keyframe
-
         return draw_keyframe(self.loop, self.keyframes[-1] if self.keyframes else None)
 
     def close(self) -> None:

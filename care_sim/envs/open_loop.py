@@ -3,7 +3,6 @@
 from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from functools import lru_cache
-from os import PathLike
 from typing import Any
 from zlib import crc32
 
@@ -22,11 +21,7 @@ from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.perception.detectors import PROXY, check_detector, make_detector
-from care_sim.sensors.lidar import LIDAR_POSITION
-from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.recordings import film_of, recordings
-from care_sim.sources.streets.draft import STREET_KEYFRAME_S
-from care_sim.sources.streets.recording import street_film
+from care_sim.viewer.pictures.scene_from_above import draw_plan
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
 """Conditions that a film, once made, cannot take on."""
@@ -93,7 +88,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         **parameters: Any,
     ):
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
-        _check_arguments(type(self), parameters)
+        check_film_arguments(type(self), parameters)
         check_presence(presence)
         conditions = conditions_of(parameters)
         check_detector(detector)
@@ -160,8 +155,6 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """
         if self.render_mode is None:
             return None
-        from care_sim.viewer.pictures.scene_from_above import draw_plan
-
         record = self.keyframes[-1] if self.keyframes else None
         index = record.index if record else self.loop.index
         found = self._masks[-1] if self._masks else np.zeros(len(self.loop.shot.annotations), bool)
@@ -188,7 +181,8 @@ class FilmEnv(OpenLoopEnv):
         return self.start(self.film, self.entropy(seed))
 
 
-def _check_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -> None:
+def check_film_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -> None:
+    """Raise InvalidInput for a name that a class of environments does not take."""
     for name in UNFILMED:
         if name in parameters:
             raise InvalidInput(
@@ -203,60 +197,3 @@ def _sightings(film: Film, presence: str) -> Sightings:
     return Sightings.of(
         film.name, [shot.annotations for shot in film.shots], hidden=film.hidden, presence=presence
     )
-
-
-class StreetEnv(OpenLoopEnv):
-    """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
-
-    The seed of `reset` draws the street (`care_sim.sources.streets`) and everything else that is
-    random. Seeds 0 to 149 are the evaluation's: train on others. `learned-scorer` learned from 1000
-    to 1019, the calibration's. With a `secret` all are other streets, none of them in the published
-    tables.
-    """
-
-    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
-
-    def __init__(self, **parameters: Any):
-        super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], STREET_KEYFRAME_S, **parameters)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode in the street of a seed. `info` holds what repeats it; there are no
-        `options`.
-        """
-        super().reset(seed=seed)
-        entropy = self.entropy(seed)
-        return self.start(street_film(entropy, self._secret), entropy)
-
-
-class ReplayEnv(FilmEnv):
-    """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
-
-    `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of
-    their scenes by name; the first, unless given. `split`, `version` and `camera_detections` are
-    those of `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token
-    that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
-    faults, noise and floor.
-    """
-
-    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
-
-    def __init__(
-        self,
-        *,
-        source: str = "",
-        scene: str | None = None,
-        split: str | None = None,
-        version: str | None = None,
-        camera_detections: str | PathLike[str] | None = None,
-        **parameters: Any,
-    ):
-        _check_arguments(type(self), parameters)
-        if not isinstance(scene, str | None):
-            raise InvalidInput(f"scene must be a name, got {shown(scene)}")
-        options = {"split": split, "version": version, "camera_detections": camera_detections}
-        recorded = recordings(source, options)
-        super().__init__(
-            film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters
-        )

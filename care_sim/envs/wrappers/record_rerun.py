@@ -21,14 +21,21 @@ if TYPE_CHECKING:
     from care_sim.viewer.recording.recording import RecordedEpisode, Recording
 
 
-def recording(path: Path, lanes: Sequence[str]) -> "Recording":
-    """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed.
-    `lanes` are their names. Raises as `RecordRerun` does.
+def _recording_class() -> "type[Recording]":
+    """The class, imported when somebody records. Its module imports Rerun, of the optional extra
+    'viewer', and this wrapper can be imported without it. Raises MissingExtra without Rerun.
     """
     import_rerun()
     from care_sim.viewer.recording.recording import Recording
 
-    return Recording(path, lanes)
+    return Recording
+
+
+def recording(path: Path, lanes: Sequence[str]) -> "Recording":
+    """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed.
+    `lanes` are their names. Raises as `RecordRerun` does.
+    """
+    return _recording_class()(path, lanes)
 
 
 class RecordRerun(Watching):
@@ -63,10 +70,7 @@ class RecordRerun(Watching):
         name: str | None = None,
     ):
         super().__init__(env, policy)
-        import_rerun()
-        from care_sim.viewer.recording.recording import Recording
-
-        if not isinstance(path, Recording):
+        if not isinstance(path, _recording_class()):
             check_path("path", path)
         if not isinstance(name, str | None):
             raise InvalidInput(f"name must be a text, got {shown(name)}")

@@ -1,0 +1,71 @@
+"""The environments of the open loop by id: generated streets and recorded scenes."""
+
+from os import PathLike
+from typing import Any
+
+from care_sim.base.errors import InvalidInput
+from care_sim.base.text import shown
+from care_sim.envs.open_loop import FilmEnv, OpenLoopEnv, check_film_arguments
+from care_sim.envs.sensing import Observed
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.sources.recordings import film_of, recordings
+from care_sim.sources.streets.draft import STREET_KEYFRAME_S
+from care_sim.sources.streets.recording import street_film
+
+
+class StreetEnv(OpenLoopEnv):
+    """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
+
+    The seed of `reset` draws the street (`care_sim.sources.streets`) and everything else that is
+    random. Seeds 0 to 149 are the evaluation's: train on others. `learned-scorer` learned from 1000
+    to 1019, the calibration's. With a `secret` all are other streets, none of them in the published
+    tables.
+    """
+
+    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
+
+    def __init__(self, **parameters: Any):
+        super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], STREET_KEYFRAME_S, **parameters)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Begin an episode in the street of a seed. `info` holds what repeats it; there are no
+        `options`.
+        """
+        super().reset(seed=seed)
+        entropy = self.entropy(seed)
+        return self.start(street_film(entropy, self._secret), entropy)
+
+
+class ReplayEnv(FilmEnv):
+    """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
+
+    `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of
+    their scenes by name; the first, unless given. `split`, `version` and `camera_detections` are
+    those of `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token
+    that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
+    faults, noise and floor.
+    """
+
+    __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
+
+    def __init__(
+        self,
+        *,
+        source: str = "",
+        scene: str | None = None,
+        split: str | None = None,
+        version: str | None = None,
+        camera_detections: str | PathLike[str] | None = None,
+        **parameters: Any,
+    ):
+        check_film_arguments(type(self), parameters)
+        if not isinstance(scene, str | None):
+            raise InvalidInput(f"scene must be a name, got {shown(scene)}")
+        options = {"split": split, "version": version, "camera_detections": camera_detections}
+        recorded = recordings(source, options)
+        super().__init__(
+            film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters
+        )
