@@ -3,8 +3,7 @@
 from os import PathLike
 from typing import Any
 
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.envs.open_loop import FilmEnv, OpenLoopEnv, check_film_arguments
 from care_sim.envs.sensing import Observed
 from care_sim.sensors.lidar import LIDAR_POSITION

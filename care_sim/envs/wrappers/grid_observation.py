@@ -8,8 +8,7 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from care_sim.base.errors import InvalidInput
-from care_sim.base.text import shown
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.belief import OBSERVED, Belief, Observation
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.policies.learned.grid_features import EGO_INPUTS, GridFeatures
