@@ -11,10 +11,12 @@ import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 
 import pytest
+from pyarrow.parquet import read_schema
 
 import care_sim.wrappers
 from care_sim import cli
 from care_sim.base.errors import InvalidInput
+from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import IDS
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.places import ROOT
@@ -190,3 +192,15 @@ def test_the_notebook_runs_from_top_to_bottom_and_is_kept_without_outputs():
 def test_the_citation_names_this_version():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "results").rglob("*s.parquet")), ids=name_of)
+def test_every_column_of_the_results_is_explained(file):
+    """By its name in the page, but for the conditions, which have a page of their own."""
+    told = set(re.findall(r"`([\w/ .-]+)`", (ROOT / "docs" / "columns.md").read_text()))
+    unknown = {
+        name
+        for name in read_schema(file).names
+        if not {name, re.sub(r"\..*", ".NAME", name)} & told and name not in DEFAULTS
+    }
+    assert not {name for name in unknown if "/" not in name}
