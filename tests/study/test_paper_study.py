@@ -18,15 +18,15 @@ def test_the_study_has_245_episodes_in_the_stated_split():
     assert {c.budget for c in configs if c.policy == "full"} == {1.0}
 
 
-def test_every_published_figure_belongs_to_a_cell_that_is_run():
+def test_every_published_result_belongs_to_a_cell_that_is_run():
     cells = {
         (c.scenario, c.policy, c.budget, bool(c.false_negative_rate or c.camera_latency))
         for c in paper.paper_study([0])
     }
-    for entry in paper.PUBLISHED:
+    for entry in paper.PUBLISHED_RESULTS:
         assert any(entry.covers(*cell) for cell in cells), entry
-    assert paper.published("dartout", "history", 0.1, False).figure.startswith("11.9")
-    assert paper.published("dartout", "history", 0.03, False) is None
+    assert paper.published_result("dartout", "history", 0.1, False).detection_m == 11.9
+    assert paper.published_result("dartout", "history", 0.03, False) is None
 
 
 def test_crowding_varies_the_vehicles_from_none_to_all():

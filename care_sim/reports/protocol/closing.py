@@ -11,7 +11,7 @@ from care_sim.reports.formatting import interval
 from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import MET, NOT_MET
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals
-from care_sim.reports.protocol.paper import BUDGETS, GATE
+from care_sim.reports.protocol.paper import GATE, PAPER_BUDGETS
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.study.run_config import REFERENCE, Row
 from care_sim.study.settings import Setting
@@ -53,7 +53,7 @@ def _gains(plays: SettingPlays) -> dict[float, MeasuredDifference]:
     return {
         budget: difference
         for budget in plays.budgets
-        if budget in BUDGETS and (difference := pair.measured(plays, budget))
+        if budget in PAPER_BUDGETS and (difference := pair.measured(plays, budget))
     }
 
 

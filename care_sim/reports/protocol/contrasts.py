@@ -8,9 +8,9 @@ from typing import NamedTuple
 from care_sim.base.errors import percent
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
-from care_sim.reports.protocol.formatting import PAPER
+from care_sim.reports.protocol.formatting import PAPER, claims_of_paper
 from care_sim.reports.protocol.notes import UNITS, left_out, on_intervals, papers, played
-from care_sim.reports.protocol.paper import statements_about
+from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE
@@ -40,7 +40,7 @@ def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
 
 def _table(plays: SettingPlays, base: str, alike: bool) -> Table:
     contrasts = list(_contrasts(plays, base, alike))
-    said = statements_about(plays.setting)
+    said = claims_about(plays.setting)
     intervals = on_intervals(
         difference for contrast in contrasts for difference in contrast.differences
     )
@@ -53,7 +53,7 @@ def _table(plays: SettingPlays, base: str, alike: bool) -> Table:
         papers(
             said[contrast.pair].source
             for contrast in contrasts
-            if contrast.pair in said and said[contrast.pair].among(plays.budgets)
+            if contrast.pair in said and said[contrast.pair].any_at(plays.budgets)
         ),
         terminal=not alike,
     )
@@ -81,6 +81,6 @@ def _lines(plays: SettingPlays, contrasts: Iterable[ContrastLine]) -> Iterator[t
             yield (heading,)
         if any(differences):
             yield (marked(policy, plays.tags[policy]), *map(interval, differences))
-            said = statements_about(plays.setting).get(pair)
-            if said and (entries := said.among(plays.budgets)):
+            said = claims_about(plays.setting).get(pair)
+            if entries := claims_of_paper(said, plays.budgets):
                 yield (PAPER, *entries)

@@ -1,19 +1,69 @@
-"""How the protocol's numbers are written in tables."""
+"""How the protocol's numbers are written in tables, ours and the paper's."""
 
-from care_sim.evaluation.scene_contrasts import Ratio
+from collections.abc import Sequence
+
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
 from care_sim.reports.formatting import emphasised, mean, signed
 from care_sim.reports.protocol.differences import MeasuredDifference, decimals_of
+from care_sim.reports.protocol.paper import Claim, Claims, PublishedLevel
 
 PAPER = "(paper)"
 """What the line under a policy begins with that holds the paper's numbers."""
 MET = "met"
 NOT_MET = "not met"
 UNDECIDED = "undecided"
+_SIGNS_ALONE = {1: "above", -1: "below", 0: "tied"}
 
 
 def written(ratio: Ratio, value: float | None) -> str:
     """A level in the unit of its measure."""
     return "" if value is None else f"{value:.{decimals_of(ratio)}f}"
+
+
+def level_of_paper(said: PublishedLevel) -> tuple[str, ...]:
+    """The paper's levels of a policy, in the order of the columns: recall and share of the full
+    scan's, of first sightings and of all; TTFD.
+    """
+    return (
+        written(FIRST_SIGHTING, said.first),
+        rounded(said.first_of_full),
+        written(OVERALL, said.overall),
+        rounded(said.overall_of_full),
+        written(TTFD, said.ttfd),
+    )
+
+
+def rounded(share: float | None, unit: str = "") -> str:
+    """A share in whole %."""
+    return "" if share is None else f"{share:.0f}{unit}"
+
+
+def claims_of_paper(claims: Claims | None, budgets: Sequence[float]) -> tuple[str, ...]:
+    """What the paper says at each of these budgets; nothing at all where it speaks of none."""
+    if claims is None or not claims.any_at(budgets):
+        return ()
+    return tuple(_claim(claims.at(budget)) for budget in budgets)
+
+
+def _claim(claim: Claim | None) -> str:
+    """A claim with all that the paper tells of it."""
+    if claim is None:
+        return ""
+    # The paper's numbers have as many decimals as they need, and one at least. That is how Python
+    # writes a float.
+    ends = "" if claim.ends is None else f" [{claim.ends[0]},{claim.ends[1]}]"
+    if claim.sign:
+        return f"{claim_in_short(claim)}{ends}"
+    bound = "" if claim.at_most is None else f", at most {claim.at_most}"
+    size = "" if claim.mean is None else f", {claim.mean:+}{ends}"
+    return f"{claim_in_short(claim)}{bound}{size}"
+
+
+def claim_in_short(claim: Claim) -> str:
+    """A claim without interval or size of a tie."""
+    if claim.mean is None or not claim.sign:
+        return _SIGNS_ALONE[claim.sign]
+    return f"{claim.mean:+}" if claim.upper is None else f"{claim.mean:+} to {claim.upper}"
 
 
 def verdict(difference: MeasuredDifference, claimed: int) -> str:
@@ -22,16 +72,16 @@ def verdict(difference: MeasuredDifference, claimed: int) -> str:
         return UNDECIDED
     if difference.sign == claimed:
         return MET
+    # An interval around zero neither bears a claimed sign out nor speaks against it. One without
+    # zero speaks against the other sign, and against a tie.
     return NOT_MET if difference.sign else UNDECIDED
 
 
-def judged(difference: MeasuredDifference | None, claimed: int | None, paper: str) -> str:
-    """A difference, whether it bears a claim out, and the claim as the paper has it; bold as `mean`
-    is.
-    """
+def judged(difference: MeasuredDifference | None, claim: Claim | None) -> str:
+    """A difference, whether it bears the claim out, and the claim itself; bold as `mean` is."""
     if difference is None:
         return ""
-    if claimed is None:
+    if claim is None:
         return mean(difference)
-    text = f"{signed(difference)} {verdict(difference, claimed)}{difference.suffix} ({paper})"
-    return emphasised(difference, text)
+    found = f"{signed(difference)} {verdict(difference, claim.sign)}{difference.suffix}"
+    return emphasised(difference, f"{found} ({claim_in_short(claim)})")

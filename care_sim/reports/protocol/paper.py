@@ -2,7 +2,7 @@
 sentences.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,51 +15,51 @@ from care_sim.reports.protocol.differences import (
 )
 from care_sim.study.settings import Setting
 
-BUDGETS = (0.10, 0.20, 0.35)
-_SIGNS = {"+": 1, "above": 1, "-": -1, "below": -1, "tied": 0}
+PAPER_BUDGETS = (0.10, 0.20, 0.35)
 
 
 @dataclass(frozen=True)
-class Said:
-    """What the paper says at each of its budgets, empty where nothing, and the sentence or table it
-    stands in.
+class Claim:
+    """What the paper says of one difference at one budget, in the unit of the measure.
 
-    An entry begins with a signed number, with above or below where the paper gives a sign alone, or
-    with tied.
+    `sign`: 1 where the first named has more, -1 where it has less, 0 where the paper calls the two
+    tied. All else is None where the paper does not tell it. `ends` are those of its 95% interval;
+    a range of differences runs from `mean` to `upper`; a tie differs by `at_most` so much.
     """
 
-    entries: tuple[str, str, str]
+    sign: int
+    mean: float | None = None
+    ends: tuple[float, float] | None = None
+    upper: float | None = None
+    at_most: float | None = None
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What the paper says of one difference by budget, and the sentence or table it stands in."""
+
+    by_budget: Mapping[float, Claim]
     source: str
 
-    def at(self, budget: float) -> str:
-        """The entry of a budget, empty where nothing is said."""
-        return dict(zip(BUDGETS, self.entries, strict=True)).get(budget, "")
+    def at(self, budget: float) -> Claim | None:
+        """The claim for a budget, None where nothing is said."""
+        return self.by_budget.get(budget)
 
-    def among(self, budgets: Sequence[float]) -> tuple[str, ...]:
-        """The entries of these budgets; none at all where nothing is said at any of them."""
-        entries = tuple(map(self.at, budgets))
-        return entries if any(entries) else ()
-
-    def short(self, budget: float) -> str:
-        """The entry without interval or size of a tie."""
-        return self.at(budget).partition(" [")[0].partition(",")[0]
-
-    def sign(self, budget: float) -> int | None:
-        """1 or -1, 0 for tied, None where nothing is said."""
-        entry = self.at(budget)
-        return next((sign for start, sign in _SIGNS.items() if entry.startswith(start)), None)
+    def any_at(self, budgets: Iterable[float]) -> bool:
+        """Whether anything is said at one of these budgets."""
+        return any(budget in self.by_budget for budget in budgets)
 
 
 class PublishedLevel(NamedTuple):
-    """What the paper says of one policy: recalls and their shares of the full scan's in %, TTFD in
-    keyframes.
+    """What the paper says of one policy, None where nothing: recalls and their shares of the full
+    scan's in %, TTFD in keyframes.
     """
 
-    first: str = ""
-    first_of_full: str = ""
-    overall: str = ""
-    overall_of_full: str = ""
-    ttfd: str = ""
+    first: float | None = None
+    first_of_full: float | None = None
+    overall: float | None = None
+    overall_of_full: float | None = None
+    ttfd: float | None = None
 
 
 _TABLE_1 = (
@@ -144,79 +144,141 @@ GATE = (
     "The effect-size gate fixed before the runs, five points of first-sighting recall, is met at "
     "10% and 20%; the 35% gain stays positive but below it."
 )
-_TIED = ("tied", "tied", "tied")
 
-_PLAIN: dict[Comparison, Said] = {
-    PolicyPair("care", "history", FIRST_SIGHTING): Said(
-        ("+5.2 [4.3,6.2]", "+5.2 [4.3,6.2]", "+4.3 [3.5,5.1]"), _TABLE_1
+
+def _difference(
+    mean: float, ends: tuple[float, float] | None = None, upper: float | None = None
+) -> Claim:
+    """A claim of more or of less: the sign is that of the mean."""
+    return Claim(1 if mean > 0 else -1, mean, ends, upper)
+
+
+def _everywhere(claim: Claim, source: str) -> Claims:
+    """The same claim at all of the paper's budgets."""
+    return Claims(dict.fromkeys(PAPER_BUDGETS, claim), source)
+
+
+def _by_budget(*claims: Claim | None, source: str) -> Claims:
+    """One claim per budget of the paper, None where it says nothing."""
+    by_budget = zip(PAPER_BUDGETS, claims, strict=True)
+    return Claims({budget: claim for budget, claim in by_budget if claim}, source)
+
+
+_MORE = Claim(1)
+_LESS = Claim(-1)
+_TIED = Claim(0)
+
+_PLAIN: dict[Comparison, Claims] = {
+    PolicyPair("care", "history", FIRST_SIGHTING): _by_budget(
+        _difference(5.2, (4.3, 6.2)),
+        _difference(5.2, (4.3, 6.2)),
+        _difference(4.3, (3.5, 5.1)),
+        source=_TABLE_1,
     ),
-    PolicyPair("care", "uncertainty", FIRST_SIGHTING): Said(
-        ("+3.5 [2.6,4.4]", "+2.7 [1.7,3.8]", "+2.1 [1.1,3.1]"), _TABLE_1
+    PolicyPair("care", "uncertainty", FIRST_SIGHTING): _by_budget(
+        _difference(3.5, (2.6, 4.4)),
+        _difference(2.7, (1.7, 3.8)),
+        _difference(2.1, (1.1, 3.1)),
+        source=_TABLE_1,
     ),
-    PolicyPair("care", "beam-reduce", FIRST_SIGHTING): Said(("+2.0", "tied", "tied"), _BEAMS),
-    PolicyPair("care", "all-camera", FIRST_SIGHTING): Said(_TIED, _CAMERA),
-    PolicyPair("care", "learned-scorer", FIRST_SIGHTING): Said(_TIED, _LEARNED),
-    PolicyPair("care", "history-oracle", FIRST_SIGHTING): Said(("+3.7 to 4.7",) * 3, _ORACLE),
-    PolicyPair("history-oracle", "history", FIRST_SIGHTING): Said(
-        ("tied, at most 0.5",) * 3, _ORACLE
+    PolicyPair("care", "beam-reduce", FIRST_SIGHTING): _by_budget(
+        _difference(2.0), _TIED, _TIED, source=_BEAMS
     ),
-    PolicyPair("history-uniform", "history", FIRST_SIGHTING): Said(("below",) * 3, _UNIFORM),
-    PolicyPair("care-priority", "care", FIRST_SIGHTING): Said(
-        ("tied, at most 0.2",) * 3, _PRIORITY
+    PolicyPair("care", "all-camera", FIRST_SIGHTING): _everywhere(_TIED, _CAMERA),
+    PolicyPair("care", "learned-scorer", FIRST_SIGHTING): _everywhere(_TIED, _LEARNED),
+    PolicyPair("care", "history-oracle", FIRST_SIGHTING): _everywhere(
+        _difference(3.7, upper=4.7), _ORACLE
     ),
-    PolicyPair("care", "history", FIRST_SIGHTING, alike=True): Said(
-        ("+5.3", "+5.2", "+4.2"), _ALIKE
+    PolicyPair("history-oracle", "history", FIRST_SIGHTING): _everywhere(
+        Claim(0, at_most=0.5), _ORACLE
     ),
-    PolicyPair("care", "history", OVERALL): Said(("-0.8", "-0.5", "+0.6"), _HISTORY),
-    PolicyPair("care", "uncertainty", OVERALL): Said(("-1.0", "-2.2", "-0.5"), _UNCERTAINTY),
-    PolicyPair("care", "beam-reduce", OVERALL): Said(
-        ("+17.4 [15.9,19.0]", "+11.5 [10.4,12.7]", "+6.4 [5.4,7.5]"), _TABLE_1
+    PolicyPair("history-uniform", "history", FIRST_SIGHTING): _everywhere(_LESS, _UNIFORM),
+    PolicyPair("care-priority", "care", FIRST_SIGHTING): _everywhere(
+        Claim(0, at_most=0.2), _PRIORITY
     ),
-    PolicyPair("care", "learned-scorer", OVERALL): Said(
-        ("+2.4 [1.9,3.0]", "+0.7 [0.4,1.0]", "+0.6 [0.3,0.9]"), _TABLE_1
+    PolicyPair("care", "history", FIRST_SIGHTING, alike=True): _by_budget(
+        _difference(5.3), _difference(5.2), _difference(4.2), source=_ALIKE
     ),
-    PolicyPair("care", "all-camera", OVERALL): Said(
-        ("-0.13 [-0.26,-0.01]", "+0.5 [0.3,0.8]", "+0.7 [0.4,1.0]"), _TABLE_1
+    PolicyPair("care", "history", OVERALL): _by_budget(
+        _difference(-0.8), _difference(-0.5), _difference(0.6), source=_HISTORY
     ),
-    PolicyPair("history-oracle", "history", OVERALL): Said(("+0.5 to 0.7",) * 3, _ORACLE),
-    PolicyPair("history-uniform", "history", OVERALL): Said(("below",) * 3, _UNIFORM),
-    PolicyPair("care-sbf", "care", OVERALL, "range/below 20 m"): Said(
-        ("tied, -0.5 [-1.7,0.4]", "-3.1 [-4.7,-1.5]", ""), _GUARD
+    PolicyPair("care", "uncertainty", OVERALL): _by_budget(
+        _difference(-1.0), _difference(-2.2), _difference(-0.5), source=_UNCERTAINTY
     ),
-    PolicyPair("care", "history", TTFD): Said(("-0.12", "-0.13", "-0.12"), _TTFD),
-    SceneThird("dense", "tracks", OVERALL): Said(("", "+0.7", "+1.0"), _DENSE),
-    SceneThird("sparse", "tracks", OVERALL): Said(("", "tied", "tied"), _DENSE),
-    SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL): Said(("", "+0.7", "+1.3"), _DENSE),
-    SceneThird("dense", "tracks", FIRST_SIGHTING): Said(_TIED, _DENSE),
-    SceneThird("middle", "tracks", FIRST_SIGHTING): Said(("tied", "-1.3", "tied"), _DENSE),
-    SceneThird("sparse", "tracks", FIRST_SIGHTING): Said(_TIED, _DENSE),
-    SceneThird(DENSE_LESS_SPARSE, "explained", OVERALL): Said(("", "above", "above"), _DENSE),
+    PolicyPair("care", "beam-reduce", OVERALL): _by_budget(
+        _difference(17.4, (15.9, 19.0)),
+        _difference(11.5, (10.4, 12.7)),
+        _difference(6.4, (5.4, 7.5)),
+        source=_TABLE_1,
+    ),
+    PolicyPair("care", "learned-scorer", OVERALL): _by_budget(
+        _difference(2.4, (1.9, 3.0)),
+        _difference(0.7, (0.4, 1.0)),
+        _difference(0.6, (0.3, 0.9)),
+        source=_TABLE_1,
+    ),
+    PolicyPair("care", "all-camera", OVERALL): _by_budget(
+        _difference(-0.13, (-0.26, -0.01)),
+        _difference(0.5, (0.3, 0.8)),
+        _difference(0.7, (0.4, 1.0)),
+        source=_TABLE_1,
+    ),
+    PolicyPair("history-oracle", "history", OVERALL): _everywhere(
+        _difference(0.5, upper=0.7), _ORACLE
+    ),
+    PolicyPair("history-uniform", "history", OVERALL): _everywhere(_LESS, _UNIFORM),
+    PolicyPair("care-sbf", "care", OVERALL, "range/below 20 m"): _by_budget(
+        Claim(0, -0.5, (-1.7, 0.4)), _difference(-3.1, (-4.7, -1.5)), None, source=_GUARD
+    ),
+    PolicyPair("care", "history", TTFD): _by_budget(
+        _difference(-0.12), _difference(-0.13), _difference(-0.12), source=_TTFD
+    ),
+    SceneThird("dense", "tracks", OVERALL): _by_budget(
+        None, _difference(0.7), _difference(1.0), source=_DENSE
+    ),
+    SceneThird("sparse", "tracks", OVERALL): _by_budget(None, _TIED, _TIED, source=_DENSE),
+    SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL): _by_budget(
+        None, _difference(0.7), _difference(1.3), source=_DENSE
+    ),
+    SceneThird("dense", "tracks", FIRST_SIGHTING): _everywhere(_TIED, _DENSE),
+    SceneThird("middle", "tracks", FIRST_SIGHTING): _by_budget(
+        _TIED, _difference(-1.3), _TIED, source=_DENSE
+    ),
+    SceneThird("sparse", "tracks", FIRST_SIGHTING): _everywhere(_TIED, _DENSE),
+    SceneThird(DENSE_LESS_SPARSE, "explained", OVERALL): _by_budget(
+        None, _MORE, _MORE, source=_DENSE
+    ),
 }
-_STRICT_CAUSAL: dict[Comparison, Said] = {
-    PolicyPair("care", "history", FIRST_SIGHTING): Said(("+4.6", "+5.3", "+2.6"), _CAUSAL)
+_STRICT_CAUSAL: dict[Comparison, Claims] = {
+    PolicyPair("care", "history", FIRST_SIGHTING): _by_budget(
+        _difference(4.6), _difference(5.3), _difference(2.6), source=_CAUSAL
+    ),
 }
-LEVELS = {
-    ("full", 1.0): PublishedLevel("24.5", "100", "49.4", "100"),
-    ("care", 0.10): PublishedLevel(ttfd="3.64"),
-    ("care", 0.20): PublishedLevel(ttfd="3.47"),
-    ("care", 0.35): PublishedLevel(first_of_full="88", overall_of_full="94", ttfd="3.33"),
-    ("history", 0.10): PublishedLevel(ttfd="3.76"),
-    ("history", 0.20): PublishedLevel(ttfd="3.60"),
-    ("history", 0.35): PublishedLevel(first_of_full="70", overall_of_full="93", ttfd="3.45"),
-    ("care-priority", 0.10): PublishedLevel(overall="38.0"),
-    ("care-priority", 0.20): PublishedLevel(overall="41.8"),
-    ("care-priority", 0.35): PublishedLevel(overall="45.7"),
+PUBLISHED_LEVELS = {
+    ("full", 1.0): PublishedLevel(24.5, 100.0, 49.4, 100.0),
+    ("care", 0.10): PublishedLevel(ttfd=3.64),
+    ("care", 0.20): PublishedLevel(ttfd=3.47),
+    ("care", 0.35): PublishedLevel(first_of_full=88.0, overall_of_full=94.0, ttfd=3.33),
+    ("history", 0.10): PublishedLevel(ttfd=3.76),
+    ("history", 0.20): PublishedLevel(ttfd=3.60),
+    ("history", 0.35): PublishedLevel(first_of_full=70.0, overall_of_full=93.0, ttfd=3.45),
+    ("care-priority", 0.10): PublishedLevel(overall=38.0),
+    ("care-priority", 0.20): PublishedLevel(overall=41.8),
+    ("care-priority", 0.35): PublishedLevel(overall=45.7),
 }
-LEVELS_SAID = (_CEILING, _TTFD, _PRIORITY)
-ALLOCATIONS = {"all-camera": Said(("17%", "", "68%"), _MECHANICAL)}
+"""By policy and budget."""
+LEVEL_SOURCES = (_CEILING, _TTFD, _PRIORITY)
+PUBLISHED_ALLOCATIONS = {"all-camera": {0.10: 17.0, 0.35: 68.0}}
+"""Share of keyframes in % on which a policy's allocation differs from that of CARE, by budget."""
+ALLOCATION_SOURCE = _MECHANICAL
 
 
 def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
     """A recall in % that the paper gives of a policy, itself or as a share of the full scan's; None
-    without.
+    where it gives neither, and for TTFD.
     """
-    said = LEVELS.get((policy, budget), PublishedLevel())
-    full = LEVELS["full", 1.0]
+    said = PUBLISHED_LEVELS.get((policy, budget), PublishedLevel())
+    full = PUBLISHED_LEVELS["full", 1.0]
     if ratio is FIRST_SIGHTING:
         own = said.first
         share = said.first_of_full
@@ -227,12 +289,12 @@ def published_level(ratio: Ratio, policy: str, budget: float) -> float | None:
         ceiling = full.overall
     else:
         return None
-    if own:
-        return float(own)
-    return float(share) * float(ceiling) / 100 if share else None
+    if own is not None or share is None or ceiling is None:
+        return own
+    return share * ceiling / 100
 
 
-def statements_about(setting: Setting) -> Mapping[Comparison, Said]:
+def claims_about(setting: Setting) -> Mapping[Comparison, Claims]:
     """What the paper says under these conditions, whatever the films and the detector are."""
     if setting.strict_causal:
         return _STRICT_CAUSAL

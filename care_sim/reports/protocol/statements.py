@@ -8,7 +8,7 @@ from care_sim.reports.formatting import ends
 from care_sim.reports.protocol.differences import Comparison, MeasuredDifference, SceneThird
 from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, judged, verdict
 from care_sim.reports.protocol.notes import UNITS, on_intervals, papers
-from care_sim.reports.protocol.paper import BUDGETS, Said, statements_about
+from care_sim.reports.protocol.paper import PAPER_BUDGETS, Claims, claims_about
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.reports.table import Table
 
@@ -32,8 +32,8 @@ def statements_tables(plays: SettingPlays) -> list[Table]:
     """One line a statement, at the paper's budgets; none where the paper says nothing of such
     plays.
     """
-    said = statements_about(plays.setting)
-    budgets = [budget for budget in plays.budgets if budget in BUDGETS]
+    said = claims_about(plays.setting)
+    budgets = [budget for budget in plays.budgets if budget in PAPER_BUDGETS]
     found = {
         each: {budget: each.measured(plays, budget) for budget in budgets}
         for each in said
@@ -72,7 +72,7 @@ def _is_played(statement: Comparison, plays: SettingPlays) -> bool:
     return set(statement.policies) <= set(plays.policies)
 
 
-def _lines(measured: Measured, said: Mapping[Comparison, Said]) -> Iterator[tuple[str, ...]]:
+def _lines(measured: Measured, said: Mapping[Comparison, Claims]) -> Iterator[tuple[str, ...]]:
     heading = ""
     for each, differences in measured.items():
         if each.heading != heading:
@@ -88,21 +88,19 @@ def _lines(measured: Measured, said: Mapping[Comparison, Said]) -> Iterator[tupl
         )
 
 
-def _entries(difference: MeasuredDifference | None, said: Said, budget: float) -> tuple[str, str]:
+def _entries(
+    difference: MeasuredDifference | None, claims: Claims, budget: float
+) -> tuple[str, str]:
     """The difference with the verdict and the paper's beside it; its interval."""
-    return judged(difference, said.sign(budget), said.short(budget)), ends(difference)
+    return judged(difference, claims.at(budget)), ends(difference)
 
 
-def _count(measured: Measured, said: Mapping[Comparison, Said]) -> str:
-    claims = [
-        (difference, said[each].sign(budget))
+def _count(measured: Measured, said: Mapping[Comparison, Claims]) -> str:
+    verdicts = Counter(
+        verdict(difference, claim.sign)
         for each, differences in measured.items()
         for budget, difference in differences.items()
-    ]
-    verdicts = Counter(
-        verdict(difference, claimed)
-        for difference, claimed in claims
-        if difference and claimed is not None
+        if difference and (claim := said[each].at(budget))
     )
     listed = ", ".join(f"{verdicts[each]} {each}" for each in (MET, NOT_MET, UNDECIDED))
     return f"Of {verdicts.total()}, each budget counted: {listed}."
@@ -114,7 +112,7 @@ def _asides(measured: Measured) -> tuple[str, ...]:
     return (*((THIRDS,) if thirds else ()), *((UNIFORM,) if uniform else ()))
 
 
-def _not_played(plays: SettingPlays, said: Mapping[Comparison, Said]) -> tuple[str, ...]:
+def _not_played(plays: SettingPlays, said: Mapping[Comparison, Claims]) -> tuple[str, ...]:
     named = dict.fromkeys(
         policy for each in said for policy in each.policies if policy not in plays.policies
     )

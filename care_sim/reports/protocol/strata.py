@@ -16,9 +16,13 @@ from care_sim.reports.protocol.differences import (
     PolicyPair,
     SceneThird,
 )
-from care_sim.reports.protocol.formatting import PAPER, written
+from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded, written
 from care_sim.reports.protocol.notes import UNITS, papers
-from care_sim.reports.protocol.paper import ALLOCATIONS, statements_about
+from care_sim.reports.protocol.paper import (
+    ALLOCATION_SOURCE,
+    PUBLISHED_ALLOCATIONS,
+    claims_about,
+)
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE
@@ -106,7 +110,7 @@ def thirds_tables(plays: SettingPlays) -> list[Table]:
     """
     if not _has_thirds(plays):
         return []
-    said = statements_about(plays.setting)
+    said = claims_about(plays.setting)
     return [
         Table(
             f"{plays.setting.label}: care minus all-camera in thirds of the scenes",
@@ -114,9 +118,9 @@ def thirds_tables(plays: SettingPlays) -> list[Table]:
             tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
             (f"{UNITS} {RANKED}",),
             papers(
-                text.source
-                for each, text in said.items()
-                if isinstance(each, SceneThird) and text.among(plays.budgets)
+                claims.source
+                for each, claims in said.items()
+                if isinstance(each, SceneThird) and claims.any_at(plays.budgets)
             ),
             terminal=False,
         )
@@ -148,8 +152,8 @@ def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[tuple[str, ...]
 
 def _third_lines(plays: SettingPlays, third: SceneThird) -> Iterator[tuple[str, ...]]:
     yield (third.label, *(interval(third.measured(plays, budget)) for budget in plays.budgets))
-    said = statements_about(plays.setting).get(third)
-    if said and (entries := said.among(plays.budgets)):
+    said = claims_about(plays.setting).get(third)
+    if entries := claims_of_paper(said, plays.budgets):
         yield (PAPER, *entries)
 
 
@@ -163,12 +167,7 @@ def allocation_tables(plays: SettingPlays) -> list[Table]:
     """How often every policy fires other cells than CARE, and how many; none without CARE."""
     if not plays.others:
         return []
-    asked = {
-        name: text
-        for name, text in ALLOCATIONS.items()
-        if name in plays.others and text.among(plays.budgets)
-    }
-    said = {} if plays.setting.conditions else asked
+    said = _published_shares(plays)
     lines: list[tuple[str, ...]] = []
     for policy in plays.others:
         lines.append(
@@ -178,7 +177,8 @@ def allocation_tables(plays: SettingPlays) -> list[Table]:
             )
         )
         if policy in said:
-            lines.append((PAPER, *said[policy].among(plays.budgets)))
+            shares = (said[policy].get(budget) for budget in plays.budgets)
+            lines.append((PAPER, *(rounded(share, "%") for share in shares)))
     return [
         Table(
             f"{plays.setting.label}: keyframes on which the allocation differs from that of "
@@ -186,9 +186,22 @@ def allocation_tables(plays: SettingPlays) -> list[Table]:
             ("policy", *map(percent, plays.budgets)),
             tuple(lines),
             (DIFFERING, *tag_notes(plays.tags.values())),
-            papers(each.source for each in said.values()),
+            papers(ALLOCATION_SOURCE for _ in said),
         )
     ]
+
+
+def _published_shares(plays: SettingPlays) -> dict[str, dict[float, float]]:
+    """The shares that the paper gives of policies and budgets that were played, by policy; it gives
+    them for the default conditions alone.
+    """
+    if plays.setting.conditions:
+        return {}
+    return {
+        policy: shares
+        for policy, shares in PUBLISHED_ALLOCATIONS.items()
+        if policy in plays.others and not shares.keys().isdisjoint(plays.budgets)
+    }
 
 
 def _differing(plays: SettingPlays, policy: str, budget: float) -> str:

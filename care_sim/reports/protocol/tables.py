@@ -14,9 +14,9 @@ from care_sim.evaluation.scene_contrasts import (
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
 from care_sim.reports.protocol.differences import RATIOS
-from care_sim.reports.protocol.formatting import PAPER, written
+from care_sim.reports.protocol.formatting import PAPER, level_of_paper, rounded, written
 from care_sim.reports.protocol.notes import left_out, papers
-from care_sim.reports.protocol.paper import LEVELS, LEVELS_SAID, PublishedLevel
+from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.protocol.statements import statements_tables
 from care_sim.reports.protocol.strata import allocation_tables, strata_tables, thirds_tables
@@ -68,7 +68,7 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
             LEVEL_COLUMNS,
             tuple(lines),
             (*missing, *left_out(plays), *tag_notes(plays.tags.values())),
-            papers(LEVELS_SAID) if any(line[1] == PAPER for line in lines) else (),
+            papers(LEVEL_SOURCES) if any(line[1] == PAPER for line in lines) else (),
             LEVEL_FILES_ONLY,
             LEVEL_WHOLE,
         )
@@ -92,12 +92,10 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
         _deviation(plays, OVERALL, policy, budget),
         str(len(plays.tallies(policy, budget))),
     )
-    said = None if plays.setting.conditions else LEVELS.get((policy, budget))
-    return [line, *([_said_line(said)] if said else [])]
-
-
-def _said_line(said: PublishedLevel) -> tuple[str, ...]:
-    return ("", PAPER, *said, *("" for _ in LEVEL_FILES_ONLY))
+    said = None if plays.setting.conditions else PUBLISHED_LEVELS.get((policy, budget))
+    if said is None:
+        return [line]
+    return [line, ("", PAPER, *level_of_paper(said), *("" for _ in LEVEL_FILES_ONLY))]
 
 
 def _of_full(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
@@ -105,7 +103,7 @@ def _of_full(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> s
     ours = plays.tallies(policy, budget)
     full = plays.tallies(FULL, 1.0)
     value, ceiling = (_over(ratio, tallies, set(ours) & set(full)) for tallies in (ours, full))
-    return f"{100 * value / ceiling:.0f}" if value is not None and ceiling else ""
+    return rounded(100 * value / ceiling) if value is not None and ceiling else ""
 
 
 def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | None:

@@ -11,7 +11,16 @@ from dataclasses import dataclass
 
 from care_sim.reports.formatting import median
 from care_sim.reports.summary import Cell, summarise
-from care_sim.study.designs.paper import CAMERA_POLICIES, paper_cells
+from care_sim.study.designs.paper import (
+    CAMERA_POLICIES,
+    DARTOUT_CAMERA,
+    DARTOUT_HISTORY,
+    DENSE_ALL_CAMERA_M,
+    DENSE_CARE_M,
+    DENSE_FULL_M,
+    PAPER_EPISODES,
+    paper_cells,
+)
 from care_sim.study.run_config import Row
 
 CellsByName = dict[tuple[str, str, float, str], Cell]
@@ -60,36 +69,41 @@ def _dartout(cells: CellsByName) -> list[Statement]:
     passes = [_pass(cell) for cell in camera]
     latest = min(camera, key=_median)
     at = "dart-out 10%: "
+    about = f"about {DARTOUT_CAMERA.detection_m:.0f}"
+    camera_pass = DARTOUT_CAMERA.pass_m
+    history_pass = DARTOUT_HISTORY.pass_m
+    braking_share = DARTOUT_HISTORY.braked / PAPER_EPISODES
     return [
         Statement(
             at + "camera policies brake in every episode",
-            "5/5",
+            f"{DARTOUT_CAMERA.braked}/{PAPER_EPISODES}",
             ", ".join(f"{cell.policy} {cell.braked}/{cell.episodes}" for cell in camera),
             all(cell.braked == cell.episodes for cell in camera),
         ),
         Statement(
             at + "camera policies detect within 0.3 m of full",
-            "about 15",
+            about,
             f"{_list(camera)}, full {_shown(full)}",
             max(gaps) <= 0.3,
         ),
         Statement(
             at + "history detects at least 2 m later",
-            "11.9 against about 15",
+            f"{DARTOUT_HISTORY.detection_m} against {about}",
             f"{_shown(history)} against {_shown(latest)}",
             _median(latest) - _median(history) >= 2.0,
         ),
         Statement(
             at + "history brakes in 3 of 5 episodes, to a tenth",
-            "3/5",
+            f"{DARTOUT_HISTORY.braked}/{PAPER_EPISODES}",
             f"{history.braked}/{history.episodes}",
-            abs(history.braked / history.episodes - 0.6) <= 0.1,
+            abs(history.braked / history.episodes - braking_share) <= 0.1,
         ),
         Statement(
-            at + "camera policies pass at 5.7 m or more, history at 4.0 m, to 0.5 m",
-            "5.7 or more against 4.0",
+            f"{at}camera policies pass at {camera_pass} m or more, history at {history_pass} m, "
+            "to 0.5 m",
+            f"{camera_pass} or more against {history_pass}",
             f"{min(passes):.1f} or more against {_pass(history):.1f}",
-            min(passes) >= 5.7 and abs(_pass(history) - 4.0) <= 0.5,
+            min(passes) >= camera_pass and abs(_pass(history) - history_pass) <= 0.5,
         ),
     ]
 
@@ -105,13 +119,13 @@ def _dense(cells: CellsByName) -> list[Statement]:
     return [
         Statement(
             "dense 3%: care detects within 0.5 m of full",
-            "15.1, full 15.1",
+            f"{DENSE_CARE_M}, full {DENSE_FULL_M}",
             f"{_shown(care)}, full {_shown(full)}",
             _gap(care, full) <= 0.5,
         ),
         Statement(
             "dense 3%: all-camera detects at least 3 m later than care",
-            "10.3 against 15.1",
+            f"{DENSE_ALL_CAMERA_M} against {DENSE_CARE_M}",
             f"{_shown(camera)} against {_shown(care)}",
             _median(care) - _median(camera) >= 3.0,
         ),

@@ -10,7 +10,12 @@ from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Me
 from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned
 from care_sim.reports.summary import Cell, summarise
 from care_sim.reports.table import Table
-from care_sim.study.designs.paper import Published, paper_cells, published
+from care_sim.study.designs.paper import (
+    PAPER_EPISODES,
+    PublishedResult,
+    paper_cells,
+    published_result,
+)
 from care_sim.study.row_reading import Groups, Key, full_of, grouped
 from care_sim.study.run_config import FULL, REFERENCE, Row
 from care_sim.study.settings import Setting
@@ -47,9 +52,9 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
 
 def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     """Medians, counts and regret, one row a cell."""
-    sayings = [_published(cell) for cell in cells]
-    sentences = dict.fromkeys(f'Paper: "{saying.sentence}"' for saying in sayings if saying)
-    lines = (_line(cell, saying) for cell, saying in zip(cells, sayings, strict=True))
+    published = [_published(cell) for cell in cells]
+    sentences = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
+    lines = (_line(cell, result) for cell, result in zip(cells, published, strict=True))
     regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
     missing = [] if regretted else ["Regret: full not run."]
     notes = [*tag_notes(cell.tags for cell in cells), *missing]
@@ -108,13 +113,13 @@ def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast
     )
 
 
-def _published(cell: Cell) -> Published | None:
+def _published(cell: Cell) -> PublishedResult | None:
     if (cell.setting, cell.policy, cell.budget) not in paper_cells():
         return None
-    return published(cell.setting.world, cell.policy, cell.budget, cell.setting.faults)
+    return published_result(cell.setting.world, cell.policy, cell.budget, cell.setting.faults)
 
 
-def _line(cell: Cell, saying: Published | None) -> tuple[str, ...]:
+def _line(cell: Cell, published: PublishedResult | None) -> tuple[str, ...]:
     return (
         percent(cell.budget),
         marked(cell.policy, cell.tags),
@@ -127,8 +132,18 @@ def _line(cell: Cell, saying: Published | None) -> tuple[str, ...]:
         unsigned(cell.regret),
         ends(cell.regret) if cell.regret else "",
         f"{cell.as_full}/{cell.regret.difference.pairs}" if cell.regret else "",
-        saying.figure if saying else "",
+        _paper(published) if published else "",
     )
+
+
+def _paper(result: PublishedResult) -> str:
+    """The paper's words where it gives no number; else its first detection, and how many episodes
+    braked where it tells.
+    """
+    if result.relation:
+        return result.relation.value
+    braked = "" if result.braked is None else f", {result.braked}/{PAPER_EPISODES}"
+    return f"{result.detection_m:g}{braked}"
 
 
 def _share(count: int, cell: Cell) -> str:

@@ -1,17 +1,19 @@
-"""The closed-loop study of the paper (Sec. 5.6): its 49 configurations, and the figures it
-published.
+"""The closed-loop study of the paper (Sec. 5.6): its 49 configurations, and what it published of
+them.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cache
+from typing import NamedTuple
 
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.row_reading import Key, key_of
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sbf")
-BUDGETED = ("history", *CAMERA_POLICIES)
-ALL = (*BUDGETED, "full")
+_BUDGETED = ("history", *CAMERA_POLICIES)
+_POLICIES = (*_BUDGETED, "full")
 
 
 def paper_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
@@ -22,7 +24,7 @@ def paper_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeC
     dense street (17) and in the dart-out (13), the cut-in (5), missed detections (8) and camera
     latency (6).
     """
-    policies = list(dict.fromkeys([*ALL, *also]))
+    policies = list(dict.fromkeys([*_POLICIES, *also]))
     impaired = [policy for policy in policies if policy != "full"]
     lagging = [policy for policy in impaired if policy != "history"]
     return [
@@ -40,19 +42,41 @@ def paper_cells() -> frozenset[Key]:
     return frozenset(key_of(config.row()) for config in paper_study([0]))
 
 
-@dataclass(frozen=True)
-class Published:
-    """What the paper says of some cells of the study: a `figure` for the tables, and its
-    `sentence`.
+class PublishedRelation(Enum):
+    """What the paper says of cells in words, where it gives no number."""
 
-    A figure gives the first detection in metres, then the share of episodes with braking.
+    LIKE_FULL = "as full"
+    LIKE_CARE = "as care"
+    NO_SEPARATION = "alike"
+    ORDER_UNCHANGED = "in order"
+
+
+class DartoutResult(NamedTuple):
+    """What the paper reports of policies in the dart-out at 10%: first detection in metres, episodes
+    with braking of `PAPER_EPISODES`, and the least distance of the centres in passing in metres.
+    """
+
+    detection_m: float
+    braked: int
+    pass_m: float
+
+
+@dataclass(frozen=True)
+class PublishedResult:
+    """What the paper says of some cells of the study, and the sentence that says so; what it does
+    not tell is None.
+
+    `detection_m` is the first detection in metres; in `braked` of `PAPER_EPISODES` the car braked;
+    `relation` stands in the place of numbers.
     """
 
     scenario: str
     policies: tuple[str, ...]
     budgets: tuple[float, ...]
-    figure: str
     sentence: str
+    detection_m: float | None = None
+    braked: int | None = None
+    relation: PublishedRelation | None = None
     faults: bool = False
 
     def covers(self, scenario: str, policy: str, budget: float, faults: bool) -> bool:
@@ -84,22 +108,61 @@ _FAULTS = (
 )
 NO_COLLISION = "No episode collides under the fixed physics, so we report detection and braking."
 
-PUBLISHED = (
-    Published("dartout", CAMERA_POLICIES, (0.10,), "15, 5/5", _DARTOUT),
-    Published("dartout", ("history",), (0.10,), "11.9, 3/5", _DARTOUT),
-    Published("dense", ("care",), (0.03,), "15.1", _DENSE),
-    Published("dense", ("all-camera",), (0.03,), "10.3", _DENSE),
-    Published("dense", ("full",), (1.0,), "15.1", _DENSE),
-    Published("dense", ("care-sbf",), (0.03,), "15.1", _CAPTION),
-    Published("dense", ("care", "care-sbf"), (0.05, 0.10, 0.20), "as full", _CAPTION),
-    Published("dense", ("all-camera",), (0.05, 0.10, 0.20), "as care", _DENSE),
-    Published("cutin", ALL, (0.10, 1.0), "alike", _CUTIN),
-    Published("dartout", BUDGETED, (0.10,), "in order", _FAULTS, faults=True),
+PAPER_EPISODES = 5
+"""Episodes, one per seed, of every cell of the paper's study."""
+DARTOUT_CAMERA = DartoutResult(detection_m=15.0, braked=5, pass_m=5.7)
+"""Of the camera policies, "about" 15 m and at least 5.7 m."""
+DARTOUT_HISTORY = DartoutResult(detection_m=11.9, braked=3, pass_m=4.0)
+DENSE_CARE_M = 15.1
+DENSE_FULL_M = 15.1
+DENSE_ALL_CAMERA_M = 10.3
+"""First detections in the dense scene at 3%, in metres."""
+_WIDER = (0.05, 0.10, 0.20)
+"""The budgets in the dense scene at which all policies but history converge."""
+PUBLISHED_RESULTS = (
+    PublishedResult(
+        "dartout",
+        CAMERA_POLICIES,
+        (0.10,),
+        _DARTOUT,
+        detection_m=DARTOUT_CAMERA.detection_m,
+        braked=DARTOUT_CAMERA.braked,
+    ),
+    PublishedResult(
+        "dartout",
+        ("history",),
+        (0.10,),
+        _DARTOUT,
+        detection_m=DARTOUT_HISTORY.detection_m,
+        braked=DARTOUT_HISTORY.braked,
+    ),
+    PublishedResult("dense", ("care",), (0.03,), _DENSE, detection_m=DENSE_CARE_M),
+    PublishedResult("dense", ("all-camera",), (0.03,), _DENSE, detection_m=DENSE_ALL_CAMERA_M),
+    PublishedResult("dense", ("full",), (1.0,), _DENSE, detection_m=DENSE_FULL_M),
+    PublishedResult("dense", ("care-sbf",), (0.03,), _CAPTION, detection_m=DENSE_FULL_M),
+    PublishedResult(
+        "dense", ("care", "care-sbf"), _WIDER, _CAPTION, relation=PublishedRelation.LIKE_FULL
+    ),
+    PublishedResult("dense", ("all-camera",), _WIDER, _DENSE, relation=PublishedRelation.LIKE_CARE),
+    PublishedResult(
+        "cutin", _POLICIES, (0.10, 1.0), _CUTIN, relation=PublishedRelation.NO_SEPARATION
+    ),
+    PublishedResult(
+        "dartout",
+        _BUDGETED,
+        (0.10,),
+        _FAULTS,
+        relation=PublishedRelation.ORDER_UNCHANGED,
+        faults=True,
+    ),
 )
 
 
-def published(scenario: str, policy: str, budget: float, faults: bool) -> Published | None:
+def published_result(
+    scenario: str, policy: str, budget: float, faults: bool
+) -> PublishedResult | None:
     """What the paper reports for a cell of its study, if anything."""
     return next(
-        (entry for entry in PUBLISHED if entry.covers(scenario, policy, budget, faults)), None
+        (result for result in PUBLISHED_RESULTS if result.covers(scenario, policy, budget, faults)),
+        None,
     )

@@ -8,8 +8,14 @@ from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.differences import MeasuredDifference
-from care_sim.reports.protocol.formatting import verdict
-from care_sim.reports.protocol.paper import BUDGETS, LEVELS, statements_about
+from care_sim.reports.protocol.formatting import claims_of_paper, judged, verdict
+from care_sim.reports.protocol.paper import (
+    PAPER_BUDGETS,
+    PUBLISHED_LEVELS,
+    Claim,
+    Claims,
+    claims_about,
+)
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES
@@ -207,11 +213,39 @@ def test_the_rule_of_met(difference, claimed, says):
     assert verdict(MeasuredDifference(OVERALL, 1.0, GAPS[difference]), claimed) == says
 
 
-def test_every_entry_of_the_paper_says_a_sign_or_nothing():
-    for said in statements_about(Setting("streets", detector="returns")).values():
-        assert all((said.sign(budget) is None) == (said.at(budget) == "") for budget in BUDGETS)
-        assert said.at(0.05) == ""
-    assert {budget for _, budget in LEVELS} == {*BUDGETS, 1.0}
+def test_every_claim_of_the_paper_has_the_sign_of_its_numbers_at_its_budgets():
+    for claims in claims_about(Setting("streets", detector="returns")).values():
+        assert claims.by_budget
+        assert {*claims.by_budget} <= {*PAPER_BUDGETS}
+        for claim in claims.by_budget.values():
+            assert claim.sign in (-1, 0, 1)
+            assert not claim.sign or claim.mean is None or claim.mean * claim.sign > 0
+            assert claim.ends is None or claim.ends[0] < claim.mean < claim.ends[1]
+            assert claim.ends is None or (claim.ends[0] > 0) - (claim.ends[1] < 0) == claim.sign
+    assert {budget for _, budget in PUBLISHED_LEVELS} == {*PAPER_BUDGETS, 1.0}
+
+
+@pytest.mark.parametrize(
+    ("claim", "text", "short"),
+    [
+        (Claim(1, 5.2, (4.3, 6.2)), "+5.2 [4.3,6.2]", "+5.2"),
+        (Claim(-1, -0.13, (-0.26, -0.01)), "-0.13 [-0.26,-0.01]", "-0.13"),
+        (Claim(1, 2.0), "+2.0", "+2.0"),
+        (Claim(1, 3.7, upper=4.7), "+3.7 to 4.7", "+3.7 to 4.7"),
+        (Claim(1), "above", "above"),
+        (Claim(-1), "below", "below"),
+        (Claim(0), "tied", "tied"),
+        (Claim(0, at_most=0.5), "tied, at most 0.5", "tied"),
+        (Claim(0, -0.5, (-1.7, 0.4)), "tied, -0.5 [-1.7,0.4]", "tied"),
+    ],
+)
+def test_claims_are_printed_as_the_paper_has_them(claim, text, short):
+    claims = Claims({0.1: claim}, "")
+    assert claims_of_paper(claims, (0.1, 0.2)) == (text, "")
+    assert claims_of_paper(claims, (0.2,)) == ()
+    ours = MeasuredDifference(OVERALL, 1.0, Interval(1.0, 0.5, 1.5))
+    assert judged(ours, claim).endswith(f" ({short})")
+    assert judged(ours, None) == "+1.0"
 
 
 def test_the_strict_causal_variant_has_the_papers_own_numbers():
