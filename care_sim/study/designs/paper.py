@@ -52,8 +52,10 @@ class PublishedRelation(Enum):
 
 
 class DartoutResult(NamedTuple):
-    """What the paper reports of policies in the dart-out at 10%: first detection in metres, episodes
-    with braking of `PAPER_EPISODES`, and the least distance of the centres in passing in metres.
+    """What the paper reports of policies in the dart-out at 10%.
+
+    First detection in metres; episodes of `PAPER_EPISODES` with braking; least distance of the
+    centres in passing, in metres.
     """
 
     detection_m: float
