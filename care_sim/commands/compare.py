@@ -20,7 +20,7 @@ from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.timeline import text
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.episode_play import Environment, answer, trace
+from care_sim.study.episode_play import GymEnv, answer, trace
 from care_sim.study.run_config import Row
 from care_sim.viewer.pictures.comparison import draw_panel
 
@@ -118,7 +118,7 @@ def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> l
 @contextmanager
 def _recorded(
     configs: Sequence[EpisodeConfig], record: Path | None
-) -> Iterator[Callable[..., Environment]]:
+) -> Iterator[Callable[..., GymEnv]]:
     """What puts an environment, with its policy and the policy's name, under the recording; or
     leaves it as it is.
     """

@@ -20,7 +20,7 @@ from care_sim.sources.nuscenes.results_form import MODALITIES, result_boxes
 from care_sim.sources.nuscenes.tables import JsonRow
 from care_sim.sources.recordings import NuScenes
 from care_sim.study.play_config import PlayConfig, play_grid
-from care_sim.study.scene_play import play
+from care_sim.study.scene_play import play_through_film
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ class Export(PlayOptions):
 def found(config: PlayConfig) -> dict[str, list[JsonRow]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
     film = config.source.film(config.scene)
-    shots = zip(film.shots, play(config, film).keyframes, strict=True)
+    shots = zip(film.shots, play_through_film(config, film).keyframes, strict=True)
     return {
         shot.token: result_boxes(shot, record.detections, record.velocities)
         for shot, record in shots

@@ -12,11 +12,10 @@ from care_sim.commands.shared.running import console
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy
-from care_sim.reports.episodes.brake_photo import BrakePhoto
-from care_sim.reports.episodes.clips import Clip
+from care_sim.reports.episodes.clips import BrakePhoto, Clip
 from care_sim.reports.episodes.timeline import print_timeline
 from care_sim.study.episode_config import grid
-from care_sim.study.episode_play import Environment, trace
+from care_sim.study.episode_play import GymEnv, trace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +61,7 @@ class Run:
         film.write()
         return 0
 
-    def _watched(self, env: Environment, policy: Policy) -> Environment:
+    def _watched(self, env: GymEnv, policy: Policy) -> GymEnv:
         """`env`, recorded and its scans written where that is wanted."""
         if self.record is not None:
             env = RecordRerun(env, self.record, policy)

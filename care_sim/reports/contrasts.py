@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from care_sim.evaluation.bootstrap import Interval
 from care_sim.evaluation.censoring import Difference, Reading, difference
-from care_sim.study.row_reading import detection
+from care_sim.study.rows.reading import detection
 from care_sim.study.run_config import Row
 
 GATE_M = 2.5

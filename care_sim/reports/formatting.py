@@ -11,7 +11,7 @@ from care_sim.reports.table import Bold
 NOT_DETECTED = "not detected"
 MARKS = {"privileged": "†", "non-causal": "‡", "generator": "§"}
 """Marks of the policies that no car can have."""
-MEANINGS = {
+_MEANINGS = {
     "privileged": "† knows the truth: no policy of a car.",
     "non-causal": "‡ saw the full scan first: saves no sensing.",
     "generator": "§ looks the episode up in the public generator: a warning, no contender.",
@@ -66,7 +66,7 @@ def marked(policy: str, tags: tuple[str, ...]) -> str:
 def tag_notes(tags: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
     """What the marks of policies with these tags mean."""
     held = {tag for each in tags for tag in each}
-    return tuple(meaning for tag, meaning in MEANINGS.items() if tag in held)
+    return tuple(meaning for tag, meaning in _MEANINGS.items() if tag in held)
 
 
 def median(values: Quartiles | None) -> str:

@@ -5,7 +5,7 @@ import re
 from care_sim.reports.table import Bold, Table, TableRow
 
 PREAMBLE = "% \\usepackage{booktabs,adjustbox}\n"
-FIT = "max width=\\textwidth,max totalheight=0.85\\textheight"
+_FIT = "max width=\\textwidth,max totalheight=0.85\\textheight"
 """A table that is too wide or too long for a page is scaled down."""
 
 _SPECIAL = {
@@ -46,7 +46,7 @@ def latex(table: Table) -> str:
         "\\begin{table}[tbp]",
         "\\centering\\footnotesize",
         f"\\caption{{{escaped(caption)}}}",
-        f"\\begin{{adjustbox}}{{{FIT}}}",
+        f"\\begin{{adjustbox}}{{{_FIT}}}",
         f"\\begin{{tabular}}{{{'l' * columns}}}",
         "\\toprule",
         _line(table.columns),

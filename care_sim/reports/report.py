@@ -15,7 +15,7 @@ from care_sim.reports.studies import STUDIES, SWEEP, Study, study_of
 from care_sim.reports.table import unmarked
 from care_sim.study.journal import JOURNAL
 from care_sim.study.results_formats import results_format_in
-from care_sim.study.rows import read_notes, read_rows
+from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row
 
 
@@ -38,7 +38,7 @@ def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
 
 
 @dataclass(frozen=True)
-class Report:
+class StudyReport:
     """What a study makes of its rows: the texts of its files of tables by name, and its figures."""
 
     texts: Mapping[str, str]
@@ -47,7 +47,7 @@ class Report:
     @classmethod
     def of(
         cls, rows: Sequence[Row], study: Study = SWEEP, left_out: Sequence[str] = ()
-    ) -> "Report":
+    ) -> "StudyReport":
         """The report of a study that lacks what is `left_out`."""
         tables = study.tables(rows)
         closing = _closing(rows, study, left_out)
@@ -77,7 +77,7 @@ def write_report(
     rows: Sequence[Row], folder: Path, study: Study = SWEEP, left_out: Sequence[str] = ()
 ) -> None:
     """Make a report and write it into a folder."""
-    Report.of(rows, study, left_out).write(folder)
+    StudyReport.of(rows, study, left_out).write(folder)
 
 
 def print_report(

@@ -7,12 +7,11 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports.captions import CAPTION, COMPARED
-from care_sim.reports.figures import budget as budget_figure
-from care_sim.reports.figures import crowding as crowding_figure
-from care_sim.reports.figures import faults as faults_figure
-from care_sim.reports.figures.protocol import FIGURE_NAMES, protocol_figures
-from care_sim.reports.protocol.captions import PROTOCOL_CAPTION
+from care_sim.reports.captions import DIFFERENCES_CAPTION, EPISODES_CAPTION, PROTOCOL_CAPTION
+from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
+from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
+from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
+from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.table import Table
@@ -24,8 +23,8 @@ from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.results_formats import EPISODES, PLAYS, ResultsFormat
-from care_sim.study.row_schema import COUNT, Column, Schema
-from care_sim.study.rows import read_notes
+from care_sim.study.rows.parquet import read_notes
+from care_sim.study.rows.schema import COUNT, Column, Schema
 from care_sim.study.run_config import Row
 
 
@@ -44,7 +43,7 @@ class Study:
     figures: Callable[[Sequence[Row]], dict[str, Figure]]
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
-    caption: str = CAPTION
+    caption: str = EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
 
@@ -76,26 +75,26 @@ _ALL = (
         "sweep",
         "Sweep of the closed loop",
         sweep_tables,
-        budget_figure.sweep_figures,
+        sweep_figures,
         _sweep_closing,
-        budget_figure.NAMES,
+        BUDGET_FIGURES,
     ),
     Study(
         "paper",
         "The paper's closed-loop study",
         sweep_tables,
-        budget_figure.sweep_figures,
+        sweep_figures,
         _paper_closing,
-        budget_figure.NAMES,
+        BUDGET_FIGURES,
     ),
     Study(
         "crowding",
         "Crowding in the closed loop",
         crowding_tables,
-        crowding_figure.crowding_figures,
+        crowding_figures,
         _sweep_closing,
-        (crowding_figure.NAME,),
-        COMPARED,
+        (CROWDING_FIGURE,),
+        DIFFERENCES_CAPTION,
         columns={VEHICLES_COLUMN: COUNT},
     ),
     Study(
@@ -105,16 +104,16 @@ _ALL = (
         _no_figures,
         _sweep_closing,
         (),
-        COMPARED,
+        DIFFERENCES_CAPTION,
     ),
     Study(
         "faults",
         "Faults in the closed loop",
         fault_tables,
-        faults_figure.fault_figures,
+        fault_figures,
         _sweep_closing,
-        faults_figure.NAMES,
-        COMPARED,
+        FAULT_FIGURES,
+        DIFFERENCES_CAPTION,
     ),
     Study(
         "protocol",
@@ -122,7 +121,7 @@ _ALL = (
         protocol_tables,
         protocol_figures,
         protocol_closing,
-        FIGURE_NAMES,
+        PROTOCOL_FIGURES,
         PROTOCOL_CAPTION,
         PLAYS,
     ),

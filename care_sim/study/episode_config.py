@@ -14,18 +14,18 @@ from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios import make_scenario
 from care_sim.study.parameters import Parameters
 from care_sim.study.run_config import (
-    CONDITIONS,
-    Likeness,
+    CONDITION_NAMES,
     Row,
     RunConfig,
+    SimilarityKey,
     check_size,
     collected,
     departures,
-    felt,
+    felt_by,
     flat,
 )
 
-ENVIRONMENTS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
+ENVIRONMENT_IDS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 """Environment id of every scenario."""
 
 
@@ -48,9 +48,9 @@ class EpisodeConfig(Conditions, RunConfig):
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
-        self.settle("scenario_parameters", "policy_parameters")
+        self.check_parameters("scenario_parameters", "policy_parameters")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
-        check_known("environment of the scenario", self.scenario, ENVIRONMENTS)
+        check_known("environment of the scenario", self.scenario, ENVIRONMENT_IDS)
         with self.make_env() as env:
             self.make_policy(env)
         super().__post_init__()
@@ -65,10 +65,10 @@ class EpisodeConfig(Conditions, RunConfig):
     def make_env(self) -> gymnasium.Env[Any, Any]:
         """The environment of this episode, not yet reset."""
         return gymnasium.make(
-            f"care_sim:{ENVIRONMENTS[self.scenario]}",
+            f"care_sim:{ENVIRONMENT_IDS[self.scenario]}",
             disable_env_checker=True,
             budget=self.budget,
-            **{name: getattr(self, name) for name in CONDITIONS},
+            **{name: getattr(self, name) for name in CONDITION_NAMES},
             **dict(self.scenario_parameters),
         )
 
@@ -103,13 +103,13 @@ class EpisodeConfig(Conditions, RunConfig):
         return self
 
     @property
-    def likenesses(self) -> tuple[Likeness, ...]:
+    def similarity_keys(self) -> tuple[SimilarityKey, ...]:
         """All but the seed; scenario, policy and budget; the policy; nothing."""
         all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
         return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
 
 
-PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITIONS]
+PLAIN_FIELDS = ["scenario", "policy", "budget", "seed", *CONDITION_NAMES]
 """Fields that are one value."""
 
 
@@ -155,9 +155,9 @@ def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[Epi
 
 
 def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
-    return EpisodeConfig(scenario, policy, **felt(policy, budget, given))
+    return EpisodeConfig(scenario, policy, **felt_by(policy, budget, given))
 
 
-def listed(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:
+def listed_episodes(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:
     """The configurations as plain data, each once, with the list of its seeds."""
     return {"configurations": collected([asdict(config) for config in configs], "seed", "seeds")}

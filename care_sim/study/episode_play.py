@@ -23,10 +23,10 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row
 from care_sim.world.world import World
 
-Answer = TypeVar("Answer")
+_Answer = TypeVar("_Answer")
 Watcher = Callable[[ClosedLoop, Keyframe], None]
-Environment = gymnasium.Env[Any, Any]
-KIB_MB = 1024 / 1e6
+GymEnv = gymnasium.Env[Any, Any]
+_KIB_MB = 1024 / 1e6
 
 
 def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
@@ -34,7 +34,7 @@ def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
     return [answer(run_episode, config) for config in batch]
 
 
-def answer(play: Callable[..., Answer], *arguments: object) -> Answer | str:
+def answer(play: Callable[..., _Answer], *arguments: object) -> _Answer | str:
     """What `play` returns, or in one line why it returns nothing: an exception stays in the worker,
     which alone may know its class.
     """
@@ -60,7 +60,7 @@ def trace(
     config: EpisodeConfig,
     *watchers: Watcher,
     begin: Callable[[ClosedLoop], None] = lambda _loop: None,
-    wrap: Callable[[Environment, Policy], Environment] = lambda env, _policy: env,
+    wrap: Callable[[GymEnv, Policy], GymEnv] = lambda env, _policy: env,
 ) -> tuple[Row, list[Keyframe]]:
     """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
 
@@ -128,6 +128,6 @@ def peak_rss_mb() -> float:
     lines = status.read_text().splitlines() if status.exists() else []
     peaks = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
     if peaks:
-        return peaks[0] * KIB_MB
+        return peaks[0] * _KIB_MB
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return held / (1e6 if sys.platform == "darwin" else 1e3)

@@ -29,7 +29,7 @@ T = TypeVar("T")
 ExecutorFactory = Callable[[int], Executor]
 """Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
 
-PATIENCE_S = 10.0
+_ANSWER_TIMEOUT_S = 10.0
 """How long a scheduler may take to answer."""
 
 
@@ -58,7 +58,7 @@ def cluster(address: str) -> ExecutorFactory:
     return lambda _workers: ClusterExecutor(_connect(address))
 
 
-def places(executor: Executor, workers: int) -> int:
+def parallel_batches(executor: Executor, workers: int) -> int:
     """How many batches are played at the same time: `workers`, or as many as a cluster has threads
     now.
     """
@@ -97,13 +97,13 @@ class ClusterExecutor(Executor):
 
     def threads(self) -> int:
         """Threads of all workers that are connected now. Raises ClusterLost."""
-        with self._answering():
+        with self._lost_on_error():
             return sum(self._client.nthreads().values())
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Hand a call over. Raises ClusterLost."""
         ours: Future[T] = Future()
-        with self._answering():
+        with self._lost_on_error():
             self._executor.submit(fn, *args, **kwargs).add_done_callback(
                 partial(self._hand_on, ours)
             )
@@ -114,7 +114,7 @@ class ClusterExecutor(Executor):
         self._client.close()
 
     @contextmanager
-    def _answering(self) -> Iterator[None]:
+    def _lost_on_error(self) -> Iterator[None]:
         """Turn whatever a client raises that has lost its scheduler into ClusterLost."""
         try:
             yield
@@ -146,8 +146,8 @@ def _connect(address: str) -> "Client":
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         with ThreadPoolExecutor(1) as aside:
-            aside.submit(asyncio.run, _knock(address)).result()
-        return Client(address, timeout=PATIENCE_S)
+            aside.submit(asyncio.run, _try_connection(address)).result()
+        return Client(address, timeout=_ANSWER_TIMEOUT_S)
     except (
         Exception
     ) as error:  # of each protocol its own, those of libraries that are not there among them
@@ -157,14 +157,16 @@ def _connect(address: str) -> "Client":
         ) from error
 
 
-async def _knock(address: str) -> None:
+async def _try_connection(address: str) -> None:
     """Raise what speaks against a connection: a client that fails at it leaves a thread that nobody
     can end.
     """
     from dask.distributed import Security
     from distributed.comm import connect
 
-    comm = await connect(address, timeout=PATIENCE_S, **Security().get_connection_args("client"))
+    comm = await connect(
+        address, timeout=_ANSWER_TIMEOUT_S, **Security().get_connection_args("client")
+    )
     await comm.close()
 
 

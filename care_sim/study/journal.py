@@ -13,14 +13,14 @@ from typing import Self
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import check_file_size, parsed
-from care_sim.study.rows import with_tuples
+from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.run_config import Row
 
-STUDY = "study"
-CHECK = "check"
+_STUDY = "study"
+_CHECK = "check"
 LARGEST_JOURNAL = 2**32
 """Bytes of a journal: the plays of the largest study (100,000 of 10 kB), four times over."""
-_LINE = re.compile(rf'(\{{.*), "{CHECK}": "([0-9a-f]{{16}})"\}}')
+_LINE = re.compile(rf'(\{{.*), "{_CHECK}": "([0-9a-f]{{16}})"\}}')
 
 
 class Journal:
@@ -45,7 +45,7 @@ class Journal:
         lines = [line for line in text.split("\n") if line]
         sound = [row for line in lines if (row := _read(line)) is not None]
         self.damaged = len(lines) - len(sound)
-        self.studies = {row.pop(STUDY) for row in sound}
+        self.studies = {row.pop(_STUDY) for row in sound}
         self._rows = {row["digest"]: row for row in sound}
         if text and not text.endswith("\n"):
             self._write("\n")
@@ -77,7 +77,7 @@ class Journal:
 
     def append(self, row: Row) -> None:
         """Keep a finished episode; with the operating system when this returns."""
-        self._write(_line(row | {STUDY: self._study}))
+        self._write(_line(row | {_STUDY: self._study}))
         self._rows[row["digest"]] = row
 
     def _lock(self, folder: Path) -> None:
@@ -109,7 +109,7 @@ def _check_journal(path: Path) -> None:
 
 def _line(row: Row) -> str:
     text = json.dumps(row).removesuffix("}")
-    return f'{text}, "{CHECK}": "{_checksum(text)}"}}\n'
+    return f'{text}, "{_CHECK}": "{_checksum(text)}"}}\n'
 
 
 def _read(line: str) -> Row | None:
@@ -121,7 +121,7 @@ def _read(line: str) -> Row | None:
         row = parsed(whole[1] + "}")
     except ValueError:
         return None
-    named = all(isinstance(row.get(name), str) for name in ("digest", STUDY))
+    named = all(isinstance(row.get(name), str) for name in ("digest", _STUDY))
     return with_tuples(row) if named else None
 
 

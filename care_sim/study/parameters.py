@@ -16,13 +16,13 @@ from care_sim.base.errors import InvalidInput, one_line, shown
 Parameters = tuple[tuple[str, Any], ...]
 """Names and values, of a scenario's physics, a policy or a detector."""
 
-ALLOWED = "a flag, a number of at most 64 bits, a text, or a list of one kind of these"
-DEEPEST = 4
+_ALLOWED = "a flag, a number of at most 64 bits, a text, or a list of one kind of these"
+_DEEPEST = 4
 """Levels that lists may be nested."""
 _WHOLE = 2**63
 
 
-def settled(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
+def checked_parameters(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
     """The parameters with values of Python's own types, lists as tuples, paths as texts.
 
     Raises InvalidInput for a value or a name that a journal and a column of a results file would
@@ -30,16 +30,16 @@ def settled(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
     characters, lists of several kinds.
     """
     return tuple(
-        (_name(name, whose), _settled(f"{whose} parameter {name}", value)) for name, value in given
+        (_name(name, whose), _checked(f"{whose} parameter {name}", value)) for name, value in given
     )
 
 
-def _settled(what: str, value: Any) -> Any:
+def _checked(what: str, value: Any) -> Any:
     try:
         plain = _plain(value)
         _kind(plain)
     except (ValueError, TypeError, OverflowError) as error:
-        raise InvalidInput(f"{one_line(what)} must be {ALLOWED}, got {shown(value)}") from error
+        raise InvalidInput(f"{one_line(what)} must be {_ALLOWED}, got {shown(value)}") from error
     return plain
 
 
@@ -52,7 +52,7 @@ def _name(name: Any, whose: str) -> str:
         ) from error
 
 
-def _plain(value: Any, levels: int = DEEPEST) -> Any:
+def _plain(value: Any, levels: int = _DEEPEST) -> Any:
     """The value in Python's own types. Raises ValueError or TypeError where it is not allowed."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
@@ -84,7 +84,7 @@ def _kind(value: Any) -> Any:
     return (*kinds,)
 
 
-LONGEST = 8192
+_LONGEST = 8192
 """Characters of a parameter: a path and its name fit."""
 
 
@@ -103,9 +103,9 @@ def _pair(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise InvalidInput(f"parameters are given as NAME=VALUE, got {shown(text)}")
-    if len(text) > LONGEST:
+    if len(text) > _LONGEST:
         raise InvalidInput(
-            f"a parameter must be at most {LONGEST} characters long, got {shown(text)}"
+            f"a parameter must be at most {_LONGEST} characters long, got {shown(text)}"
         )
     with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
         try:

@@ -18,20 +18,20 @@ from care_sim.sources.scenes import Scene, Source
 from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest
 from care_sim.study.run_config import (
-    CONDITIONS,
+    CONDITION_NAMES,
     FULL,
-    Likeness,
     Row,
     RunConfig,
+    SimilarityKey,
     check_size,
     collected,
     departures,
-    felt,
+    felt_by,
     files_in,
     flat,
 )
 
-_FILMED = [name for name in CONDITIONS if name not in UNFILMED]
+_FILMED = [name for name in CONDITION_NAMES if name not in UNFILMED]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class PlayConfig(Conditions, RunConfig):
     presence: str = ANNOTATED
 
     def __post_init__(self) -> None:
-        self.settle("detector_parameters", "policy_parameters")
+        self.check_parameters("detector_parameters", "policy_parameters")
         for name in UNFILMED:
             if getattr(self, name) != DEFAULTS[name]:
                 raise InvalidInput(
@@ -115,7 +115,7 @@ class PlayConfig(Conditions, RunConfig):
         return self.source, self.scene
 
     @property
-    def likenesses(self) -> tuple[Likeness, ...]:
+    def similarity_keys(self) -> tuple[SimilarityKey, ...]:
         """Policy, budget and detector; policy and detector; the detector; nothing."""
         return (
             (self.policy, self.budget, self.detector),
@@ -167,10 +167,10 @@ def play_grid(
 def _config(
     source: Source, scene: Scene, policy: str, budget: float, given: dict[str, Any]
 ) -> PlayConfig:
-    return PlayConfig(source, scene, policy, **felt(policy, budget, given))
+    return PlayConfig(source, scene, policy, **felt_by(policy, budget, given))
 
 
-def listed(configs: Sequence[PlayConfig]) -> dict[str, Any]:
+def listed_plays(configs: Sequence[PlayConfig]) -> dict[str, Any]:
     """The scenes, and the configurations that were played in all of them, as plain data, each once
     with the list of its floor seeds.
     """

@@ -11,16 +11,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from care_sim.study.executors import ExecutorFactory
-from care_sim.study.forecast import Forecast
 from care_sim.study.journal import Journal
+from care_sim.study.remaining_time import RemainingTime
 from care_sim.study.results_formats import ResultsFormat
 from care_sim.study.run_config import Row, RunConfig
-from care_sim.study.runner import Audience, Failure, run_all
+from care_sim.study.runner import Failure, RunListener, run_all
 
-EARLY = 0.05
+_EARLY = 0.05
 """Share of the tasks after which the prediction is kept, and after which a line is due."""
-FIRST_LINE_S = 10.0
-LINE_S = 60.0
+_FIRST_LINE_S = 10.0
+_LINE_S = 60.0
 
 Show = Callable[[int, str], None]
 """Shows how many tasks are done and, in words, what is left."""
@@ -38,35 +38,35 @@ def run_with_progress(
     Returns those that failed; see `care_sim.study.runner.run_all`.
     """
     found = [(config, journal[config.key]["wall_s"]) for config in configs if config.key in journal]
-    forecast = Forecast((config for config in configs if config.key not in journal), found)
+    remaining = RemainingTime((config for config in configs if config.key not in journal), found)
     unit = kind.unit
     with (
-        bar(len(configs), unit)
+        progress_bar(len(configs), unit)
         if sys.stderr.isatty()
-        else nullcontext(Lines(len(configs), unit)) as show
+        else nullcontext(ProgressLines(len(configs), unit)) as show
     ):
-        reporter = Reporter(forecast, show, len(configs))
+        reporter = ProgressReporter(remaining, show, len(configs))
         failures = run_all(configs, journal, workers, make_executor, reporter, kind.play_batch)
     if len(found) < len(configs):
         print(reporter.summary(unit), file=sys.stderr)
     return failures
 
 
-class Reporter(Audience):
-    """Keeps the forecast and shows it."""
+class ProgressReporter(RunListener):
+    """Shows how far a run is, and how long the rest of it should take."""
 
     def __init__(
         self,
-        forecast: Forecast,
+        remaining: RemainingTime,
         show: Show,
         total: int,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._forecast = forecast
+        self._remaining = remaining
         self._show = show
         self._total = total
         self._clock = clock
-        self._new = forecast.waiting
+        self._new = remaining.waiting
         self._started = clock()
         self._workers = 0
         self._end = math.nan
@@ -81,11 +81,11 @@ class Reporter(Audience):
 
     def finished(self, config: RunConfig, row: Row | None) -> None:
         """Learn how long a task took."""
-        self._forecast.finished(config, row["wall_s"] if row else 0.0)
+        self._remaining.finished(config, row["wall_s"] if row else 0.0)
         self._predict()
         if (
             math.isnan(self._predicted_s)
-            and self._new - self._forecast.waiting >= EARLY * self._new
+            and self._new - self._remaining.waiting >= _EARLY * self._new
         ):
             self._predicted_s = self._end - self._started
         self._tell()
@@ -98,24 +98,26 @@ class Reporter(Audience):
     def summary(self, unit: str) -> str:
         """How long it took, and how long it should have."""
         took = f"{self._new} {unit} took {_exact(self._clock() - self._started)}"
-        many = self._new >= 1 / EARLY
-        return f"{took}; {_exact(self._predicted_s)} predicted after {EARLY:.0%}" if many else took
+        many = self._new >= 1 / _EARLY
+        return f"{took}; {_exact(self._predicted_s)} predicted after {_EARLY:.0%}" if many else took
 
     def _predict(self) -> None:
-        self._end = self._clock() + self._forecast.remaining_s(self._workers)
+        self._end = self._clock() + self._remaining.remaining_s(self._workers)
 
     def _tell(self) -> None:
         left = (
-            "" if math.isnan(self._end) else f"{spoken(max(self._end - self._clock(), 0.0))} left"
+            ""
+            if math.isnan(self._end)
+            else f"{rounded_duration(max(self._end - self._clock(), 0.0))} left"
         )
-        waits = self._workers == 0 and self._forecast.waiting > 0
+        waits = self._workers == 0 and self._remaining.waiting > 0
         self._show(
-            self._total - self._forecast.waiting, "no worker is connected" if waits else left
+            self._total - self._remaining.waiting, "no worker is connected" if waits else left
         )
 
 
 @contextmanager
-def bar(total: int, unit: str) -> Iterator[Show]:
+def progress_bar(total: int, unit: str) -> Iterator[Show]:
     """A bar on a terminal."""
     columns = (TextColumn(unit), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     shared = sys.stdout.isatty()
@@ -125,7 +127,7 @@ def bar(total: int, unit: str) -> Iterator[Show]:
         yield lambda done, left: progress.update(task, completed=done, left=left)
 
 
-class Lines:
+class ProgressLines:
     """A line after ten seconds, then every minute, or sooner when another twentieth is done."""
 
     def __init__(self, total: int, unit: str, clock: Callable[[], float] = time.monotonic):
@@ -138,8 +140,8 @@ class Lines:
     def __call__(self, done: int, left: str) -> None:
         """Print a line when it is due."""
         quiet_s = self._clock() - self._last_s
-        much = done - self._last_done >= EARLY * self._total
-        if quiet_s >= LINE_S or (quiet_s >= FIRST_LINE_S and much):
+        much = done - self._last_done >= _EARLY * self._total
+        if quiet_s >= _LINE_S or (quiet_s >= _FIRST_LINE_S and much):
             self._last_s = self._clock()
             self._last_done = done
             print(
@@ -149,7 +151,7 @@ class Lines:
             )
 
 
-def spoken(seconds: float) -> str:
+def rounded_duration(seconds: float) -> str:
     """A duration as people say it, rounded: 45 s, 12 min, 3 h 20 min."""
     if seconds < 90:
         return f"{seconds:.0f} s"

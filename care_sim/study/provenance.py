@@ -15,7 +15,7 @@ from care_sim.base.package_files import shipped_files
 from care_sim.perception.detectors import DETECTORS
 from care_sim.policies import POLICIES
 
-LIBRARIES = (
+_LIBRARIES = (
     "gymnasium",
     "highway-env",
     "matplotlib",
@@ -25,12 +25,12 @@ LIBRARIES = (
     "pybullet",
     "scipy",
 )
-EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
+_EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
 """Libraries of detectors, policies and measurements that may be there."""
 
 SHIPPED = Path(care_sim.__file__).parent / "policies" / "learned" / "shipped"
 """Where the weights lie that come with the package."""
-CODE = (".py", ".so", ".pyd")
+_CODE = (".py", ".so", ".pyd")
 """Endings of what a process loads once."""
 
 SESSION = uuid4().hex
@@ -64,7 +64,7 @@ def _entry_digest(entry: EntryPoint) -> str | None:
     if files is None:
         return None
     shipped = [
-        f"{name} {_loaded(file) if file.suffix in CODE else content_digest(file)}"
+        f"{name} {_loaded(file) if file.suffix in _CODE else content_digest(file)}"
         for name, file in files.items()
     ]
     further = files_named_by(entry) | files_named_in(files.values())
@@ -91,7 +91,7 @@ def _sources_digest(root: Path) -> str:
 def versions() -> dict[str, str]:
     """Versions of Python, the package, its code and the libraries that decide an episode."""
     libraries = {
-        name: metadata.version(name) for name in (*LIBRARIES, *filter(_is_installed, EXTRAS))
+        name: metadata.version(name) for name in (*_LIBRARIES, *filter(_is_installed, _EXTRAS))
     }
     return {
         "python": platform.python_version(),

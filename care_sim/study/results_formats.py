@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from care_sim.loops.records import Outcome
-from care_sim.study import episode_config as config
-from care_sim.study import episode_play as episode
-from care_sim.study import play_config
-from care_sim.study import scene_play as plays
-from care_sim.study.added_columns import annotated, tagged
-from care_sim.study.row_schema import (
-    CONDITIONS,
+from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
+from care_sim.study.episode_play import play_episodes
+from care_sim.study.play_config import PLAY_FIELDS, listed_plays
+from care_sim.study.rows.reading import annotated, tagged
+from care_sim.study.rows.schema import (
+    CONDITION_COLUMNS,
     COUNT,
     FLAG,
     PARAMETERS,
@@ -29,6 +28,7 @@ from care_sim.study.row_schema import (
 )
 from care_sim.study.run_config import Row
 from care_sim.study.runner import PlayBatch
+from care_sim.study.scene_play import SUMS, event_columns, play_scene, without_events
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ResultsFormat:
 
 _WRITER_COLUMNS = dict.fromkeys(("version", "digest", "episode_hash", "tags"), as_optional(TEXT))
 _EPISODES = Schema(
-    {name: CONDITIONS.get(name, TEXT) for name in config.PLAIN_FIELDS}
+    {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS}
     | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
     | {
         name: as_optional(SUM)
@@ -60,37 +60,37 @@ _EPISODES = Schema(
     _WRITER_COLUMNS,
 )
 _PLAYS = Schema(
-    {name: CONDITIONS.get(name, TEXT) for name in (*play_config.PLAY_FIELDS, "film_hash")}
+    {name: CONDITION_COLUMNS.get(name, TEXT) for name in (*PLAY_FIELDS, "film_hash")}
     | {
         "budget": SHARE,
         "keyframes": COUNT,
         "floor_seed": COUNT,
         "ttfds": Column("lists of whole numbers", least=0),
     }
-    | dict.fromkeys(plays.SUMS, TALLY)
+    | dict.fromkeys(SUMS, TALLY)
     | dict.fromkeys(("tracks", "explained"), SUM)
     | dict.fromkeys(("differing_keyframes", "differing_cells"), as_optional(COUNT)),
     _WRITER_COLUMNS
     | dict.fromkeys(("recording", "camera_detections", "presence"), as_optional(TEXT))
     | {"emerging": as_optional(COUNT)},
-    plays.SUMS,
+    SUMS,
 )
 EPISODES = ResultsFormat(
     "episodes",
-    episode.play_episodes,
+    play_episodes,
     annotated,
     "episodes.parquet",
     _EPISODES,
-    config.listed,
+    listed_episodes,
 )
 PLAYS = ResultsFormat(
     "plays",
-    plays.play_scene,
-    lambda rows: [plays.without_events(row) for row in tagged(rows)],
+    play_scene,
+    lambda rows: [without_events(row) for row in tagged(rows)],
     "plays.parquet",
     _PLAYS,
-    play_config.listed,
-    lambda rows: {"events.parquet": plays.event_columns(rows)},
+    listed_plays,
+    lambda rows: {"events.parquet": event_columns(rows)},
 )
 RESULTS_FORMATS = (EPISODES, PLAYS)
 
@@ -105,6 +105,4 @@ def is_parameter(name: str) -> bool:
     return name in _PARAMETERS or name.startswith(PARAMETERS)
 
 
-_PARAMETERS = frozenset(
-    {*config.PLAIN_FIELDS, *play_config.PLAY_FIELDS, "scene", "camera_detections", "presence"}
-)
+_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence"})

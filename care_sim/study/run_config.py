@@ -17,18 +17,18 @@ from care_sim.base.named_files import paths_in
 from care_sim.core.conditions import DEFAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.policies import check_policy, make_policy
 from care_sim.policies.base import Policy
-from care_sim.study.parameters import Parameters, settled
+from care_sim.study.parameters import Parameters, checked_parameters
 from care_sim.study.provenance import SESSION, code_digest, policy_digest
 
 Row = dict[str, Any]
 
-Likeness = tuple[object, ...]
+SimilarityKey = tuple[object, ...]
 """What tasks have in common."""
 
 MOST_TASKS = 100_000
 """Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
 
-CONDITIONS = [*DEFAULTS]
+CONDITION_NAMES = [*DEFAULTS]
 REFERENCE = "care"
 """The policy that others are compared with."""
 FULL = "full"
@@ -63,8 +63,8 @@ class RunConfig(ABC):
 
     @property
     @abstractmethod
-    def likenesses(self) -> tuple[Likeness, ...]:
-        """What it shares with tasks that take as long, the closest likeness first."""
+    def similarity_keys(self) -> tuple[SimilarityKey, ...]:
+        """What it shares with tasks that take as long, the closest key first."""
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
         """The policy for the environment; its files are looked at before it plays, which may load
@@ -115,7 +115,7 @@ class RunConfig(ABC):
             object.__setattr__(other, name, value)
         return other
 
-    def settle(self, *names: str) -> None:
+    def check_parameters(self, *names: str) -> None:
         """Make the parameters in these fields what files can hold. Raises InvalidInput for those
         that none does.
         """
@@ -125,7 +125,9 @@ class RunConfig(ABC):
                 raise InvalidInput(
                     f"{name} must be pairs of a name and a value, got {shown(pairs)}"
                 )
-            object.__setattr__(self, name, settled(pairs, name.removesuffix("_parameters")))
+            object.__setattr__(
+                self, name, checked_parameters(pairs, name.removesuffix("_parameters"))
+            )
 
 
 def departures(task: RunConfig, without: Sequence[str]) -> list[str]:
@@ -133,20 +135,20 @@ def departures(task: RunConfig, without: Sequence[str]) -> list[str]:
     return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != DEFAULTS.get(n)]
 
 
-def felt(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
+def felt_by(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
     """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither
     camera nor allocator.
     """
     check_policy(policy)
     felt = conditions | {"budget": budget}
     if parameters := conditions.get("policy_parameters"):
-        felt["policy_parameters"] = own(policy, parameters)
+        felt["policy_parameters"] = parameters_of(policy, parameters)
     if policy == FULL:
         felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNUSED_BY_FULL_SCAN}
     return felt
 
 
-def own(policy: str, parameters: Parameters) -> Parameters:
+def parameters_of(policy: str, parameters: Parameters) -> Parameters:
     """Those of a policy among parameters for several: NAME is for all, POLICY.NAME for that policy
     alone.
 
@@ -182,7 +184,7 @@ def check_size(tasks: int) -> None:
         )
 
 
-def batches(tasks: Sequence[RunConfig]) -> list[list[RunConfig]]:
+def in_batches(tasks: Sequence[RunConfig]) -> list[list[RunConfig]]:
     """The tasks in the order in which they are played, those of a batch together."""
     together: dict[Hashable, list[RunConfig]] = {}
     for task in sorted(tasks, key=lambda task: task.order):

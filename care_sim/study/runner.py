@@ -8,25 +8,25 @@ from dataclasses import dataclass
 from typing import Any
 
 from care_sim.study.episode_play import play_episodes
-from care_sim.study.executors import ClusterLost, ExecutorFactory, places, processes
+from care_sim.study.executors import ClusterLost, ExecutorFactory, parallel_batches, processes
 from care_sim.study.journal import Journal
-from care_sim.study.run_config import Row, RunConfig, batches
+from care_sim.study.run_config import Row, RunConfig, in_batches
 
 Batch = Sequence[RunConfig]
 PlayBatch = Callable[[Any], list[Row | str]]
 """Plays a batch in a worker: of each task its row, or in one line why there is none."""
-Flying = dict[Future[list[Row | str]], Batch]
+_InFlight = dict[Future[list[Row | str]], Batch]
 """The batches in flight."""
 
 DIED = "the worker process died"
-OTHER_CODE = (
+_OTHER_CODE = (
     "the worker runs another version of care-sim or of the policy, or their files changed while "
     "the study ran"
 )
-DEADLY = 3
+_DEADLY = 3
 """Workers that a policy may kill before the rest of its tasks is not tried any more."""
-PATIENCE_S = 2.0
-"""How long nothing may happen before the audience is told so."""
+_QUIET_S = 2.0
+"""How long nothing may happen before the listener is told so."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Failure:
         return f"{self.config.label}: {self.reason}"
 
 
-class Audience:
+class RunListener:
     """Follows a run; this one keeps quiet."""
 
     def playing(self, workers: int) -> None:
@@ -58,21 +58,21 @@ def run_all(
     journal: Journal,
     workers: int,
     make_executor: ExecutorFactory = processes,
-    audience: Audience | None = None,
+    listener: RunListener | None = None,
     play_batch: PlayBatch = play_episodes,
 ) -> list[Failure]:
     """Run every task that the journal does not hold yet, in their order; returns those that failed.
 
     An interrupt waits for the batches in flight and leaves all that is finished in the journal.
     When a worker dies, the batches then in flight are run again one by one, and in halves, so that
-    only the guilty task fails; the rest of a policy that has killed DEADLY workers is not tried.
+    only the guilty task fails; the rest of a policy that has killed _DEADLY workers is not tried.
     Raises ClusterLost when a cluster's scheduler is gone.
     """
-    run = _Run(journal, workers, make_executor, audience or Audience(), play_batch)
-    waiting = deque(batches([config for config in configs if config.key not in journal]))
+    run = _Run(journal, workers, make_executor, listener or RunListener(), play_batch)
+    waiting = deque(in_batches([config for config in configs if config.key not in journal]))
     while waiting:
-        for suspect in run.together(waiting):
-            run.alone(suspect)
+        for suspect in run.run_together(waiting):
+            run.run_alone(suspect)
     return run.failures
 
 
@@ -82,7 +82,7 @@ class _Run:
         journal: Journal,
         workers: int,
         make_executor: ExecutorFactory,
-        audience: Audience,
+        listener: RunListener,
         play_batch: PlayBatch,
     ):
         self.failures: list[Failure] = []
@@ -91,32 +91,32 @@ class _Run:
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
-        self._audience = audience
+        self._audience = listener
 
-    def together(self, waiting: "deque[list[RunConfig]]") -> list[Batch]:
+    def run_together(self, waiting: "deque[list[RunConfig]]") -> list[Batch]:
         """Run until nothing waits or a worker dies; returns the batches in flight at a death.
 
         No more are in flight than there are workers, so that few are suspected.
         """
-        flying: Flying = {}
+        in_flight: _InFlight = {}
         with self._make_executor(min(self._workers, len(waiting))) as executor:
             try:
-                while waiting or flying:
-                    self._launch(executor, waiting, flying)
-                    self._land(flying)
+                while waiting or in_flight:
+                    self._submit_waiting(executor, waiting, in_flight)
+                    self._collect_finished(in_flight)
             except BrokenExecutor:
-                wait(flying)
+                wait(in_flight)
             except KeyboardInterrupt:
                 self._audience.interrupted()
-                wait(flying)
-                for future, batch in flying.items():
+                wait(in_flight)
+                for future, batch in in_flight.items():
                     self._kept(batch, future)
                 raise
-        return [batch for future, batch in flying.items() if not self._kept(batch, future)]
+        return [batch for future, batch in in_flight.items() if not self._kept(batch, future)]
 
-    def alone(self, batch: Batch) -> None:
+    def run_alone(self, batch: Batch) -> None:
         """Run one batch in a worker of its own; in halves, when that one dies too."""
-        batch = self._tried(batch)
+        batch = self._without_deadly(batch)
         if not batch:
             return
         with self._make_executor(1) as executor:
@@ -129,34 +129,34 @@ class _Run:
             self._fail(batch, DIED)
             return
         for half in (batch[: len(batch) // 2], batch[len(batch) // 2 :]):
-            self.alone(half)
+            self.run_alone(half)
 
-    def _tried(self, batch: Batch) -> list[RunConfig]:
+    def _without_deadly(self, batch: Batch) -> list[RunConfig]:
         """The tasks of a batch but for those of deadly policies, which fail."""
         self._fail(
-            [task for task in batch if self._deaths[task.policy] >= DEADLY],
-            f"{DIED} {DEADLY} times before",
+            [task for task in batch if self._deaths[task.policy] >= _DEADLY],
+            f"{DIED} {_DEADLY} times before",
         )
-        return [task for task in batch if self._deaths[task.policy] < DEADLY]
+        return [task for task in batch if self._deaths[task.policy] < _DEADLY]
 
-    def _launch(
-        self, executor: Executor, waiting: "deque[list[RunConfig]]", flying: Flying
+    def _submit_waiting(
+        self, executor: Executor, waiting: "deque[list[RunConfig]]", in_flight: _InFlight
     ) -> None:
         """Fill the places; a cluster without any gets one batch, which waits for a worker."""
-        workers = places(executor, self._workers)
+        workers = parallel_batches(executor, self._workers)
         self._audience.playing(workers)
-        while waiting and len(flying) < max(workers, 1):
-            waiting[0] = self._tried(waiting[0])
+        while waiting and len(in_flight) < max(workers, 1):
+            waiting[0] = self._without_deadly(waiting[0])
             if waiting[0]:
-                flying[self._submit(executor, waiting[0])] = waiting[0]
+                in_flight[self._submit(executor, waiting[0])] = waiting[0]
             waiting.popleft()
 
-    def _land(self, flying: Flying) -> None:
-        done, _ = wait(flying, PATIENCE_S, FIRST_COMPLETED)
+    def _collect_finished(self, in_flight: _InFlight) -> None:
+        done, _ = wait(in_flight, _QUIET_S, FIRST_COMPLETED)
         for future in sorted(done, key=_is_cut_off):
-            if not self._kept(flying[future], future):
+            if not self._kept(in_flight[future], future):
                 raise BrokenExecutor
-            del flying[future]
+            del in_flight[future]
 
     def _kept(self, batch: Batch, future: Future[list[Row | str]]) -> bool:
         """Record how a batch ended; False when it was cut off by the death of a worker."""
@@ -176,7 +176,7 @@ class _Run:
         if isinstance(ending, str):
             self._fail([config], ending)
         elif ending["digest"] != config.key:
-            self._fail([config], OTHER_CODE)
+            self._fail([config], _OTHER_CODE)
         else:
             self._journal.append(ending)
             self._audience.finished(config, ending)

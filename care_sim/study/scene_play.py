@@ -22,7 +22,7 @@ from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 SUMS = tuple(field.name for field in fields(Tally))
-EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
+_EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
 """What is known of an event before any policy plays."""
 _NAMES = (
     "source",
@@ -113,9 +113,9 @@ class ScenePlayer:
 
     def _record(self, config: PlayConfig) -> PlayRecord:
         if config != _reference(config):
-            return play(config, self._film)
+            return play_through_film(config, self._film)
         if config not in self._references:
-            self._references[config] = play(config, self._film)
+            self._references[config] = play_through_film(config, self._film)
         return self._references[config]
 
     def _difference(self, config: PlayConfig, record: PlayRecord) -> Row:
@@ -128,7 +128,7 @@ class ScenePlayer:
         return {"differing_keyframes": moved.differing, "differing_cells": moved.cells}
 
 
-def play(config: PlayConfig, film: Film) -> PlayRecord:
+def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
     """Play a policy through the film of its scene."""
     started = time.perf_counter()
     with config.make_env(film) as env:
@@ -167,7 +167,7 @@ def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
         for name in _NAMES
     }
     seen = {
-        name: [value for row in rows for value in row["sightings"][name]] for name in EVENT_COLUMNS
+        name: [value for row in rows for value in row["sightings"][name]] for name in _EVENT_COLUMNS
     }
     delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
     return {**names, **seen, "detected": delays == 0, "ttfd": delays}
@@ -221,7 +221,7 @@ def _strata(score: SceneScore) -> Row:
 def _sightings(score: SceneScore) -> dict[str, list[Any]]:
     """What is known of the events, as columns; metres and radians to three decimals."""
     rows = score.event_rows()
-    columns = {name: [row[name] for row in rows] for name in EVENT_COLUMNS}
+    columns = {name: [row[name] for row in rows] for name in _EVENT_COLUMNS}
     return {
         name: [round(v, 3) if isinstance(v, float) else v for v in column]
         for name, column in columns.items()

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.policies import tags_of
-from care_sim.reports.figures.styles import FULL, styles
+from care_sim.reports.figures.styles import FULL_STYLE, styles
 from care_sim.training.curves import TrainingRun
 
 
@@ -28,7 +28,7 @@ def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
     config = runs[0].config
     marks = runs[0].marks
     learner = config["algorithm"]
-    drawn = styles((name, tags_of(name)) for name in (*marks, learner)) | {"full": FULL}
+    drawn = styles((name, tags_of(name)) for name in (*marks, learner)) | {"full": FULL_STYLE}
     colours = {name: style.colour for name, style in drawn.items()}
     for name, height in marks.items():
         axes.axhline(height, color=colours[name], linestyle="--", linewidth=1.1, zorder=1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.extras import import_torch
-from care_sim.study.progress import Lines, Show, bar, spoken
+from care_sim.study.progress import ProgressLines, Show, progress_bar, rounded_duration
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
 from care_sim.training.environments import bare, side_by_side, wrapped
@@ -77,9 +77,9 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
     clock = Stopwatch(folder.seconds)
     begun = model.num_timesteps
     with (
-        bar(config.steps, "steps")
+        progress_bar(config.steps, "steps")
         if sys.stderr.isatty()
-        else nullcontext(Lines(config.steps, "steps")) as show
+        else nullcontext(ProgressLines(config.steps, "steps")) as show
     ):
         shown = _shower(show, config, clock, begun)
         while True:
@@ -120,7 +120,7 @@ def _shower(
     def shown(steps: int) -> None:
         rate = (steps - begun) / max(clock.here, 1e-9)
         left = max(config.steps - steps, 0) / rate if rate else 0.0
-        show(min(steps, config.steps), f"{rate:.0f} steps/s, {spoken(left)} left")
+        show(min(steps, config.steps), f"{rate:.0f} steps/s, {rounded_duration(left)} left")
 
     return shown
 

@@ -51,7 +51,7 @@ except KeyboardInterrupt:
         ("numpy", "SIGINT"),
         ("tyro", "SIGTERM"),
         ("care_sim.commands.run", "SIGHUP"),
-        ("care_sim.reports.episodes.brake_photo", "SIGINT"),
+        ("care_sim.reports.episodes.clips", "SIGINT"),
     ],
 )
 def test_an_interrupt_within_an_import_of_the_command_is_one_line(module, end):

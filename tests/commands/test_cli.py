@@ -17,7 +17,7 @@ from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.parameters import parameters
 from care_sim.study.results_formats import EPISODES
-from care_sim.study.rows import read_rows, write_rows
+from care_sim.study.rows.parquet import read_rows, write_rows
 
 SHORT = ["--scenario-parameters", "duration_s=0.3"]
 

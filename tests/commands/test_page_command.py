@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from care_sim.cli import main
-from care_sim.study.rows import write_rows
+from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_rows import STUDY
 
 

@@ -21,9 +21,9 @@ from care_sim.reports.studies import STUDIES
 from care_sim.sources.scenes import Scene, Streets, chosen_scenes, source_of
 from care_sim.study import scene_play as plays
 from care_sim.study.journal import JOURNAL, Journal
-from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed, play_grid
+from care_sim.study.play_config import PLAY_FIELDS, PlayConfig, listed_plays, play_grid
 from care_sim.study.results_formats import PLAYS
-from care_sim.study.run_config import batches
+from care_sim.study.run_config import in_batches
 from care_sim.study.runner import run_all
 from tests.helpers.av2_log import at, box, write
 
@@ -60,7 +60,7 @@ def steady(row):
 
 
 def attempted(configs):
-    return [row for batch in batches(configs) for row in plays.play_scene(batch)]
+    return [row for batch in in_batches(configs) for row in plays.play_scene(batch)]
 
 
 def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):
@@ -135,8 +135,8 @@ def test_the_row_names_every_condition_and_the_label_what_departs(source):
     )
     assert set(config.row()) == {*PLAY_FIELDS, "recording", "policy.k_safe"}
     assert config.label == "a care-sbf 0.05 camera_latency=1 floor_seed=2 policy.k_safe=1.0"
-    assert listed([config])["scenes"] == ["a"]
-    assert listed([config])["configurations"][0]["floor_seeds"] == [2]
+    assert listed_plays([config])["scenes"] == ["a"]
+    assert listed_plays([config])["configurations"][0]["floor_seeds"] == [2]
     with pytest.raises(InvalidInput, match="engine cannot be changed in the open loop"):
         replace(config, engine="bullet")
     with pytest.raises(InvalidInput, match="unknown detector 'yolo'"):

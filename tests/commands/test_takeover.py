@@ -17,7 +17,7 @@ from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import PLAY_FIELDS, play_grid
 from care_sim.study.results_formats import _PARAMETERS, EPISODES, PLAYS, RESULTS_FORMATS
-from care_sim.study.rows import read_notes, read_rows, write_rows
+from care_sim.study.rows.parquet import read_notes, read_rows, write_rows
 from tests.helpers.made_rows import STUDY, rows
 
 SHORT = (("duration_s", 0.1),)

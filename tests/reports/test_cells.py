@@ -1,6 +1,6 @@
 from care_sim.reports.cells import StudyCells
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.row_reading import key_of
+from care_sim.study.rows.reading import key_of
 from tests.helpers.made_rows import rows
 
 ROWS = [

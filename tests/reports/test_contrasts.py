@@ -2,8 +2,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.censoring import Bound
+from care_sim.reports.cells import summarise
 from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, contrast
-from care_sim.reports.summary import summarise
 from care_sim.study.episode_config import EpisodeConfig
 from tests.helpers.made_rows import NEAREST_M, STUDY, row, rows
 

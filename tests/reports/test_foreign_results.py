@@ -14,10 +14,9 @@ from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.reports.report import Report, print_report, reported
+from care_sim.reports.report import StudyReport, print_report, reported
 from care_sim.reports.studies import STUDIES
-from care_sim.study.rows import LEFT_OUT, read_rows, write_rows
-from care_sim.study.rows import STUDY as NAME
+from care_sim.study.rows.parquet import LEFT_OUT_NOTE, STUDY_NOTE, read_rows, write_rows
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY
 
@@ -46,7 +45,7 @@ def of_value(content, column, value):
 def shown(folder):
     rows, study, left_out = reported(folder)
     with warnings.catch_warnings(action="ignore"):
-        Report.of(rows, replace(study, figures=lambda _rows: {}), left_out)
+        StudyReport.of(rows, replace(study, figures=lambda _rows: {}), left_out)
         print_report(rows, Console(file=io.StringIO()), study, left_out)
 
 
@@ -188,14 +187,17 @@ def test_names_and_texts_of_broken_characters_are_damage(tmp_path):
 @pytest.mark.parametrize(
     ("notes", "fault"),
     [
-        ({NAME: b"\xff"}, "has notes that cannot be read"),
-        ({LEFT_OUT: b"["}, "has notes that cannot be read"),
-        ({LEFT_OUT: DEEP}, "nested too deep"),
-        ({LEFT_OUT: b"3"}, "what is left out must be a list of texts"),
-        ({LEFT_OUT: b"[1]"}, "what is left out must be a list of texts"),
-        ({NAME: b"gardening"}, "unknown study"),
-        ({NAME: b"protocol"}, "holds no rows of the study protocol, which are in plays.parquet"),
-        ({NAME: b"crowding"}, "it lacks scenario.vehicles"),
+        ({STUDY_NOTE: b"\xff"}, "has notes that cannot be read"),
+        ({LEFT_OUT_NOTE: b"["}, "has notes that cannot be read"),
+        ({LEFT_OUT_NOTE: DEEP}, "nested too deep"),
+        ({LEFT_OUT_NOTE: b"3"}, "what is left out must be a list of texts"),
+        ({LEFT_OUT_NOTE: b"[1]"}, "what is left out must be a list of texts"),
+        ({STUDY_NOTE: b"gardening"}, "unknown study"),
+        (
+            {STUDY_NOTE: b"protocol"},
+            "holds no rows of the study protocol, which are in plays.parquet",
+        ),
+        ({STUDY_NOTE: b"crowding"}, "it lacks scenario.vehicles"),
     ],
 )
 def test_notes_of_another_kind_are_one_line(tmp_path, notes, fault):

@@ -8,10 +8,10 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.conduct import conduct
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
-from care_sim.study.added_columns import annotated
 from care_sim.study.designs import ablations, crowding, faults, paper
 from care_sim.study.episode_config import grid
-from care_sim.study.rows import read_rows, write_rows
+from care_sim.study.rows.parquet import read_rows, write_rows
+from care_sim.study.rows.reading import annotated
 from tests.helpers.made_rows import CROWD, STUDY, row
 
 

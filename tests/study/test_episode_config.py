@@ -9,7 +9,13 @@ import pytest
 from care_sim.base import package_files
 from care_sim.base.errors import InvalidInput
 from care_sim.study import provenance
-from care_sim.study.episode_config import ENVIRONMENTS, PLAIN_FIELDS, EpisodeConfig, grid, listed
+from care_sim.study.episode_config import (
+    ENVIRONMENT_IDS,
+    PLAIN_FIELDS,
+    EpisodeConfig,
+    grid,
+    listed_episodes,
+)
 
 GOOD = EpisodeConfig("dense", "care")
 
@@ -17,7 +23,7 @@ GOOD = EpisodeConfig("dense", "care")
 def test_every_scenario_has_its_environment():
     from care_sim.scenarios import SCENARIOS
 
-    assert set(ENVIRONMENTS) == set(SCENARIOS)
+    assert set(ENVIRONMENT_IDS) == set(SCENARIOS)
 
 
 @pytest.mark.parametrize(
@@ -153,7 +159,7 @@ def test_full_runs_once_for_all_budgets():
         ("care", 0.1),
         ("full", 1.0),
     ]
-    assert [plain["seeds"] for plain in listed(configs)["configurations"]] == [[0, 1]] * 3
+    assert [plain["seeds"] for plain in listed_episodes(configs)["configurations"]] == [[0, 1]] * 3
 
 
 def test_a_parameter_may_be_one_policys_own():

@@ -19,7 +19,7 @@ from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.executors import cluster
 from care_sim.study.journal import JOURNAL, Journal
-from care_sim.study.runner import Audience, run_all
+from care_sim.study.runner import RunListener, run_all
 
 MEASURED = {"wall_s", "peak_rss_mb"}
 SHORT = (("duration_s", 0.5),)
@@ -38,7 +38,7 @@ class Dies(History):
 """
 
 
-class Watching(Audience):
+class Watching(RunListener):
     """Notes how many workers played."""
 
     def __init__(self):
@@ -113,13 +113,13 @@ def dask_cluster(tmp_path, monkeypatch):
 
 
 @contextmanager
-def running(configs, journal, address, audience=None):
+def running(configs, journal, address, listener=None):
     """A run in the background; yields what it returns or raises, once it has ended."""
     ending = {}
 
     def run():
         try:
-            ending["failures"] = run_all(configs, journal, 1, cluster(address), audience)
+            ending["failures"] = run_all(configs, journal, 1, cluster(address), listener)
         except Exception as error:
             ending["error"] = error
 
@@ -145,11 +145,11 @@ def steady(row):
 def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask_cluster, tmp_path):
     configs = grid(["dartout"], ["history", "care"], [0.1], range(6), scenario_parameters=LONG)
     doomed, _ = dask_cluster.worker(), dask_cluster.worker()
-    audience, path = Watching(), tmp_path / "journal.jsonl"
+    listener, path = Watching(), tmp_path / "journal.jsonl"
     with watched(dask_cluster.address) as client, Journal(path) as journal:
         client.wait_for_workers(2, timeout=40)
         (address,) = (where for where, pid in client.run(os.getpid).items() if pid == doomed.pid)
-        with running(configs, journal, dask_cluster.address, audience) as ending:
+        with running(configs, journal, dask_cluster.address, listener) as ending:
             until(lambda: len(journal) >= 2)
             doomed.send_signal(signal.SIGSTOP)
             time.sleep(0.3)
@@ -160,7 +160,7 @@ def test_a_killed_worker_costs_a_retry_and_every_row_is_the_one_played_here(dask
         assert [steady(journal[config.digest()]) for config in configs] == [
             steady(run_episode(c)) for c in configs
         ]
-    assert set(audience.workers) == {1, 2}
+    assert set(listener.workers) == {1, 2}
 
 
 @pytest.mark.slow

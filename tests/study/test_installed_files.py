@@ -15,7 +15,7 @@ from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.play_config import play_grid
 from care_sim.study.provenance import code_digest, detector_digest, policy_digest
 from care_sim.study.results_formats import EPISODES
-from care_sim.study.rows import read_rows
+from care_sim.study.rows.parquet import read_rows
 from care_sim.study.run_config import files_in
 from care_sim.study.runner import run_all
 

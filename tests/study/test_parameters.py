@@ -16,9 +16,9 @@ from care_sim.commands.shared.takeover import check_results
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.journal import Journal
-from care_sim.study.parameters import settled
-from care_sim.study.row_reading import policy_of
-from care_sim.study.rows import read_rows, write_rows
+from care_sim.study.parameters import checked_parameters
+from care_sim.study.rows.parquet import read_rows, write_rows
+from care_sim.study.rows.reading import policy_of
 
 ANYTHING = """
 from care_sim.policies.paper.history import History
@@ -92,7 +92,7 @@ def test_a_parameter_has_a_name_of_text(anything, name):
     ],
 )
 def test_python_types_of_everything_else(value, held):
-    ((_, found),) = settled([("x", value)], "policy")
+    ((_, found),) = checked_parameters([("x", value)], "policy")
     assert found == held
     assert type(found) is type(held)
 
@@ -114,7 +114,7 @@ def test_files_give_back_what_a_task_was_given(tmp_path_factory, value):
     folder = tmp_path_factory.mktemp("held")
     row = {
         "digest": "a",
-        **{f"policy.{name}": held for name, held in settled([("x", value)], "policy")},
+        **{f"policy.{name}": held for name, held in checked_parameters([("x", value)], "policy")},
     }
     with Journal(folder / "journal.jsonl") as journal:
         journal.append(row)

@@ -18,8 +18,8 @@ from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import answer, run_episode, trace
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.results_formats import EPISODES
-from care_sim.study.rows import read_rows
-from care_sim.study.runner import Audience, run_all
+from care_sim.study.rows.parquet import read_rows
+from care_sim.study.runner import RunListener, run_all
 
 SHORT = (("duration_s", 0.3),)
 MEASURED = {"wall_s", "peak_rss_mb"}
@@ -90,7 +90,7 @@ def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys)
     }
 
 
-class Counting(Audience):
+class Counting(RunListener):
     def __init__(self):
         self.ended = []
 
@@ -98,7 +98,7 @@ class Counting(Audience):
         self.ended.append((config, row is not None))
 
 
-class Impatient(Audience):
+class Impatient(RunListener):
     """Interrupts once episodes are in flight."""
 
     def __init__(self):
@@ -114,22 +114,22 @@ class Impatient(Audience):
 
 
 def test_an_interrupt_finishes_and_keeps_what_is_in_flight(tmp_path):
-    configs, audience = short(["history", "care", "random"], seeds=(0, 1)), Impatient()
+    configs, listener = short(["history", "care", "random"], seeds=(0, 1)), Impatient()
     with Journal(tmp_path / JOURNAL) as journal:
         with pytest.raises(KeyboardInterrupt):
-            run_all(configs, journal, 2, audience=audience)
+            run_all(configs, journal, 2, listener=listener)
         kept = [config for config in configs if config.digest() in journal]
-    assert audience.warned
+    assert listener.warned
     assert len(kept) >= 2
     assert len(kept) < len(configs)
 
 
 def test_any_executor_will_do(tmp_path):
-    audience = Counting()
+    listener = Counting()
     with Journal(tmp_path / JOURNAL) as journal:
         for _ in range(2):
-            assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, audience) == []
-            assert audience.ended == [(short(["history"])[0], True)]
+            assert run_all(short(["history"]), journal, 1, ThreadPoolExecutor, listener) == []
+            assert listener.ended == [(short(["history"])[0], True)]
 
 
 def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_path):
@@ -144,9 +144,9 @@ def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_pat
 
 def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
     configs = short(["history", "dies", "care", "raises", "raises-oddly", "exits", "random"])
-    audience = Counting()
+    listener = Counting()
     with Journal(tmp_path / JOURNAL) as journal:
-        failures = run_all(configs, journal, 2, audience=audience)
+        failures = run_all(configs, journal, 2, listener=listener)
         kept = {config for config in configs if config.digest() in journal}
     assert {failure.config.policy: failure.reason for failure in failures} == {
         "dies": "the worker process died",
@@ -158,18 +158,18 @@ def test_a_bad_policy_costs_only_its_own_episode(third_party, tmp_path):
         f"dartout {failures[0].config.policy} 0.1 seed 0 scenario.duration_s=0.3: "
     )
     assert {config.policy for config in kept} == {"history", "care", "random"}
-    assert Counter(audience.ended) == Counter((config, config in kept) for config in configs)
+    assert Counter(listener.ended) == Counter((config, config in kept) for config in configs)
 
 
 def test_a_worker_killed_in_mid_run_costs_a_retry(third_party, tmp_path):
     configs = short(["history", "killed-once", "care", "random"])
-    audience = Counting()
+    listener = Counting()
     with Journal(tmp_path / JOURNAL) as journal:
-        assert run_all(configs, journal, 2, audience=audience) == []
+        assert run_all(configs, journal, 2, listener=listener) == []
         assert len(journal) == 4
     assert (third_party.parent / "killed").exists()
     assert len((tmp_path / JOURNAL).read_text().splitlines()) == 4
-    assert Counter(audience.ended) == Counter((config, True) for config in configs)
+    assert Counter(listener.ended) == Counter((config, True) for config in configs)
 
 
 class BusyServer(ThreadPoolExecutor):

@@ -8,7 +8,7 @@ from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.journal import Journal
 from care_sim.study.results_formats import EPISODES
-from care_sim.study.rows import read_rows, write_rows
+from care_sim.study.rows.parquet import read_rows, write_rows
 
 ROWS = [
     EpisodeConfig("dense", policy).row()

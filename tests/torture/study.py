@@ -46,7 +46,7 @@ def expected():
 
 def steady(folder):
     """The rows in a folder without what is measured."""
-    from care_sim.study.rows import read_rows
+    from care_sim.study.rows.parquet import read_rows
 
     return [
         {name: value for name, value in row.items() if name not in MEASURED}

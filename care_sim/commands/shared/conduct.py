@@ -9,13 +9,13 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import write_text
 from care_sim.commands.shared.takeover import check_journal, check_kind, check_results, lost
-from care_sim.reports.report import Report
+from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import SWEEP, Study
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.progress import run_with_progress
 from care_sim.study.provenance import machine, versions
-from care_sim.study.rows import check_columns, write_columns, write_rows
+from care_sim.study.rows.parquet import check_columns, write_columns, write_rows
 from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
 
@@ -137,7 +137,7 @@ def _write(
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.results
     left_out, finished, aside = summary(failures, kind.unit), kind.finish(rows), kind.aside(rows)
-    report = Report.of(finished, study, left_out)
+    report = StudyReport.of(finished, study, left_out)
     write_text(folder / "config.json", _description(configs, study, failures))
     for name, columns in aside.items():
         write_columns(columns, folder / name)

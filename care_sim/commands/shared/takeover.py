@@ -11,7 +11,7 @@ from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.reports.studies import SWEEP, Study
 from care_sim.study.journal import Journal
 from care_sim.study.results_formats import RESULTS_FORMATS, is_parameter
-from care_sim.study.rows import read_notes, read_rows
+from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 
 WAYS_OUT = "give another --out, or --force to replace it"

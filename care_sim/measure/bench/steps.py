@@ -16,7 +16,7 @@ from care_sim.core.conditions import DEFAULTS
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.driven import Environment, driven
 from care_sim.sensors.engines import ENGINES
-from care_sim.study.episode_config import ENVIRONMENTS
+from care_sim.study.episode_config import ENVIRONMENT_IDS
 
 DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"
 """The peers, under random actions: highway-env's driving without sensors, and panda-gym's arm, also
@@ -31,14 +31,16 @@ def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
     and in one line each what is left out.
     """
     chosen = config.episode
-    main = ENVIRONMENTS[config.scenario]
-    others = [name for name in ENVIRONMENTS if name != config.scenario]
+    main = ENVIRONMENT_IDS[config.scenario]
+    others = [name for name in ENVIRONMENT_IDS if name != config.scenario]
     engines = [name for name in ENGINES if name != DEFAULTS["engine"]]
     made: dict[str, Maker] = {main: partial(driven, chosen)}
     made |= {
         f"{main}, engine {name}": partial(driven, replace(chosen, engine=name)) for name in engines
     }
-    made |= {ENVIRONMENTS[name]: partial(driven, replace(chosen, scenario=name)) for name in others}
+    made |= {
+        ENVIRONMENT_IDS[name]: partial(driven, replace(chosen, scenario=name)) for name in others
+    }
     made[DRIVING] = partial(gymnasium.make, f"highway_env:{DRIVING}", disable_env_checker=True)
     try:
         import_panda_gym()

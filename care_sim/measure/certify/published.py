@@ -6,7 +6,7 @@ from pathlib import Path
 
 from care_sim.base.errors import InvalidInput
 from care_sim.measure.certify.trail import DIGEST_BYTES
-from care_sim.study.rows import read_rows, write_columns
+from care_sim.study.rows.parquet import read_rows, write_columns
 
 FILE = Path(__file__).with_name("published.parquet")
 

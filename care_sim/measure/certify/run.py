@@ -11,7 +11,7 @@ from care_sim.measure.certify.needs import playable_here
 from care_sim.measure.certify.playing import Trails, trails_of
 from care_sim.measure.certify.published import combined, read, write
 from care_sim.measure.certify.verdict import verdict_of
-from care_sim.study.progress import Lines, bar
+from care_sim.study.progress import ProgressLines, progress_bar
 
 
 def run_certify(config: CertifyConfig) -> int:
@@ -38,9 +38,9 @@ def run_certify(config: CertifyConfig) -> int:
 def _played(numbers: Sequence[int], workers: int) -> Trails:
     total = len(numbers)
     with (
-        bar(total, "episodes")
+        progress_bar(total, "episodes")
         if sys.stderr.isatty()
-        else nullcontext(Lines(total, "episodes")) as show
+        else nullcontext(ProgressLines(total, "episodes")) as show
     ):
         return trails_of(numbers, workers, lambda done: show(done, ""))
 

@@ -18,7 +18,7 @@ from care_sim.measure.parity.random_scenes import random_scenes
 from care_sim.measure.parity.tables import parity_tables
 from care_sim.measure.parity.tally import REFERENCES
 from care_sim.scenarios import SCENARIOS
-from care_sim.study.progress import Lines, bar
+from care_sim.study.progress import ProgressLines, progress_bar
 from care_sim.study.provenance import machine, versions
 
 Figures = TypeVar("Figures")
@@ -75,5 +75,9 @@ def unexplained(report: dict[str, Any]) -> int:
 def _shown(
     unit: str, total: int, compare: Callable[[int, Callable[[int], None]], Figures]
 ) -> Figures:
-    with bar(total, unit) if sys.stderr.isatty() else nullcontext(Lines(total, unit)) as show:
+    with (
+        progress_bar(total, unit)
+        if sys.stderr.isatty()
+        else nullcontext(ProgressLines(total, unit)) as show
+    ):
         return compare(total, lambda done: show(done, ""))

@@ -1,13 +1,15 @@
-"""Episodes on film: one as its picture shows it, or the same seed under several policies side by
-side.
+"""Episodes in pictures: a clip of one or of several side by side, and the moment at which the brake
+goes on.
 """
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
 
 from PIL import Image
 
+from care_sim.base.files import PNG, check_output, replacing
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.study.episode_play import Watcher
@@ -15,7 +17,7 @@ from care_sim.viewer.pictures.clip_files import check_clip, write_clip
 from care_sim.viewer.pictures.drawing import BACKGROUND
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 
-LAST_PICTURE_S = 2.5
+_LAST_PICTURE_S = 2.5
 """How long the end of a film stays."""
 _GAP = 8
 
@@ -65,7 +67,7 @@ class Clip:
         """
         films = [film for film in self._films if film]
         if self._path is not None and films:
-            write_clip(self._path, _side_by_side(films), self._keyframe_s, LAST_PICTURE_S)
+            write_clip(self._path, _side_by_side(films), self._keyframe_s, _LAST_PICTURE_S)
         return bool(films)
 
 
@@ -81,3 +83,29 @@ def _row(pictures: Sequence[Image.Image]) -> Image.Image:
     for number, picture in enumerate(pictures):
         canvas.paste(picture, (number * (width + _GAP), 0))
     return canvas
+
+
+class BrakePhoto:
+    """Watches an episode and writes one picture to `path`; without a path it does nothing.
+
+    Raises InvalidInput and OSError at once where no picture can be written:
+    `care_sim.base.files.check_output`.
+    """
+
+    def __init__(self, path: Path | None):
+        self._path = path
+        self._done = path is None
+        if path is not None:
+            check_output(path, PNG)
+
+    def __call__(self, loop: ClosedLoop, frame: Keyframe) -> None:
+        """Take the picture if this is the keyframe."""
+        if self._path is not None and not self._done and frame.braking:
+            with replacing(self._path, PNG) as unfinished:
+                Image.fromarray(draw_keyframe(loop, frame)).save(unfinished, "PNG")
+            self._done = True
+
+    def report(self) -> None:
+        """Say so when there was nothing to take a picture of."""
+        if not self._done:
+            print("the car never braked: no picture", file=sys.stderr)

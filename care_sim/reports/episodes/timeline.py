@@ -11,7 +11,7 @@ from care_sim.loops.records import Keyframe, Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row
 
-COLUMNS = (
+_COLUMNS = (
     "time\ns",
     "speed\nm/s",
     "sensor to\nactor m",
@@ -21,12 +21,12 @@ COLUMNS = (
     "found",
     "brake",
 )
-LEGEND = (
+_LEGEND = (
     "seen: the camera shows the actor; found: the LiDAR detector reports it; distances are "
     "planar.\nThe brake acts 0.3 s after the decision. Keyframes in which nothing changes are left "
     "out."
 )
-LABELS = {
+_LABELS = {
     "detection_distance_m": "detection_distance_m (sensor to actor)",
     "min_distance_m": "min_distance_m (ego centre to actor centre)",
     "clearance_m": "clearance_m (hull to hull)",
@@ -43,14 +43,14 @@ def print_timeline(
         box=None,
         padding=(0, 1, 0, 0),
     )
-    for number, column in enumerate(COLUMNS):
+    for number, column in enumerate(_COLUMNS):
         table.add_column(column, justify="right" if number < 5 else "left", no_wrap=True)
     for frame in eventful(keyframes):
         table.add_row(*(_cells(frame) if frame else ["..."]))
     console.print(table)
-    console.print(LEGEND, markup=False)
+    console.print(_LEGEND, markup=False)
     for name in Outcome.__dataclass_fields__:
-        console.print(f"{LABELS.get(name, name):44} {text(row[name])}")
+        console.print(f"{_LABELS.get(name, name):44} {text(row[name])}")
     console.print(f"{'episode_hash':44} {row['episode_hash']}")
     console.print(f"{'wall_s':44} {row['wall_s']:.1f}")
 

@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
 from care_sim.base.errors import percent
-from care_sim.reports.figures.styles import FULL, Style, styles
+from care_sim.reports.cells import Cell, summarise
+from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.summary import Cell, summarise
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.run_config import Row
 
-NAMES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
+BUDGET_FIGURES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
 """Every figure that a sweep can draw."""
 DODGE = 0.03
 """Share of a budget by which neighbouring policies are moved apart, so that equal curves stay
@@ -24,11 +24,11 @@ visible.
 """
 SPREAD = 0.24
 """The same share from the first policy to the last, at most."""
-FEW = 5
+_FEW = 5
 """Policies up to which their quartiles are drawn in full strength."""
 
 
-class Curve(NamedTuple):
+class _NamedCurve(NamedTuple):
     """A curve and the metres at its right end."""
 
     line: Line2D
@@ -59,7 +59,7 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     without a detection; bars of a lower quartile that is not detected reach the bottom.
     """
     policies = dict.fromkeys((cell.policy, cell.tags) for cell in cells if cell.policy != "full")
-    figure = Figure(figsize=(8.2, 3.6 + 0.16 * max(len(policies), FEW)), layout="constrained")
+    figure = Figure(figsize=(8.2, 3.6 + 0.16 * max(len(policies), _FEW)), layout="constrained")
     axes = figure.add_subplot()
     axes.set_xscale("log")
     _name_curves(figure, _draw(axes, cells, styles(policies)))
@@ -79,7 +79,7 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[Curve]:
+def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[_NamedCurve]:
     curves = [
         _full_scan(axes, cell)
         for cell in cells
@@ -88,21 +88,28 @@ def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[Cu
     for number, (policy, style) in enumerate(drawn.items()):
         own = [cell for cell in cells if cell.policy == policy]
         shift = 1 + min(DODGE, SPREAD / len(drawn)) * (number - (len(drawn) - 1) / 2)
-        curves.append(_curve(axes, own, shift, style, 1.0 if len(drawn) <= FEW else 0.4))
+        curves.append(_curve(axes, own, shift, style, 1.0 if len(drawn) <= _FEW else 0.4))
     axes.set_ylim(bottom=0.0)
     _undetected(axes, cells, drawn)
     return curves
 
 
-def _full_scan(axes: Axes, cell: Cell) -> Curve:
+def _full_scan(axes: Axes, cell: Cell) -> _NamedCurve:
     height = cell.detection.median or 0.0
     line = axes.axhline(
-        height, color=FULL.colour, linestyle=FULL.line, linewidth=1.2, label="full scan", zorder=1
+        height,
+        color=FULL_STYLE.colour,
+        linestyle=FULL_STYLE.line,
+        linewidth=1.2,
+        label="full scan",
+        zorder=1,
     )
-    return Curve(line, height)
+    return _NamedCurve(line, height)
 
 
-def _curve(axes: Axes, cells: Sequence[Cell], shift: float, style: Style, strength: float) -> Curve:
+def _curve(
+    axes: Axes, cells: Sequence[Cell], shift: float, style: Style, strength: float
+) -> _NamedCurve:
     """Draw the detected medians of a policy and their quartiles."""
     places = [cell.budget * shift for cell in cells]
     medians = [
@@ -125,7 +132,7 @@ def _curve(axes: Axes, cells: Sequence[Cell], shift: float, style: Style, streng
         "linewidth": 1.5,
     }
     (line,) = axes.plot(places, medians, label=marked(cells[0].policy, cells[0].tags), **look)
-    return Curve(line, cells[-1].detection.median or 0.0)
+    return _NamedCurve(line, cells[-1].detection.median or 0.0)
 
 
 def _undetected(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> None:
@@ -166,7 +173,7 @@ def _open_marker(axes: Axes, cell: Cell, style: Style, aside: float) -> None:
     )
 
 
-def _name_curves(figure: Figure, curves: Sequence[Curve]) -> None:
+def _name_curves(figure: Figure, curves: Sequence[_NamedCurve]) -> None:
     """Name the curves beside the axes, in the order of their right ends."""
     handles = [curve.line for curve in sorted(curves, key=lambda curve: curve.end, reverse=True)]
     figure.legend(

@@ -15,14 +15,14 @@ from care_sim.reports.table import Bold
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.study.run_config import Row
 
-NAME = "crowding"
+CROWDING_FIGURE = "crowding"
 PALE = 0.55
 """Share of the colours' range up to which numbers are printed in black."""
 
 
 def crowding_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """The heat map, by name."""
-    return {NAME: crowding_figure(rows)}
+    return {CROWDING_FIGURE: crowding_figure(rows)}
 
 
 def crowding_figure(rows: Sequence[Row]) -> Figure:

@@ -9,15 +9,14 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from care_sim.reports.cells import StudyCells
-from care_sim.reports.figures.styles import FULL, Style, styles
-from care_sim.reports.summary import Cell
+from care_sim.reports.cells import Cell, StudyCells
+from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
 from care_sim.reports.tables.faults import policies_of
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, Fault
 from care_sim.study.designs.variants import Place
 from care_sim.study.run_config import Row
 
-COLUMNS = 5
+_COLUMNS = 5
 """Panels side by side; a place at least stays free for the legend."""
 
 
@@ -48,7 +47,7 @@ MEASURES = (
         lambda cell: cell.clearance.median if cell.clearance else None,
     ),
 )
-NAMES = tuple(
+FAULT_FIGURES = tuple(
     f"faults-{place.scenario}-{measure.name}" for place in FAULT_PLACES for measure in MEASURES
 )
 """Every figure that the study can draw."""
@@ -60,7 +59,7 @@ def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     drawn = styles(
         (policy, study.tags.get(policy, ())) for policy in policies_of(study) if policy != "full"
     )
-    curves = Curves(study, drawn | {"full": FULL})
+    curves = _FaultPanels(study, drawn | {"full": FULL_STYLE})
     return {
         f"faults-{p.scenario}-{m.name}": curves.figure(p, m)
         for p, m in product(FAULT_PLACES, MEASURES)
@@ -68,7 +67,7 @@ def fault_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 @dataclass(frozen=True)
-class Curves:
+class _FaultPanels:
     """Draws what was played, in the styles of the policies."""
 
     study: StudyCells
@@ -78,9 +77,9 @@ class Curves:
         """All faults in one place: an open marker at the bottom stands for a median that there is
         not.
         """
-        lines = len(FAULTS) // COLUMNS + 1
-        figure = Figure(figsize=(2.5 * COLUMNS, 2.3 * lines), layout="constrained")
-        panels = list(figure.subplots(lines, COLUMNS, sharey=True).flat)
+        lines = len(FAULTS) // _COLUMNS + 1
+        figure = Figure(figsize=(2.5 * _COLUMNS, 2.3 * lines), layout="constrained")
+        panels = list(figure.subplots(lines, _COLUMNS, sharey=True).flat)
         for fault, axes in zip(FAULTS, panels, strict=False):
             self._panel(axes, fault, place, measure)
         panels[0].set_ylim(bottom=min(0.0, panels[0].get_ylim()[0]))

@@ -1,18 +1,24 @@
-"""Figures of the first-sighting protocol, for every setting that has them."""
+"""Figures of the first-sighting protocol: the paper's Figures 2 and 3 for every setting that has
+them.
+"""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from care_sim.reports.figures.protocol_budgets import levels_figure
-from care_sim.reports.figures.protocol_frontier import pareto_figure
-from care_sim.reports.protocol.rows import plays_by_setting
-from care_sim.study.run_config import Row
-from care_sim.study.settings import SOURCES
+from care_sim.base.errors import percent
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
+from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
+from care_sim.reports.formatting import MARKS, marked, tag_notes
+from care_sim.reports.protocol.paper import published_level
+from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
+from care_sim.study.rows.settings import SOURCES
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
-KINDS = ("pareto", "levels")
-FIGURE_NAMES = tuple(
-    f"{kind}-{source}{rest}" for kind in KINDS for source in SOURCES for rest in ("", "-*")
+_KINDS = ("pareto", "levels")
+PROTOCOL_FIGURES = tuple(
+    f"{kind}-{source}{rest}" for kind in _KINDS for source in SOURCES for rest in ("", "-*")
 )
 """Every figure that a folder may hold, as patterns: the source, then what of detector and
 conditions is not usual.
@@ -28,3 +34,191 @@ def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         if len(plays.budgets) > 1:
             figures[f"levels-{plays.setting.slug}"] = levels_figure(plays)
     return figures
+
+
+Point = tuple[float, float]
+"""Overall and first-sighting recall in %."""
+
+
+def pareto_figure(plays: SettingPlays) -> Figure:
+    """Markers of all policies, and in grey the Pareto frontier of those that a car can have.
+
+    What lies below and left of the staircase is beaten in one recall and not better in the other.
+    Open markers show what lies under them; that of CARE is filled.
+    """
+    figure = Figure(figsize=(8.4, 3.6), layout="constrained")
+    panels = figure.subplots(1, len(plays.budgets), squeeze=False)[0]
+    drawn = styles(plays.tags.items())
+    for axes, budget in zip(panels, plays.budgets, strict=True):
+        points = {
+            policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))
+        }
+        _draw_recalls(axes, points, drawn, plays)
+        axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
+    panels[0].set_ylabel("first-sighting recall (%)")
+    _name_markers(figure, panels[0], plays)
+    return figure
+
+
+def frontier(points: Mapping[str, Point]) -> list[str]:
+    """The policies that no other equals in both recalls and beats in one, from least to most
+    overall recall.
+    """
+    best = [
+        name
+        for name, point in points.items()
+        if not any(_beats(other, point) for other in points.values())
+    ]
+    return sorted(best, key=lambda name: points[name])
+
+
+def _beats(other: Point, point: Point) -> bool:
+    return other != point and all(theirs >= ours for theirs, ours in zip(other, point, strict=True))
+
+
+def recalls(plays: SettingPlays, policy: str, budget: float) -> Point | None:
+    """Where a policy stands at a budget; None where a recall is not known."""
+    overall, first = (
+        plays.level(ratio, policy, budget).by_event for ratio in (OVERALL, FIRST_SIGHTING)
+    )
+    return None if overall is None or first is None else (overall, first)
+
+
+def _draw_recalls(
+    axes: Axes, points: Mapping[str, Point], drawn: Mapping[str, Style], plays: SettingPlays
+) -> None:
+    for policy, (overall, first) in points.items():
+        look = drawn[policy]
+        (marker,) = axes.plot(
+            overall, first, look.marker, color=look.colour, label=marked(policy, plays.tags[policy])
+        )
+        if policy == REFERENCE:
+            marker.set(markersize=5, zorder=5)
+        else:
+            marker.set(markersize=9, markerfacecolor="none", markeredgewidth=1.5, zorder=4)
+    axes.margins(0.1)
+    _staircase(
+        axes, {policy: point for policy, point in points.items() if not _marks(plays.tags[policy])}
+    )
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.94")
+    axes.set_axisbelow(True)
+
+
+def _marks(tags: tuple[str, ...]) -> bool:
+    return any(tag in MARKS for tag in tags)
+
+
+def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
+    """The frontier, from the left edge of the axes to the lower one."""
+    corners = [points[policy] for policy in frontier(points)]
+    if not corners:
+        return
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    overall, first = zip((left, corners[0][1]), *corners, (corners[-1][0], low), strict=True)
+    axes.step(overall, first, where="pre", color="0.6", linewidth=1.2, zorder=2)
+    axes.set(xlim=(left, right), ylim=(low, high))
+
+
+def _name_markers(figure: Figure, axes: Axes, plays: SettingPlays) -> None:
+    """The title, the markers by policy, what the full scan reaches, and what the grey line is."""
+    figure.suptitle(
+        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
+    )
+    ceiling = recalls(plays, FULL, 1.0) if plays.full else None
+    reached = (
+        f"; full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall"
+        if ceiling
+        else ""
+    )
+    line = f"grey line: Pareto frontier of the policies that a car can have{reached}"
+    figure.supxlabel(
+        "\n".join(["overall recall (%)", line, *tag_notes(plays.tags.values())]), fontsize=9
+    )
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
+    )
+
+
+DODGE = 0.025
+"""Share of a budget by which neighbouring policies are moved apart, so that equal lines stay
+visible.
+"""
+SPREAD = 0.1
+"""The same share from the first policy to the last, at most."""
+APART = "policies are drawn a little apart sideways, so that equal points stay visible"
+
+
+def levels_figure(plays: SettingPlays) -> Figure:
+    """Recalls in % of all policies at all budgets; the full scan as a dashed line; what the paper
+    gives of both, hollow and dotted.
+    """
+    figure = Figure(figsize=(8.4, 4.0), layout="constrained")
+    panels = figure.subplots(1, 2)
+    for axes, ratio in zip(panels, (FIRST_SIGHTING, OVERALL), strict=True):
+        _draw_levels(axes, plays, ratio)
+        if not plays.setting.conditions:
+            _draw_published(axes, plays, ratio)
+        axes.set_xscale("log")
+        axes.set_xticks(plays.budgets, [percent(budget) for budget in plays.budgets])
+        axes.minorticks_off()
+        axes.set_ylabel(f"{ratio.name} (%)")
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(axis="y", color="0.93")
+        axes.set_axisbelow(True)
+    figure.suptitle(
+        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
+    )
+    apart = [APART] if len(plays.tags) > 1 else []
+    notes = ["budget (share of cells fired)", *apart, *tag_notes(plays.tags.values())]
+    figure.supxlabel("\n".join(notes), fontsize=9)
+    figure.legend(
+        *panels[1].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
+    )
+    return figure
+
+
+def _draw_levels(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
+    ceiling = plays.level(ratio, FULL, 1.0).by_event if plays.full else None
+    if ceiling is not None:
+        axes.axhline(
+            ceiling,
+            color=FULL_STYLE.colour,
+            linestyle=FULL_STYLE.line,
+            linewidth=1.2,
+            label="full scan",
+        )
+    for number, (policy, look) in enumerate(styles(plays.tags.items()).items()):
+        shift = 1 + min(DODGE, SPREAD / len(plays.tags)) * (number - (len(plays.tags) - 1) / 2)
+        levels = {budget: plays.level(ratio, policy, budget).by_event for budget in plays.budgets}
+        known = {budget * shift: value for budget, value in levels.items() if value is not None}
+        order = 4 if policy == REFERENCE else 3
+        line = axes.plot(
+            list(known),
+            list(known.values()),
+            look.line,
+            color=look.colour,
+            zorder=order,
+            linewidth=1.4,
+        )
+        line[0].set(marker=look.marker, markersize=6, markeredgecolor="white", markeredgewidth=0.5)
+        line[0].set_label(marked(policy, plays.tags[policy]))
+
+
+def _draw_published(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
+    """The levels that the paper gives, of nuScenes and its own detectors."""
+    ceiling = published_level(ratio, FULL, 1.0)
+    if ceiling is not None:
+        axes.axhline(
+            ceiling, color=FULL_STYLE.colour, linestyle=":", linewidth=1.2, label="paper: full scan"
+        )
+    for policy, look in styles(plays.tags.items()).items():
+        levels = {budget: published_level(ratio, policy, budget) for budget in plays.budgets}
+        known = {budget: value for budget, value in levels.items() if value is not None}
+        if known:
+            (marks,) = axes.plot(
+                list(known), list(known.values()), look.marker, color=look.colour, zorder=5
+            )
+            marks.set(
+                markersize=7, markerfacecolor="white", markeredgewidth=1.4, label=f"paper: {policy}"
+            )

@@ -34,7 +34,7 @@ _KNOWN = {
 _SPARE = ("#6699CC", "#44AA99", "#CC6677", "#88CCEE", "#DDCC77")
 _GREYS = ("0.3", "0.45", "0.6")
 _MARKERS = ("d", "H", "8", "1", "2")
-FULL = Style("0.35", "_", "--")
+FULL_STYLE = Style("0.35", "_", "--")
 
 
 def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:

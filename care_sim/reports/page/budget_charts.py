@@ -6,6 +6,7 @@ from typing import Any
 import altair as alt
 
 from care_sim.base.errors import counted, percent
+from care_sim.reports.cells import Cell, summarise
 from care_sim.reports.figures.budget import DODGE, SPREAD
 from care_sim.reports.formatting import marked, spread, tag_notes
 from care_sim.reports.page.chart import (
@@ -18,10 +19,9 @@ from care_sim.reports.page.chart import (
     inline,
     specification,
 )
-from care_sim.reports.summary import Cell, summarise
 from care_sim.study.run_config import FULL, Row
 
-NOTES = (
+_NOTES = (
     "Median over the seeds; bars are quartiles. Hollow, at the bottom: the median is an actor "
     "that was not detected. Curves are drawn a little apart sideways, so that equal ones stay "
     "visible.",
@@ -75,7 +75,7 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         f"budgets {budgets_text(budgets)}."
     )
     return Chart(
-        title, about_it, (*NOTES, *tag_notes(own for _, own in tags)), specification(chart)
+        title, about_it, (*_NOTES, *tag_notes(own for _, own in tags)), specification(chart)
     )
 
 

@@ -21,7 +21,7 @@ from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts
 from care_sim.reports.page.episodes import Episode, chosen, played_again
 from care_sim.reports.page.fault_charts import fault_charts
-from care_sim.reports.page.listing import Group, groups, reel
+from care_sim.reports.page.listing import Group, episode_groups, replay_data
 from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.page.provenance import Provenance, provenance_of
 from care_sim.reports.page.tables import blocks
@@ -87,7 +87,7 @@ class Page:
                 tables=[(table, blocks(table)) for table in self.findings.tables],
                 closing=self.findings.closing,
                 groups=self.groups(),
-                reel=_embedded(reel(self.episodes)),
+                reel=_embedded(replay_data(self.episodes)),
                 asset=_asset,
                 counted=counted,
             )
@@ -95,7 +95,7 @@ class Page:
 
     def groups(self) -> list[Group]:
         """The episodes by setting; none in the open loop."""
-        return groups(self.rows, self.episodes) if self.closed_loop else []
+        return episode_groups(self.rows, self.episodes) if self.closed_loop else []
 
     @property
     def warnings(self) -> list[str]:

@@ -10,14 +10,14 @@ import altair as alt
 from matplotlib.colors import to_hex
 
 from care_sim.base.errors import percent
-from care_sim.reports.figures.styles import FULL, Style, styles
+from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
 from care_sim.reports.formatting import marked
 from care_sim.reports.page.shapes import outline
 
 FULL_SCAN = "full scan"
 PANEL_WIDTH = 200
 """Width of a panel in pixels; the browser sets as many side by side as there is room for."""
-FAINT = 0.12
+_FAINT = 0.12
 """Opacity of what is not chosen in the legend."""
 _DASHES = {"-": [1, 0], "--": [5, 3]}
 
@@ -65,7 +65,7 @@ class Encoding:
             marked(policy, own): style
             for (policy, own), style in zip(tags, styles(tags).values(), strict=True)
         }
-        return cls.of_styles(drawn | ({FULL_SCAN: FULL} if full else {}))
+        return cls.of_styles(drawn | ({FULL_SCAN: FULL_STYLE} if full else {}))
 
     @classmethod
     def of_styles(cls, drawn: Mapping[str, Style]) -> "Encoding":
@@ -87,7 +87,7 @@ class Encoding:
             alt.StrokeDash(
                 "policy:N", scale=scale([_DASHES[s.line] for s in drawn.values()]), legend=legend
             ),
-            alt.condition(chosen, alt.value(1.0), alt.value(FAINT)),
+            alt.condition(chosen, alt.value(1.0), alt.value(_FAINT)),
             chosen,
         )
 

@@ -13,7 +13,7 @@ from care_sim.reports.page.chart import Chart, inline, specification
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
 from care_sim.study.run_config import Row
 
-NOTES = (
+_NOTES = (
     "Asterisk: the interval excludes zero and the gate is met. Frame: all-camera has collapsed.",
 )
 
@@ -63,4 +63,4 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
         "A heat map of the mean difference by budget and standing vehicles; negative where "
         "all-camera is later."
     )
-    return [Chart(title, about_it, NOTES, specification(chart))]
+    return [Chart(title, about_it, _NOTES, specification(chart))]

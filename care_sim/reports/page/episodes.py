@@ -16,7 +16,7 @@ from care_sim.study.parameters import Parameters
 from care_sim.study.run_config import Row
 from care_sim.study.runner import DIED
 
-TOLERANCE = 1e-6
+_TOLERANCE = 1e-6
 """Machines of different kinds may differ in the last bits."""
 
 
@@ -110,7 +110,7 @@ def _ending(future: Future[Replay | str]) -> Replay | str:
 
 def _equal(was: object, now: object) -> bool:
     if isinstance(was, float) and isinstance(now, float):
-        return math.isclose(was, now, rel_tol=TOLERANCE, abs_tol=TOLERANCE)
+        return math.isclose(was, now, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE)
     return was == now
 
 

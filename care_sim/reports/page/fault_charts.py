@@ -10,16 +10,16 @@ import altair as alt
 from care_sim.base.errors import counted
 from care_sim.reports.cells import StudyCells
 from care_sim.reports.figures.faults import MEASURES, CurveMeasure
-from care_sim.reports.figures.styles import FULL, styles
+from care_sim.reports.figures.styles import FULL_STYLE, styles
 from care_sim.reports.page.chart import PANEL_WIDTH, Chart, Encoding, inline, specification
 from care_sim.reports.tables.faults import policies_of
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS
 from care_sim.study.designs.variants import Place
 from care_sim.study.run_config import Row
 
-LARGEST = 220.0
+_LARGEST = 220.0
 """Area of the marks of the first policy, in square pixels."""
-LEAST = 15.0
+_LEAST = 15.0
 """Area of the marks of a policy after the last, in square pixels."""
 
 
@@ -32,13 +32,13 @@ def fault_charts(rows: Sequence[Row]) -> list[Chart]:
 def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
     names = policies_of(study)
     known = styles((policy, study.tags.get(policy, ())) for policy in names if policy != "full") | {
-        "full": FULL
+        "full": FULL_STYLE
     }
     drawn = {study.marked(policy): style for policy, style in known.items()}
     encoding = Encoding.of_styles(drawn)
-    ratio = (LEAST / LARGEST) ** (1 / len(names))
+    ratio = (_LEAST / _LARGEST) ** (1 / len(names))
     values = [
-        value | {"area": round(LARGEST * ratio**number, 1)}
+        value | {"area": round(_LARGEST * ratio**number, 1)}
         for number, policy in enumerate(names)
         for value in _values(study, place, measure, policy)
     ]

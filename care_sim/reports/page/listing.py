@@ -10,13 +10,13 @@ from care_sim.base.errors import percent
 from care_sim.reports.formatting import marked
 from care_sim.reports.page.episodes import Episode
 from care_sim.reports.page.replay import packed
-from care_sim.study.row_reading import policy_of, setting_of, tags_of_row
+from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
+from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
-from care_sim.study.settings import Setting
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EpisodeEntry:
     """What an entry says of an episode; `number` of the replay in the page, None without."""
 
     text: str
@@ -32,7 +32,7 @@ class Configuration:
 
     policy: str
     budget: str
-    outcomes: tuple[Outcome | None, ...]
+    outcomes: tuple[EpisodeEntry | None, ...]
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Group:
     watchable: int
 
 
-def groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Group]:
+def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Group]:
     """All rows by setting; `episodes` are those of them that were played again, in the order of
-    `reel`.
+    `replay_data`.
     """
     held = {
         _place(episode.row): (number, episode)
@@ -61,7 +61,7 @@ def groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Group]:
     return [_group(setting, own, held) for setting, own in by_setting.items()]
 
 
-def reel(episodes: Sequence[Episode]) -> dict[str, Any]:
+def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
     """What `play.js` plays: every replay, and the standing bodies that several share."""
     shared: dict[str, int] = {}
     worlds: dict[Any, int] = {}
@@ -92,7 +92,7 @@ def _watchable(episodes: Sequence[Episode]) -> list[Episode]:
 
 def _group(setting: Setting, rows: Sequence[Row], held: dict[Any, tuple[int, Episode]]) -> Group:
     seeds = sorted({row["seed"] for row in rows})
-    lines: dict[tuple[str, str], dict[int, Outcome]] = {}
+    lines: dict[tuple[str, str], dict[int, EpisodeEntry]] = {}
     for row in rows:
         key = marked(policy_of(row), tags_of_row(row)), percent(row["budget"])
         lines.setdefault(key, {})[row["seed"]] = _outcome(row, *held.get(_place(row), (None, None)))
@@ -101,7 +101,7 @@ def _group(setting: Setting, rows: Sequence[Row], held: dict[Any, tuple[int, Epi
     return Group(setting.label, tuple(seeds), tuple(configurations), watchable)
 
 
-def _outcome(row: Row, number: int | None, episode: Episode | None) -> Outcome:
+def _outcome(row: Row, number: int | None, episode: Episode | None) -> EpisodeEntry:
     distance = row["detection_distance_m"]
     said = [
         "never detected" if distance is None else f"first detected at {distance:.1f} m",
@@ -110,7 +110,7 @@ def _outcome(row: Row, number: int | None, episode: Episode | None) -> Outcome:
     ]
     differs = bool(episode and episode.differences)
     text = "never" if distance is None else f"{distance:.1f}"
-    return Outcome(text, ", ".join(said), row["collision"], differs, number)
+    return EpisodeEntry(text, ", ".join(said), row["collision"], differs, number)
 
 
 def _place(row: Row) -> tuple[Any, ...]:

@@ -7,8 +7,7 @@ import altair as alt
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.reports.figures.protocol_budgets import APART, DODGE, SPREAD
-from care_sim.reports.figures.protocol_frontier import Point, frontier, recalls
+from care_sim.reports.figures.protocol import APART, DODGE, SPREAD, Point, frontier, recalls
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.page.chart import (
     FULL_SCAN,
@@ -24,8 +23,8 @@ from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.run_config import FULL, Row
 
-RECALLS = (FIRST_SIGHTING, OVERALL)
-Values = list[dict[str, Any]]
+_RECALLS = (FIRST_SIGHTING, OVERALL)
+_Values = list[dict[str, Any]]
 
 
 def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
@@ -103,7 +102,7 @@ def _pareto(plays: SettingPlays) -> Chart:
     )
 
 
-def _points(plays: SettingPlays, budget: float) -> Values:
+def _points(plays: SettingPlays, budget: float) -> _Values:
     """The policies at a budget; then the corners of the frontier, without a policy."""
     points = {
         policy: point for policy in plays.policies if (point := recalls(plays, policy, budget))
@@ -135,7 +134,7 @@ def _points(plays: SettingPlays, budget: float) -> Values:
 def _levels(plays: SettingPlays) -> Chart:
     """Both recalls against the budget; hollow: what the paper gives."""
     encoding = Encoding.of(plays.tags.items(), full=bool(plays.full))
-    values = [value for ratio in RECALLS for value in _curves(plays, ratio)]
+    values = [value for ratio in _RECALLS for value in _curves(plays, ratio)]
     height = alt.Y("value:Q", title="recall (%)", scale=alt.Scale(zero=False))
     base = alt.Chart().encode(y=height, color=encoding.colour, opacity=encoding.opacity)
     curves = base.encode(x=budget_axis(plays.budgets))
@@ -156,7 +155,7 @@ def _levels(plays: SettingPlays) -> Chart:
         .encode(shape=encoding.shape, tooltip=about)
         .transform_filter(papers),
     ).properties(width=PANEL_WIDTH + 140, height=260)
-    chart = _faceted(panels, values, [ratio.name for ratio in RECALLS]).resolve_scale(
+    chart = _faceted(panels, values, [ratio.name for ratio in _RECALLS]).resolve_scale(
         y="independent"
     )
     said = (
@@ -174,9 +173,9 @@ def _levels(plays: SettingPlays) -> Chart:
     )
 
 
-def _curves(plays: SettingPlays, ratio: Ratio) -> Values:
+def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
     """Our levels, moved apart, and the paper's; without a place the full scan."""
-    values: Values = []
+    values: _Values = []
     for number, (policy, tags) in enumerate(plays.tags.items()):
         shift = apart(number, len(plays.tags), DODGE, SPREAD)
         for budget in plays.budgets:
@@ -207,7 +206,7 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> Values:
     return [*values, *([full] if ceiling is not None else [])]
 
 
-def _faceted(panels: Any, values: Values, order: Sequence[str]) -> Any:
+def _faceted(panels: Any, values: _Values, order: Sequence[str]) -> Any:
     header = alt.Header(title=None, labelAnchor="start", labelFontSize=12)
     facet = alt.Facet("panel:N", sort=list(order), header=header)
     return panels.facet(facet=facet, columns=len(order), data=inline(values))

@@ -14,7 +14,7 @@ from care_sim.study.results_formats import ResultsFormat, is_parameter
 from care_sim.study.run_config import Row
 
 CONFIG = "config.json"
-MANY = 12
+_MANY = 12
 """Values of a parameter that are listed; of more the first and the last."""
 
 
@@ -70,7 +70,7 @@ def _listed(values: Sequence[Any]) -> str:
     texts = [_text(value) for value in values]
     return (
         ", ".join(texts)
-        if len(texts) <= MANY
+        if len(texts) <= _MANY
         else f"{texts[0]} to {texts[-1]}, {len(texts)} values"
     )
 

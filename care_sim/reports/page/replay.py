@@ -30,10 +30,10 @@ from care_sim.world.world import Actor
 
 SECTORS = 128
 """Directions of the picture in which fired cells are counted, from azimuth -pi on."""
-DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
+_DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 """How full a sector is, is written as one digit, from none of its cells to all of them."""
-CENTI = 100
-MILLI = 1000
+_CENTI = 100
+_MILLI = 1000
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class Recorder:
         """What was taken down, a list a column."""
         columns = {name: [moment[name] for moment in self.moments] for name in self.moments[0]}
         ego = {
-            "size": _whole(np.array(self.ego_size[:2]), CENTI),
-            "sensor": _whole(LIDAR_POSITION[0], CENTI),
+            "size": _whole(np.array(self.ego_size[:2]), _CENTI),
+            "sensor": _whole(LIDAR_POSITION[0], _CENTI),
         }
         return {"ego": ego, "tracked": self.tracked, "rays": self.rays, **columns}
 
@@ -115,17 +115,17 @@ class Recorder:
         for track, label, box in zip(
             tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True
         ):
-            self.tracked[track] = [CLASSES[label], *_whole(box[3:5], CENTI)]
+            self.tracked[track] = [CLASSES[label], *_whole(box[3:5], _CENTI)]
         columns = [
             tracks.ids[:, None],
             _poses(places[:, [0, 1, 6]]),
-            _whole_array(moves[:, :2], CENTI),
+            _whole_array(moves[:, :2], _CENTI),
         ]
         self.moments.append(
             {
-                "time": _whole(world.time, CENTI),
+                "time": _whole(world.time, _CENTI),
                 "place": _poses(np.array([world.ego.pose]))[0].tolist(),
-                "speed": _whole(loop.world.ego_motion.speed, CENTI),
+                "speed": _whole(loop.world.ego_motion.speed, _CENTI),
                 "tracks": np.column_stack([*columns, tracks.misses > 0]).tolist(),
                 "camera": sightlines(
                     loop.belief.detections,
@@ -141,7 +141,7 @@ class Recorder:
         about = {
             "n": number,
             "kind": actor.kind.name,
-            "size": _whole(np.array(actor.kind.size[:2]), CENTI),
+            "size": _whole(np.array(actor.kind.size[:2]), _CENTI),
             "reported": actor.label is not None,
             "sought": actor is self.first_sighting,
         }
@@ -154,8 +154,8 @@ def fullness(fired: Cells, grid: AngularGrid) -> str:
     width = grid.columns // SECTORS
     counts = np.bincount(np.asarray(fired) % grid.columns // width, minlength=SECTORS)
     return "".join(
-        DIGITS[round(digit)]
-        for digit in (counts / (width * grid.rows) * (len(DIGITS) - 1)).tolist()
+        _DIGITS[round(digit)]
+        for digit in (counts / (width * grid.rows) * (len(_DIGITS) - 1)).tolist()
     )
 
 
@@ -168,7 +168,7 @@ def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) 
         camera = rig.cameras[int(detections.cameras[number])]
         ends = camera.rays(np.array([[left, camera.height / 2], [right, camera.height / 2]]))
         azimuths = np.arctan2(ends[:, 1], ends[:, 0]) - detections.yaw_changes[number]
-        lines.append([*_whole(azimuths, MILLI), int(known[number])])
+        lines.append([*_whole(azimuths, _MILLI), int(known[number])])
     return lines
 
 
@@ -180,7 +180,7 @@ def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
         for key, name in switches.items()
     }
     distances = [
-        _whole(f.distance_m, CENTI) if np.isfinite(f.distance_m) else None for f in keyframes
+        _whole(f.distance_m, _CENTI) if np.isfinite(f.distance_m) else None for f in keyframes
     ]
     contact = next((f.index for f in keyframes if f.impact_speed_mps is not None), None)
     return {**written, "distance": distances, "contact": contact}
@@ -188,7 +188,7 @@ def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
 
 def _poses(poses: Floats) -> NDArray[np.int64]:
     """Places in centimetres and headings in milliradians, (n, 3)."""
-    return _whole_array(poses * (CENTI, CENTI, MILLI), 1)
+    return _whole_array(poses * (_CENTI, _CENTI, _MILLI), 1)
 
 
 def _whole_array(values: Floats, scale: int) -> NDArray[np.int64]:

@@ -13,8 +13,8 @@ from care_sim.reports.protocol.formatting import MET, NOT_MET
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals
 from care_sim.reports.protocol.paper import GATE, PAPER_BUDGETS
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
+from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import REFERENCE, Row
-from care_sim.study.settings import Setting
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:

@@ -9,18 +9,18 @@ from care_sim.base.errors import percent
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper
-from care_sim.reports.protocol.notes import UNITS, left_out, on_intervals, papers, played
+from care_sim.reports.protocol.notes import UNITS_NOTE, left_out, on_intervals, papers, played
 from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE
 
-TITLES = {REFERENCE: f"{REFERENCE} minus each policy", HISTORY: f"each policy minus {HISTORY}"}
-HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}
+_TITLES = {REFERENCE: f"{REFERENCE} minus each policy", HISTORY: f"each policy minus {HISTORY}"}
+_HEADS = {REFERENCE: f"{REFERENCE} minus", HISTORY: f"minus {HISTORY}"}
 """What stands above the names of the policies that the base is compared with."""
 
 
-class ContrastLine(NamedTuple):
+class _ContrastLine(NamedTuple):
     """A pair, named by the one of its policies that is not the base, and its differences at every
     budget.
     """
@@ -35,42 +35,49 @@ def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
     every scene; none of a base that was not played, or alone.
     """
     wanted = ((REFERENCE, False), (HISTORY, False), (REFERENCE, True))
-    return [_table(plays, base, alike) for base, alike in wanted if plays.other_than(base)]
+    return [
+        _table(plays, base, equal_scenes) for base, equal_scenes in wanted if plays.other_than(base)
+    ]
 
 
-def _table(plays: SettingPlays, base: str, alike: bool) -> Table:
-    contrasts = list(_contrasts(plays, base, alike))
+def _table(plays: SettingPlays, base: str, equal_scenes: bool) -> Table:
+    contrasts = list(_contrasts(plays, base, equal_scenes))
     said = claims_about(plays.setting)
     intervals = on_intervals(
         difference for contrast in contrasts for difference in contrast.differences
     )
-    weights = ", equal scene weights" if alike else ""
+    weights = ", equal scene weights" if equal_scenes else ""
     return Table(
-        f"{plays.setting.label}: {TITLES[base]}{weights}",
-        (HEADS[base], *map(percent, plays.budgets)),
+        f"{plays.setting.label}: {_TITLES[base]}{weights}",
+        (_HEADS[base], *map(percent, plays.budgets)),
         tuple(_lines(plays, contrasts)),
-        (f"{UNITS} {played(plays)}", *intervals, *left_out(plays), *tag_notes(plays.tags.values())),
+        (
+            f"{UNITS_NOTE} {played(plays)}",
+            *intervals,
+            *left_out(plays),
+            *tag_notes(plays.tags.values()),
+        ),
         papers(
             said[contrast.pair].source
             for contrast in contrasts
             if contrast.pair in said and said[contrast.pair].any_at(plays.budgets)
         ),
-        terminal=not alike,
+        terminal=not equal_scenes,
     )
 
 
-def _contrasts(plays: SettingPlays, base: str, alike: bool) -> Iterator[ContrastLine]:
+def _contrasts(plays: SettingPlays, base: str, equal_scenes: bool) -> Iterator[_ContrastLine]:
     """CARE stands first in its pairs, history last."""
     for ratio in RATIOS:
         for policy in plays.other_than(base):
             first, second = (base, policy) if base == REFERENCE else (policy, base)
-            pair = PolicyPair(first, second, ratio, alike=alike)
-            yield ContrastLine(
+            pair = PolicyPair(first, second, ratio, equal_scenes=equal_scenes)
+            yield _ContrastLine(
                 policy, pair, [pair.measured(plays, budget) for budget in plays.budgets]
             )
 
 
-def _lines(plays: SettingPlays, contrasts: Iterable[ContrastLine]) -> Iterator[tuple[str, ...]]:
+def _lines(plays: SettingPlays, contrasts: Iterable[_ContrastLine]) -> Iterator[tuple[str, ...]]:
     """The differences at every budget, and under them the paper's, below the headings of the
     measures.
     """

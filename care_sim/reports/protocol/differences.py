@@ -25,7 +25,7 @@ from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import REFERENCE
 
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
-HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
+_HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
 RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
 """What the columns by which scenes are ranked count, a keyframe."""
 FEWEST_SCENES = 9
@@ -113,21 +113,23 @@ class Comparison(Protocol):
 
 @dataclass(frozen=True)
 class PolicyPair:
-    """`first` less `second`, of all or `within` one stratum; with `alike` every scene weighs the
-    same.
+    """`first` less `second`, of all or `within` one stratum; with `equal_scenes` every scene
+    weighs the same.
     """
 
     first: str
     second: str
     ratio: Ratio
     within: str = ""
-    alike: bool = False
+    equal_scenes: bool = False
 
     @property
     def heading(self) -> str:
         """The measure, the stratum, the weights."""
         within = [self.within.partition("/")[2]] if self.within else []
-        return ", ".join([HEADINGS[self.ratio], *within, *(["equal scenes"] if self.alike else [])])
+        return ", ".join(
+            [_HEADINGS[self.ratio], *within, *(["equal scenes"] if self.equal_scenes else [])]
+        )
 
     @property
     def label(self) -> str:
@@ -144,10 +146,10 @@ class PolicyPair:
         found = self._contrast(plays, budget)
         if found is None:
             return None
-        by = found.by_scene if self.alike else found.by_event
+        by = found.by_scene if self.equal_scenes else found.by_event
         if found.scenes >= FEWEST_PAIRS:
             return MeasuredDifference(self.ratio, by.mean, by)
-        by_events = None if self.within or self.alike else _by_events(self, plays, budget)
+        by_events = None if self.within or self.equal_scenes else _by_events(self, plays, budget)
         return MeasuredDifference(self.ratio, by.mean, by_events, over_events=by_events is not None)
 
     def _contrast(self, plays: SettingPlays, budget: float) -> SceneContrast | None:
@@ -171,7 +173,7 @@ class SceneThird:
     @property
     def heading(self) -> str:
         """The measure, and what scenes are ranked by."""
-        return f"{HEADINGS[self.ratio]}, by {self.ranked_by}"
+        return f"{_HEADINGS[self.ratio]}, by {self.ranked_by}"
 
     @property
     def label(self) -> str:

@@ -13,7 +13,7 @@ from care_sim.reports.protocol.differences import (
     PolicyPair,
     SceneThird,
 )
-from care_sim.study.settings import Setting
+from care_sim.study.rows.settings import Setting
 
 PAPER_BUDGETS = (0.10, 0.20, 0.35)
 
@@ -196,7 +196,7 @@ _PLAIN: dict[Comparison, Claims] = {
     PolicyPair("care-priority", "care", FIRST_SIGHTING): _everywhere(
         Claim(0, at_most=0.2), _PRIORITY
     ),
-    PolicyPair("care", "history", FIRST_SIGHTING, alike=True): _by_budget(
+    PolicyPair("care", "history", FIRST_SIGHTING, equal_scenes=True): _by_budget(
         _difference(5.3), _difference(5.2), _difference(4.2), source=_ALIKE
     ),
     PolicyPair("care", "history", OVERALL): _by_budget(

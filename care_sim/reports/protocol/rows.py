@@ -13,9 +13,9 @@ from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import Ratio, RatioLevel, Tallies, averaged, ratio_level
 from care_sim.evaluation.strata import thirds
-from care_sim.study.row_reading import policy_of, setting_of, tags_of_row
+from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
+from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, REFERENCE, Row
-from care_sim.study.settings import Setting
 
 HISTORY = "history"
 """The policy that every other is held against."""

@@ -7,23 +7,23 @@ from care_sim.base.errors import percent
 from care_sim.reports.formatting import ends
 from care_sim.reports.protocol.differences import Comparison, MeasuredDifference, SceneThird
 from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, judged, verdict
-from care_sim.reports.protocol.notes import UNITS, on_intervals, papers
+from care_sim.reports.protocol.notes import UNITS_NOTE, on_intervals, papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS, Claims, claims_about
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.reports.table import Table
 
-Measured = Mapping[Comparison, Mapping[float, MeasuredDifference | None]]
+_Measured = Mapping[Comparison, Mapping[float, MeasuredDifference | None]]
 """What was measured of every statement, by budget."""
-RULE = (
+_RULE = (
     "In brackets: the paper's. Met: the interval excludes zero on the side that the paper says, or "
     "contains zero where it says tied. Not met: it excludes zero on the other side, or at all "
     "where the paper says tied. Undecided: it contains zero where the paper claims a sign, or "
     "there is none. A tie that is met shows no difference; it does not show that there is none."
 )
-THIRDS = (
+_THIRDS = (
     "Thirds of the scenes, by tracked objects or by explained detections: care minus all-camera."
 )
-UNIFORM = (
+_UNIFORM = (
     "The paper does not say in which measure history-uniform falls below history: both are tested."
 )
 
@@ -52,7 +52,7 @@ def statements_tables(plays: SettingPlays) -> list[Table]:
             tuple(_lines(measured, said)),
             (
                 _count(measured, said),
-                f"{UNITS} {RULE}",
+                f"{UNITS_NOTE} {_RULE}",
                 *_asides(measured),
                 *on_intervals(
                     difference
@@ -72,7 +72,7 @@ def _is_played(statement: Comparison, plays: SettingPlays) -> bool:
     return set(statement.policies) <= set(plays.policies)
 
 
-def _lines(measured: Measured, said: Mapping[Comparison, Claims]) -> Iterator[tuple[str, ...]]:
+def _lines(measured: _Measured, said: Mapping[Comparison, Claims]) -> Iterator[tuple[str, ...]]:
     heading = ""
     for each, differences in measured.items():
         if each.heading != heading:
@@ -95,7 +95,7 @@ def _entries(
     return judged(difference, claims.at(budget)), ends(difference)
 
 
-def _count(measured: Measured, said: Mapping[Comparison, Claims]) -> str:
+def _count(measured: _Measured, said: Mapping[Comparison, Claims]) -> str:
     verdicts = Counter(
         verdict(difference, claim.sign)
         for each, differences in measured.items()
@@ -106,10 +106,10 @@ def _count(measured: Measured, said: Mapping[Comparison, Claims]) -> str:
     return f"Of {verdicts.total()}, each budget counted: {listed}."
 
 
-def _asides(measured: Measured) -> tuple[str, ...]:
+def _asides(measured: _Measured) -> tuple[str, ...]:
     thirds = any(isinstance(each, SceneThird) for each in measured)
     uniform = any("history-uniform" in each.policies for each in measured)
-    return (*((THIRDS,) if thirds else ()), *((UNIFORM,) if uniform else ()))
+    return (*((_THIRDS,) if thirds else ()), *((_UNIFORM,) if uniform else ()))
 
 
 def _not_played(plays: SettingPlays, said: Mapping[Comparison, Claims]) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from care_sim.reports.protocol.differences import (
     SceneThird,
 )
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded, written
-from care_sim.reports.protocol.notes import UNITS, papers
+from care_sim.reports.protocol.notes import UNITS_NOTE, papers
 from care_sim.reports.protocol.paper import (
     ALLOCATION_SOURCE,
     PUBLISHED_ALLOCATIONS,
@@ -27,17 +27,17 @@ from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE
 
-BASES = (HISTORY, "all-camera")
+_BASES = (HISTORY, "all-camera")
 """The policies that strata compare CARE with."""
-RANKED = (
+_RANKED = (
     "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. "
     f"No interval of fewer than {FEWEST_PAIRS} scenes."
 )
-NO_THIRDS = (
+_NO_THIRDS = (
     "No thirds of the scenes by traffic: they take all-camera and at least "
     f"{FEWEST_SCENES} scenes at every budget."
 )
-DIFFERING = (
+_DIFFERING = (
     "Share of the keyframes, and mean number of cells where they differ. Each policy follows its "
     "own tracks, so differences accumulate over a scene."
 )
@@ -45,7 +45,7 @@ DIFFERING = (
 
 def strata_tables(plays: SettingPlays) -> list[Table]:
     """Recall by range, azimuth and class: the level of every policy, and CARE less the others in
-    `BASES`.
+    `_BASES`.
     """
     if not plays.policies:
         return []
@@ -54,7 +54,7 @@ def strata_tables(plays: SettingPlays) -> list[Table]:
         *(pair.label for pair in _pairs(plays)),
     )
     notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
-    without = (NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
+    without = (_NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
     return [
         Table(
             f"{plays.setting.label}: {ratio.name} by stratum",
@@ -73,7 +73,7 @@ def strata_tables(plays: SettingPlays) -> list[Table]:
 def _pairs(
     plays: SettingPlays, ratio: Ratio = FIRST_SIGHTING, within: str = ""
 ) -> list[PolicyPair]:
-    return [PolicyPair(REFERENCE, base, ratio, within) for base in BASES if base in plays.others]
+    return [PolicyPair(REFERENCE, base, ratio, within) for base in _BASES if base in plays.others]
 
 
 def _on_strata(plays: SettingPlays) -> tuple[str, ...]:
@@ -116,7 +116,7 @@ def thirds_tables(plays: SettingPlays) -> list[Table]:
             f"{plays.setting.label}: care minus all-camera in thirds of the scenes",
             ("third", *map(percent, plays.budgets)),
             tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
-            (f"{UNITS} {RANKED}",),
+            (f"{UNITS_NOTE} {_RANKED}",),
             papers(
                 claims.source
                 for each, claims in said.items()
@@ -185,7 +185,7 @@ def allocation_tables(plays: SettingPlays) -> list[Table]:
             f"{REFERENCE}",
             ("policy", *map(percent, plays.budgets)),
             tuple(lines),
-            (DIFFERING, *tag_notes(plays.tags.values())),
+            (_DIFFERING, *tag_notes(plays.tags.values())),
             papers(ALLOCATION_SOURCE for _ in said),
         )
     ]

@@ -23,7 +23,7 @@ from care_sim.reports.protocol.strata import allocation_tables, strata_tables, t
 from care_sim.reports.table import Table
 from care_sim.study.run_config import FULL, Row
 
-LEVEL_COLUMNS = (
+_LEVEL_COLUMNS = (
     "budget",
     "policy",
     "first sightings %",
@@ -38,8 +38,8 @@ LEVEL_COLUMNS = (
     "seeds: overall ±",
     "scenes",
 )
-LEVEL_FILES_ONLY = tuple(name for name in LEVEL_COLUMNS if ": " in name or name == "scenes")
-LEVEL_WHOLE = tuple(name for name in LEVEL_COLUMNS if name != "policy")
+_LEVEL_FILES_ONLY = tuple(name for name in _LEVEL_COLUMNS if ": " in name or name == "scenes")
+_LEVEL_WHOLE = tuple(name for name in _LEVEL_COLUMNS if name != "policy")
 
 
 def protocol_tables(rows: Sequence[Row]) -> list[Table]:
@@ -65,12 +65,12 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
     return [
         Table(
             f"{plays.setting.label}: levels",
-            LEVEL_COLUMNS,
+            _LEVEL_COLUMNS,
             tuple(lines),
             (*missing, *left_out(plays), *tag_notes(plays.tags.values())),
             papers(LEVEL_SOURCES) if any(line[1] == PAPER for line in lines) else (),
-            LEVEL_FILES_ONLY,
-            LEVEL_WHOLE,
+            _LEVEL_FILES_ONLY,
+            _LEVEL_WHOLE,
         )
     ]
 
@@ -95,7 +95,7 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
     said = None if plays.setting.conditions else PUBLISHED_LEVELS.get((policy, budget))
     if said is None:
         return [line]
-    return [line, ("", PAPER, *level_of_paper(said), *("" for _ in LEVEL_FILES_ONLY))]
+    return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _LEVEL_FILES_ONLY))]
 
 
 def _of_full(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:

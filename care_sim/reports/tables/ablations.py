@@ -3,16 +3,15 @@
 from collections.abc import Iterator, Sequence
 from itertools import product
 
-from care_sim.reports.cells import StudyCells
+from care_sim.reports.cells import Cell, StudyCells
 from care_sim.reports.formatting import interval, median, quarters
-from care_sim.reports.summary import Cell
 from care_sim.reports.table import Table
 from care_sim.study.designs.ablations import ABLATION_PLACES, ABLATIONS, Ablation
-from care_sim.study.designs.variants import USUAL, Place, Variant
+from care_sim.study.designs.variants import USUAL_VARIANT, Place, Variant
 from care_sim.study.run_config import Row
 
-LEVELS = ("level", "first detection m", "quartiles m", "braked")
-MOST_SHOWN = 2
+_LEVEL_COLUMNS = ("level", "first detection m", "quartiles m", "braked")
+_MOST_SHOWN = 2
 """References that 80 characters of a terminal leave room for."""
 
 
@@ -24,12 +23,22 @@ def ablation_tables(rows: Sequence[Row]) -> list[Table]:
 
 def _table(ablation: Ablation, study: StudyCells) -> Table:
     beside = _beside(ablation, study)
-    columns = (*LEVELS, "minus usual", *(f"minus {study.marked(policy)}" for policy in beside))
+    columns = (
+        *_LEVEL_COLUMNS,
+        "minus usual",
+        *(f"minus {study.marked(policy)}" for policy in beside),
+    )
     lines = [line for place in ABLATION_PLACES for line in _block(ablation, place, beside, study)]
-    hidden = (*LEVELS[2:], *columns[len(LEVELS) + 1 + MOST_SHOWN :])
+    hidden = (*_LEVEL_COLUMNS[2:], *columns[len(_LEVEL_COLUMNS) + 1 + _MOST_SHOWN :])
     notes = (*ablation.notes, *study.notes(beside))
     return Table(
-        f"{ablation.policy}: {ablation.title}", columns, tuple(lines), notes, (), hidden, LEVELS
+        f"{ablation.policy}: {ablation.title}",
+        columns,
+        tuple(lines),
+        notes,
+        (),
+        hidden,
+        _LEVEL_COLUMNS,
     )
 
 
@@ -37,7 +46,7 @@ def _block(
     ablation: Ablation, place: Place, beside: Sequence[str], study: StudyCells
 ) -> Iterator[tuple[str, ...]]:
     yield (str(place),)
-    usual = USUAL.key(place, ablation.policy)
+    usual = USUAL_VARIANT.key(place, ablation.policy)
     for level in ablation.levels:
         ours = level.key(place, ablation.policy)
         others = (level.for_others().key(place, policy) for policy in beside)
@@ -56,7 +65,7 @@ def _beside(ablation: Ablation, study: StudyCells) -> list[str]:
     the usual.
     """
     known = (ablation.policy, *ablation.references, "full")
-    usual = USUAL.key(ABLATION_PLACES[0], "care")
+    usual = USUAL_VARIANT.key(ABLATION_PLACES[0], "care")
     levels = [
         other
         for other in map(Variant.for_others, ablation.levels)

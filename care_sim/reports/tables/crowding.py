@@ -10,10 +10,10 @@ from care_sim.reports.contrasts import Contrast
 from care_sim.reports.formatting import interval, mean, median
 from care_sim.reports.table import Table
 from care_sim.study.designs.crowding import CROWDING_POLICIES, VEHICLES_COLUMN
-from care_sim.study.row_reading import Key, key_of
+from care_sim.study.rows.reading import Key, key_of
 from care_sim.study.run_config import Row
 
-TITLE = "dense, by standing vehicles: "
+_TITLE = "dense, by standing vehicles: "
 COLLAPSE_M = 3.0
 """All-camera counts as collapsed where CARE detects this much earlier and the interval excludes
 zero.
@@ -80,7 +80,7 @@ def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
         (str(n), *(entry(crowd.gap(n, budget, other)) for budget in crowd.budgets))
         for n in crowd.counts
     ]
-    title = f"{TITLE}first detection of {crowd.study.marked(other)} minus care, m{more}"
+    title = f"{_TITLE}first detection of {crowd.study.marked(other)} minus care, m{more}"
     notes = (
         (_collapse_note(crowd),)
         if other == "all-camera" and not intervals
@@ -105,7 +105,7 @@ def _medians_table(crowd: Crowd) -> Table:
         )
         for n in crowd.counts
     ]
-    title = f"{TITLE}median first detection, {'/'.join(map(crowd.study.marked, policies))}, m"
+    title = f"{_TITLE}median first detection, {'/'.join(map(crowd.study.marked, policies))}, m"
     columns = ("vehicles", *map(percent, crowd.budgets), "full")
     return Table(
         title,

@@ -5,17 +5,16 @@ policies changes.
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from care_sim.reports.cells import StudyCells
+from care_sim.reports.cells import Cell, StudyCells
 from care_sim.reports.contrasts import Contrast
 from care_sim.reports.formatting import interval, median
-from care_sim.reports.summary import Cell
 from care_sim.reports.table import Bold, Table
 from care_sim.study.designs.faults import FAULT_PLACES, FAULT_POLICIES, FAULTS, Fault
 from care_sim.study.designs.variants import Place, Variant
 from care_sim.study.run_config import Row
 
-PAIRS = (("care", "history"), ("care", "all-camera"), ("all-camera", "history"))
-ORDER = (
+_PAIRS = (("care", "history"), ("care", "all-camera"), ("all-camera", "history"))
+_ORDER = (
     "How the first named stands to the second at the first strength, and from which strength on "
     "otherwise. > : it detects earlier, interval without zero and gate met; < : it detects later, "
     "likewise; = : neither."
@@ -25,7 +24,7 @@ ORDER = (
 def pairs_of(study: StudyCells) -> list[tuple[str, str]]:
     """The pairs of policies whose order is followed."""
     return [
-        *PAIRS,
+        *_PAIRS,
         *(("care", policy) for policy in study.policies if policy not in FAULT_POLICIES),
     ]
 
@@ -79,7 +78,7 @@ def _order_table(study: StudyCells) -> Table:
         "Where the order of policies changes",
         columns,
         tuple(lines),
-        (ORDER, *study.notes(study.policies)),
+        (_ORDER, *study.notes(study.policies)),
     )
 
 

@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from care_sim.reports.cells import Cell, summarise
 from care_sim.reports.formatting import median
-from care_sim.reports.summary import Cell, summarise
 from care_sim.study.designs.paper import (
     CAMERA_POLICIES,
     DARTOUT_CAMERA,
@@ -23,7 +23,7 @@ from care_sim.study.designs.paper import (
 )
 from care_sim.study.run_config import Row
 
-CellsByName = dict[tuple[str, str, float, str], Cell]
+_CellsByName = dict[tuple[str, str, float, str], Cell]
 """By scenario, policy, budget and camera fault ('' without one)."""
 
 
@@ -61,7 +61,7 @@ def _key(cell: Cell) -> tuple[str, str, float, str]:
     return cell.setting.world, cell.policy, cell.budget, fault
 
 
-def _dartout(cells: CellsByName) -> list[Statement]:
+def _dartout(cells: _CellsByName) -> list[Statement]:
     camera = [cells["dartout", policy, 0.1, ""] for policy in CAMERA_POLICIES]
     history = cells["dartout", "history", 0.1, ""]
     full = cells["dartout", "full", 1.0, ""]
@@ -108,7 +108,7 @@ def _dartout(cells: CellsByName) -> list[Statement]:
     ]
 
 
-def _dense(cells: CellsByName) -> list[Statement]:
+def _dense(cells: _CellsByName) -> list[Statement]:
     care, camera, full = (
         cells["dense", p, b, ""] for p, b in (("care", 0.03), ("all-camera", 0.03), ("full", 1.0))
     )
@@ -140,7 +140,7 @@ def _dense(cells: CellsByName) -> list[Statement]:
     ]
 
 
-def _cutin(cells: CellsByName) -> Statement:
+def _cutin(cells: _CellsByName) -> Statement:
     group = [cell for cell in cells.values() if cell.setting.world == "cutin"]
     first = max(group, key=_median)
     last = min(group, key=_median)
@@ -149,7 +149,7 @@ def _cutin(cells: CellsByName) -> Statement:
     )
 
 
-def _faults(cells: CellsByName) -> list[Statement]:
+def _faults(cells: _CellsByName) -> list[Statement]:
     """A camera policy may not fall behind history, which asks no camera and so is its faultless
     self under latency.
     """
@@ -172,11 +172,11 @@ def _faults(cells: CellsByName) -> list[Statement]:
     return made
 
 
-def _slowest(cells: CellsByName, fault: str) -> Cell:
+def _slowest(cells: _CellsByName, fault: str) -> Cell:
     return min((cells["dartout", policy, 0.1, fault] for policy in CAMERA_POLICIES), key=_median)
 
 
-def _history(cells: CellsByName) -> Cell:
+def _history(cells: _CellsByName) -> Cell:
     return cells["dartout", "history", 0.1, ""]
 
 

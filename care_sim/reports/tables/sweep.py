@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import Quartiles
+from care_sim.reports.cells import Cell, summarise
 from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
 from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned
-from care_sim.reports.summary import Cell, summarise
 from care_sim.reports.table import Table
 from care_sim.study.designs.paper import (
     PAPER_EPISODES,
@@ -16,11 +16,11 @@ from care_sim.study.designs.paper import (
     paper_cells,
     published_result,
 )
-from care_sim.study.row_reading import Groups, Key, full_of, grouped
+from care_sim.study.rows.reading import Groups, Key, full_of, grouped
+from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, REFERENCE, Row
-from care_sim.study.settings import Setting
 
-COLUMNS = (
+SWEEP_COLUMNS = (
     "budget",
     "policy",
     "first detection m",
@@ -34,9 +34,9 @@ COLUMNS = (
     "as full",
     "paper",
 )
-FILES_ONLY = ("pass m", "clearance m", "collisions", "interval", "as full")
+_FILES_ONLY = ("pass m", "clearance m", "collisions", "interval", "as full")
 """Columns that 80 characters of a terminal leave no room for."""
-WHOLE = tuple(column for column in COLUMNS if column not in ("policy", "paper"))
+_WHOLE = tuple(column for column in SWEEP_COLUMNS if column not in ("policy", "paper"))
 
 
 def sweep_tables(rows: Sequence[Row]) -> list[Table]:
@@ -58,8 +58,8 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
     missing = [] if regretted else ["Regret: full not run."]
     notes = [*tag_notes(cell.tags for cell in cells), *missing]
-    hidden = FILES_ONLY if any(cell.never for cell in cells) else (*FILES_ONLY, "never")
-    return Table(title, COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, WHOLE)
+    hidden = _FILES_ONLY if any(cell.never for cell in cells) else (*_FILES_ONLY, "never")
+    return Table(title, SWEEP_COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, _WHOLE)
 
 
 def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> list[Table]:

@@ -6,7 +6,7 @@ from itertools import product
 from typing import Any
 
 from care_sim.core.forgetting import ForgettingRules
-from care_sim.study.designs.variants import USUAL, Place, Variant
+from care_sim.study.designs.variants import USUAL_VARIANT, Place, Variant
 from care_sim.study.episode_config import EpisodeConfig
 
 ABLATION_PLACES = (
@@ -19,7 +19,7 @@ ABLATION_PLACES = (
 tightest and below: with more the reserve holds every wedge whole, and nothing that is varied here
 could show.
 """
-REFERENCES = ("history", "all-camera")
+_REFERENCES = ("history", "all-camera")
 
 
 @dataclass(frozen=True)
@@ -59,28 +59,28 @@ ABLATIONS = (
         "reserve fraction rho",
         "care",
         _conditions("reserve_fraction", (0.15, 0.3, 0.5)),
-        REFERENCES,
+        _REFERENCES,
     ),
     Ablation(
         "angular margin of hulls and wedges, columns and rows",
         "care",
         tuple(_margins(*margins) for margins in ((1, 1), (2, 1), (4, 2))),
-        REFERENCES,
+        _REFERENCES,
         ("Halved, the margin keeps its one row: there is no half of one.",),
     ),
     Ablation(
         "least confidence of the camera",
         "care",
         _conditions("camera_confidence", (0.25, 0.5)),
-        REFERENCES,
+        _REFERENCES,
     ),
     Ablation(
         "age of the camera's detections, keyframes",
         "care",
         _conditions("camera_latency", (0, 1)),
-        REFERENCES,
+        _REFERENCES,
     ),
-    Ablation("seed of the shared floor", "care", _conditions("floor_seed", (0, 1, 2)), REFERENCES),
+    Ablation("seed of the shared floor", "care", _conditions("floor_seed", (0, 1, 2)), _REFERENCES),
     Ablation(
         "order of the reserve",
         "care",
@@ -118,7 +118,7 @@ def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     made = [
         config
         for place in ABLATION_PLACES
-        for config in USUAL.configurations(place, ["full"], seeds)
+        for config in USUAL_VARIANT.configurations(place, ["full"], seeds)
     ]
     for place, ablation in product(ABLATION_PLACES, ABLATIONS):
         beside = [*ablation.references, *(also if ablation.varies_conditions else ())]

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from care_sim.scenarios.dense import VEHICLE_PLACES
 from care_sim.study.episode_config import EpisodeConfig, grid
 
-CROWDING_BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
-VEHICLE_COUNTS = range(len(VEHICLE_PLACES) + 1)
+_CROWDING_BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
+_VEHICLE_COUNTS = range(len(VEHICLE_PLACES) + 1)
 CROWDING_POLICIES = ("all-camera", "care", "full")
 VEHICLES_COLUMN = "scenario.vehicles"
 """The column of the rows that the study varies."""
@@ -21,11 +21,11 @@ def crowding_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     policies = list(dict.fromkeys([*CROWDING_POLICIES, *also]))
     return [
         config
-        for vehicles in VEHICLE_COUNTS
+        for vehicles in _VEHICLE_COUNTS
         for config in grid(
             ["dense"],
             policies,
-            CROWDING_BUDGETS,
+            _CROWDING_BUDGETS,
             seeds,
             scenario_parameters=(("vehicles", vehicles),),
         )

@@ -13,9 +13,9 @@ FAULT_PLACES = (Place("dartout", 0.10), Place("dense", 0.03))
 reserves apart.
 """
 FAULT_POLICIES = ("history", "all-camera", "care", "full")
-BLACKOUT_START_S = 2.0
+_BLACKOUT_START_S = 2.0
 """The person comes into the camera's view 2.4 to 2.9 s after the start."""
-DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
+_DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
 """Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees
 below the horizon.
 """
@@ -63,9 +63,9 @@ FAULTS = (
     Fault("latency", "keyframes", _growing("camera_latency", 1, 2, 3, 5)),
     Fault("jitter of the latency", "most keyframes", _growing("camera_jitter", 1, 2, 4)),
     Fault(
-        f"blackout from {BLACKOUT_START_S:.1f} s",
+        f"blackout from {_BLACKOUT_START_S:.1f} s",
         "s",
-        _growing("blackout_s", 0.5, 1.0, 2.0, blackout_start_s=BLACKOUT_START_S),
+        _growing("blackout_s", 0.5, 1.0, 2.0, blackout_start_s=_BLACKOUT_START_S),
     ),
     Fault(
         "camera turned",
@@ -86,7 +86,10 @@ FAULTS = (
     Fault(
         "dead rows",
         "rows",
-        (Variant("0"), *(Variant(f"{len(rows)}", {"lidar_dead_rows": rows}) for rows in DEAD_ROWS)),
+        (
+            Variant("0"),
+            *(Variant(f"{len(rows)}", {"lidar_dead_rows": rows}) for rows in _DEAD_ROWS),
+        ),
     ),
     Fault("noise of the car's speed", "sigma in m/s", _growing("ego_speed_sigma", 0.25, 0.5, 1.0)),
 )

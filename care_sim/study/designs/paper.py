@@ -9,7 +9,7 @@ from functools import cache
 from typing import NamedTuple
 
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.row_reading import Key, key_of
+from care_sim.study.rows.reading import Key, key_of
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sbf")
 _BUDGETED = ("history", *CAMERA_POLICIES)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from care_sim.base.errors import percent
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.row_reading import Key, key_of
+from care_sim.study.rows.reading import Key, key_of
 from care_sim.study.run_config import Row
 
 
@@ -51,7 +51,7 @@ class Variant:
         return Variant(self.label, self.changes)
 
     def key(self, place: Place, policy: str) -> Key:
-        """Where `care_sim.reports.summary` keeps the rows of a policy at this level."""
+        """Where `care_sim.reports.cells` keeps the rows of a policy at this level."""
         row: Row = {
             "scenario": place.scenario,
             "policy": self.policy or policy,
@@ -65,4 +65,4 @@ class Variant:
         return (key[0].for_full(), "full", 1.0) if policy == "full" else key
 
 
-USUAL = Variant("usual")
+USUAL_VARIANT = Variant("usual")

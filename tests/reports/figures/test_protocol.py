@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.reports.figures.files import save
-from care_sim.reports.figures.protocol import FIGURE_NAMES, protocol_figures
-from care_sim.reports.figures.protocol_frontier import frontier
+from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, frontier, protocol_figures
 from tests.helpers.made_plays import study
 
 FOUND = {
@@ -30,8 +29,8 @@ def test_every_setting_has_its_figures_and_their_names_are_known():
     ]
     figures = protocol_figures(rows)
     assert list(figures) == ["pareto-streets", "levels-streets", "pareto-streets-camera-latency-1"]
-    assert all(any(fnmatch(name, pattern) for pattern in FIGURE_NAMES) for name in figures)
-    assert not any(fnmatch("pareto-mine", pattern) for pattern in FIGURE_NAMES)
+    assert all(any(fnmatch(name, pattern) for pattern in PROTOCOL_FIGURES) for name in figures)
+    assert not any(fnmatch("pareto-mine", pattern) for pattern in PROTOCOL_FIGURES)
 
 
 @pytest.mark.parametrize("name", ["pareto-streets", "levels-streets"])

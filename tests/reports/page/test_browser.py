@@ -15,11 +15,11 @@ from PIL import Image, ImageColor
 from care_sim.reports.figures.styles import styles
 from care_sim.reports.page.build import write_page
 from care_sim.reports.page.replay import packed
-from care_sim.study.added_columns import annotated, tagged
 from care_sim.study.designs import ablations, faults
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import run_episode
-from care_sim.study.rows import write_rows
+from care_sim.study.rows.parquet import write_rows
+from care_sim.study.rows.reading import annotated, tagged
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 from tests.helpers.places import ROOT

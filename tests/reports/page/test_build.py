@@ -8,7 +8,7 @@ from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.build import CHARTS, write_page
 from care_sim.reports.page.crowding_charts import crowding_charts
 from care_sim.reports.studies import STUDIES
-from care_sim.study.rows import write_rows
+from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_rows import CROWD, STUDY, rows
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.reports.page.listing import groups
+from care_sim.reports.page.listing import episode_groups
 from care_sim.reports.page.provenance import provenance_of, settings
 from care_sim.reports.page.tables import blocks, sort_key
 from care_sim.reports.protocol.formatting import PAPER
@@ -70,7 +70,7 @@ def test_a_table_of_one_column_has_no_headings():
 
 def test_the_listing_has_a_line_a_configuration_and_an_entry_a_seed():
     played = [*STUDY, *rows("care", [9.0], budget=0.05, changes={"collision": True})]
-    (group,) = groups(played, [])
+    (group,) = episode_groups(played, [])
     assert (group.label, group.seeds, group.watchable) == ("dense", (0, 1, 2, 3, 4), 0)
     by_name = {(line.policy, line.budget): line.outcomes for line in group.configurations}
     assert [outcome.text for outcome in by_name["history", "3%"]] == [

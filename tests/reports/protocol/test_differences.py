@@ -50,7 +50,7 @@ def test_equal_scene_weights_count_scenes():
         for policy, sighted in (("care", ours), ("history", 0))
     ]
     assert FIRST.measured(plays(rows), 0.1).mean == pytest.approx(100 * 3 / 26)
-    assert PolicyPair("care", "history", FIRST_SIGHTING, alike=True).measured(
+    assert PolicyPair("care", "history", FIRST_SIGHTING, equal_scenes=True).measured(
         plays(rows), 0.1
     ).mean == pytest.approx(30.0)
 
@@ -84,7 +84,7 @@ def test_of_few_scenes_the_interval_comes_from_events_averaged_over_floor_seeds(
     assert late.interval.mean == pytest.approx(late.mean)
     for none in (
         PolicyPair("care", "history", OVERALL),
-        PolicyPair("care", "history", FIRST_SIGHTING, alike=True),
+        PolicyPair("care", "history", FIRST_SIGHTING, equal_scenes=True),
     ):
         assert none.measured(few, 0.1).interval is None
     within = PolicyPair("care", "history", FIRST_SIGHTING, "range/below 20 m").measured(few, 0.1)

@@ -12,7 +12,7 @@ from care_sim.reports.report import print_report, reported, write_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.results_formats import PLAYS
-from care_sim.study.rows import write_rows
+from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_plays import found, play, study
 
 BOTH = {"care": (6, 5), "history": (4, 6)}

@@ -20,8 +20,8 @@ from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
-from care_sim.study.rows import read_rows, with_tuples, write_rows
-from care_sim.study.settings import Setting
+from care_sim.study.rows.parquet import read_rows, with_tuples, write_rows
+from care_sim.study.rows.settings import Setting
 from tests.helpers.made_plays import found, play, study
 
 FOUND = {

@@ -1,7 +1,7 @@
 import pytest
 
 from care_sim.core.conditions import Sensing
-from care_sim.reports.figures.faults import NAMES, fault_figures
+from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.faults import StudyCells, fault_tables, order
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, fault_study
@@ -102,7 +102,7 @@ def test_the_full_scan_is_played_only_where_it_feels_the_fault():
 
 def test_a_figure_for_every_place_and_measure(rows):
     figures = fault_figures(rows)
-    assert tuple(figures) == NAMES
+    assert tuple(figures) == FAULT_FIGURES
     for figure in figures.values():
         panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
         assert [axes.get_title(loc="left") for axes in panels] == [fault.title for fault in FAULTS]

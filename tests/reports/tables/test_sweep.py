@@ -6,9 +6,9 @@ import pytest
 from rich.console import Console
 
 from care_sim.reports.table import Bold
-from care_sim.reports.tables.sweep import COLUMNS, sweep_tables
+from care_sim.reports.tables.sweep import SWEEP_COLUMNS, sweep_tables
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.row_reading import setting_of
+from care_sim.study.rows.reading import setting_of
 from tests.helpers.made_rows import STUDY, row, rows
 
 ORACLE = rows(
@@ -19,7 +19,9 @@ ORACLE = rows(
 
 
 def levels(study=STUDY):
-    return {line[1]: dict(zip(COLUMNS, line, strict=True)) for line in sweep_tables(study)[0].rows}
+    return {
+        line[1]: dict(zip(SWEEP_COLUMNS, line, strict=True)) for line in sweep_tables(study)[0].rows
+    }
 
 
 def blocks(study=STUDY):

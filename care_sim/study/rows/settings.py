@@ -6,7 +6,7 @@ from typing import Any
 from care_sim.core.conditions import CAMERA_FAULTS, UNUSED_BY_FULL_SCAN
 from care_sim.perception.detectors import PROXY
 
-Conditions = tuple[tuple[str, Any], ...]
+ChangedConditions = tuple[tuple[str, Any], ...]
 """Names and values of the conditions that are not the default."""
 SOURCES = {"streets": "generated streets", "argoverse2": "Argoverse 2", "nuscenes": "nuScenes"}
 """How headings name the sources of films."""
@@ -21,7 +21,7 @@ class Setting:
     """
 
     world: str
-    conditions: Conditions = ()
+    conditions: ChangedConditions = ()
     detector: str = ""
 
     @property

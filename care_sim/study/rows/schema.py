@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 
 from care_sim.core.conditions import DEFAULTS
 
-MOST = 1e12
+_LARGEST = 1e12
 """What a measured number may be and still be averaged and drawn."""
 PARAMETERS = ("scenario.", "policy.", "detector.")
 """What the names of columns of parameters begin with."""
@@ -40,7 +40,7 @@ def _is_parameter(kind: pa.DataType) -> bool:
 
 
 _ANY = "text, numbers, flags or lists of them"
-KINDS: dict[str, Callable[[pa.DataType], bool]] = {
+_KINDS: dict[str, Callable[[pa.DataType], bool]] = {
     "text": _is_text,
     "true or false": pa.types.is_boolean,
     "whole numbers": pa.types.is_integer,
@@ -53,7 +53,7 @@ _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": p
 
 @dataclass(frozen=True)
 class Column:
-    """A column of one of `KINDS`, its numbers within `least` and `most`.
+    """A column of one of `_KINDS`, its numbers within `least` and `most`.
 
     Where it is `optional`, rows may hold nothing in it. Numbers that are `whole` count something,
     whatever type a file holds them in.
@@ -61,8 +61,8 @@ class Column:
 
     kind: str
     optional: bool = False
-    least: float = -MOST
-    most: float = MOST
+    least: float = -_LARGEST
+    most: float = _LARGEST
     whole: bool = False
 
     @property
@@ -76,7 +76,7 @@ class Column:
             # The type of an empty column carries no meaning: pandas and earlier versions write
             # numbers there.
             return
-        if not KINDS[self.kind](values.type):
+        if not _KINDS[self.kind](values.type):
             yield f"must hold {self.kind}, got {values.type}"
         elif values.null_count and not self.optional:
             yield f"must hold {self.kind} in every row, got nothing in {values.null_count}"
@@ -118,7 +118,7 @@ _OF_TYPES = {
     str: "text",
     tuple: "lists of whole numbers",
 }
-CONDITIONS = {
+CONDITION_COLUMNS = {
     name: Column(_OF_TYPES[type(value)], optional=True) for name, value in DEFAULTS.items()
 }
 

@@ -4,25 +4,25 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 
-from care_sim.study.run_config import Likeness, RunConfig
+from care_sim.study.run_config import RunConfig, SimilarityKey
 
 
-class Forecast:
+class RemainingTime:
     """Predicts the time that the waiting tasks of a run still need.
 
-    A task is expected to take as long as the mean of those most like it (`RunConfig.likenesses`).
-    What this run has measured comes before what an `earlier` run did, perhaps on another machine:
-    pairs of task and seconds.
+    A task is expected to take as long as the mean of those most like it
+    (`RunConfig.similarity_keys`). What this run has measured comes before what an `earlier` run
+    did, perhaps on another machine: pairs of task and seconds.
     """
 
     def __init__(
         self, waiting: Iterable[RunConfig], earlier: Iterable[tuple[RunConfig, float]] = ()
     ):
-        self._waiting = Counter(task.likenesses for task in waiting)
+        self._waiting = Counter(task.similarity_keys for task in waiting)
         self._now = _Means()
         self._earlier = _Means()
         for task, seconds in earlier:
-            self._earlier.add(task.likenesses, seconds)
+            self._earlier.add(task.similarity_keys, seconds)
 
     @property
     def waiting(self) -> int:
@@ -31,8 +31,8 @@ class Forecast:
 
     def finished(self, task: RunConfig, seconds: float) -> None:
         """A task has ended after so many seconds; one that failed counts as 0."""
-        self._waiting[task.likenesses] -= 1
-        self._now.add(task.likenesses, seconds)
+        self._waiting[task.similarity_keys] -= 1
+        self._now.add(task.similarity_keys, seconds)
 
     def remaining_s(self, workers: int) -> float:
         """Seconds until the last task ends, with so many workers; NaN while nothing is known."""
@@ -44,22 +44,20 @@ class Forecast:
         total = sum(self._waiting[kind] * seconds for kind, seconds in expected.items())
         return max(total / max(workers, 1), max(expected.values()))
 
-    def _expected_s(self, kind: tuple[Likeness, ...]) -> float:
-        candidates = (
-            means.get(likeness) for likeness in kind for means in (self._now, self._earlier)
-        )
+    def _expected_s(self, kind: tuple[SimilarityKey, ...]) -> float:
+        candidates = (means.get(key) for key in kind for means in (self._now, self._earlier))
         return next((seconds for seconds in candidates if seconds is not None), math.nan)
 
 
 class _Means:
     def __init__(self) -> None:
-        self._sums: dict[Likeness, tuple[float, int]] = {}
+        self._sums: dict[SimilarityKey, tuple[float, int]] = {}
 
-    def add(self, likenesses: tuple[Likeness, ...], seconds: float) -> None:
-        for likeness in likenesses:
-            total, number = self._sums.get(likeness, (0.0, 0))
-            self._sums[likeness] = (total + seconds, number + 1)
+    def add(self, similarity_keys: tuple[SimilarityKey, ...], seconds: float) -> None:
+        for key in similarity_keys:
+            total, number = self._sums.get(key, (0.0, 0))
+            self._sums[key] = (total + seconds, number + 1)
 
-    def get(self, likeness: Likeness) -> float | None:
-        total, number = self._sums.get(likeness, (0.0, 0))
+    def get(self, key: SimilarityKey) -> float | None:
+        total, number = self._sums.get(key, (0.0, 0))
         return total / number if number else None

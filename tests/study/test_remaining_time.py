@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.forecast import Forecast
-from care_sim.study.progress import Lines, Reporter, spoken
+from care_sim.study.progress import ProgressLines, ProgressReporter, rounded_duration
+from care_sim.study.remaining_time import RemainingTime
 
 POLICIES = ["history", "all-camera", "care", "care-sbf", "random", "full"]
 SEEDS = 20
@@ -32,15 +32,15 @@ def play(configs, workers, forecast=None):
     predicted then.
     """
     random = np.random.default_rng(0)
-    forecast = forecast or Forecast(configs)
+    remaining = forecast or RemainingTime(configs)
     flying, predictions, waiting, now = [], [], list(reversed(configs)), 0.0
     while waiting or flying:
         while waiting and len(flying) < workers:
             took = seconds(waiting[-1], random)
             heapq.heappush(flying, (now + took, len(waiting), took, waiting.pop()))
         now, _, took, config = heapq.heappop(flying)
-        forecast.finished(config, took)
-        predictions.append((now, now + forecast.remaining_s(workers)))
+        remaining.finished(config, took)
+        predictions.append((now, now + remaining.remaining_s(workers)))
     return now, predictions
 
 
@@ -57,7 +57,7 @@ def test_soon_the_whole_is_known_to_a_tenth(workers, share):
 
 
 def test_the_mean_of_all_would_be_far_off():
-    """The same run when the slow policy comes last and likeness is not looked at: why the forecast
+    """The same run when the slow policy comes last and key is not looked at: why the forecast
     looks.
     """
     configs = sorted(sweep(), key=lambda config: config.policy == "full")
@@ -74,9 +74,9 @@ def test_an_earlier_run_tells_before_the_first_episode_and_then_gives_way():
         if config.seed < 2
     ]
     rest = [config for config in configs if config.seed >= 2]
-    forecast = Forecast(rest, earlier)
-    assert forecast.remaining_s(4) == pytest.approx(3 * play(rest, 4)[0], rel=0.25)
-    truth, predictions = play(rest, 4, forecast)
+    remaining = RemainingTime(rest, earlier)
+    assert remaining.remaining_s(4) == pytest.approx(3 * play(rest, 4)[0], rel=0.25)
+    truth, predictions = play(rest, 4, remaining)
     assert predictions[len(rest) // 10][1] == pytest.approx(truth, rel=0.1)
 
 
@@ -87,23 +87,23 @@ def test_the_closest_likeness_counts():
         EpisodeConfig("dartout", "care", budget=0.05),
         EpisodeConfig("cutin", "history"),
     )
-    forecast = Forecast([few, many, half, slow, EpisodeConfig("dense", "care", seed=1)])
-    assert math.isnan(forecast.remaining_s(1))
-    forecast.finished(few, 1.0)
-    forecast.finished(many, 5.0)
-    assert forecast.remaining_s(1) == 3 * 3.0
-    forecast.finished(slow, 9.0)
-    assert forecast.remaining_s(1) == 2 * 3.0
-    assert forecast.waiting == 2
+    remaining = RemainingTime([few, many, half, slow, EpisodeConfig("dense", "care", seed=1)])
+    assert math.isnan(remaining.remaining_s(1))
+    remaining.finished(few, 1.0)
+    remaining.finished(many, 5.0)
+    assert remaining.remaining_s(1) == 3 * 3.0
+    remaining.finished(slow, 9.0)
+    assert remaining.remaining_s(1) == 2 * 3.0
+    assert remaining.waiting == 2
 
 
 def test_the_longest_episode_bounds_what_many_workers_can_do():
-    forecast = Forecast(
+    remaining = RemainingTime(
         [EpisodeConfig("cutin", "full", budget=1.0, seed=seed) for seed in range(4)]
     )
-    forecast.finished(EpisodeConfig("cutin", "full", budget=1.0), 10.0)
-    assert (forecast.remaining_s(100), forecast.remaining_s(2)) == (10.0, 15.0)
-    assert forecast.remaining_s(0) == 30.0
+    remaining.finished(EpisodeConfig("cutin", "full", budget=1.0), 10.0)
+    assert (remaining.remaining_s(100), remaining.remaining_s(2)) == (10.0, 15.0)
+    assert remaining.remaining_s(0) == 30.0
 
 
 class Clock:
@@ -116,7 +116,7 @@ class Clock:
 
 def test_lines_come_after_ten_seconds_then_each_minute_or_twentieth(capsys):
     clock = Clock()
-    lines = Lines(1000, "episodes", clock)
+    lines = ProgressLines(1000, "episodes", clock)
     for now, done in [
         (1, 0),
         (9, 5),
@@ -140,7 +140,9 @@ def test_lines_come_after_ten_seconds_then_each_minute_or_twentieth(capsys):
 def test_the_reporter_counts_down_and_says_how_good_it_was():
     clock, shown = Clock(), []
     configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(40)]
-    reporter = Reporter(Forecast(configs), lambda done, left: shown.append((done, left)), 50, clock)
+    reporter = ProgressReporter(
+        RemainingTime(configs), lambda done, left: shown.append((done, left)), 50, clock
+    )
     reporter.playing(0)
     reporter.playing(2)
     for config in configs:
@@ -156,8 +158,8 @@ def test_the_reporter_counts_down_and_says_how_good_it_was():
 def test_an_episode_that_fails_is_counted_and_takes_no_time():
     shown = []
     configs = [EpisodeConfig("dartout", "care", seed=seed) for seed in range(3)]
-    reporter = Reporter(
-        Forecast(configs), lambda done, left: shown.append((done, left)), 3, Clock()
+    reporter = ProgressReporter(
+        RemainingTime(configs), lambda done, left: shown.append((done, left)), 3, Clock()
     )
     reporter.playing(1)
     reporter.finished(configs[0], None)
@@ -170,4 +172,4 @@ def test_an_episode_that_fails_is_counted_and_takes_no_time():
     [(0.4, "0 s"), (89.4, "89 s"), (90, "2 min"), (3600, "60 min"), (12000, "3 h 20 min")],
 )
 def test_durations_as_people_say_them(duration, text):
-    assert spoken(duration) == text
+    assert rounded_duration(duration) == text

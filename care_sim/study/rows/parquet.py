@@ -11,14 +11,14 @@ import pyarrow.parquet as pq
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing
 from care_sim.base.json_text import parsed
-from care_sim.study.row_schema import Schema
+from care_sim.study.rows.schema import Schema
 from care_sim.study.run_config import Row
 
-STUDY = b"care_sim.study"
+STUDY_NOTE = b"care_sim.study"
 """Where the schema of a file names the study that its rows belong to."""
-LEFT_OUT = b"care_sim.left_out"
+LEFT_OUT_NOTE = b"care_sim.left_out"
 """Where the schema of a file tells what is missing in it."""
-ANY = Schema()
+_ANY = Schema()
 """Of columns of whatever name and type."""
 
 
@@ -27,21 +27,23 @@ def write_rows(
     path: Path,
     study: str = "sweep",
     left_out: Sequence[str] = (),
-    schema: Schema = ANY,
+    schema: Schema = _ANY,
 ) -> None:
     """Write rows, the name of their study and what it lacks to a Parquet file; columns of nothing
     as `schema` says.
     """
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [row.get(name) for row in rows] for name in names}
-    write_columns(columns, path, {STUDY: study, LEFT_OUT: json.dumps([*left_out])}, schema)
+    write_columns(
+        columns, path, {STUDY_NOTE: study, LEFT_OUT_NOTE: json.dumps([*left_out])}, schema
+    )
 
 
 def write_columns(
     columns: Mapping[str, Any],
     path: Path,
     notes: Mapping[bytes, str] | None = None,
-    schema: Schema = ANY,
+    schema: Schema = _ANY,
 ) -> None:
     """Write columns to a Parquet file, whole or not at all."""
     arrays = {name: pa.array(column) for name, column in columns.items()}
@@ -86,7 +88,7 @@ def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
     damaged, is empty, or has not the schema.
     """
     table = _read(path)
-    for fault in (schema or ANY).faults(table):
+    for fault in (schema or _ANY).faults(table):
         raise InvalidInput(f"{path} holds no rows of a study: {fault}")
     known = table.select(schema.known(table)) if schema else table
     try:
@@ -103,8 +105,8 @@ def read_notes(path: Path) -> tuple[str | None, list[str]]:
     """
     notes = _read(path).schema.metadata or {}
     try:
-        study = notes[STUDY].decode() if STUDY in notes else None
-        left_out = parsed(notes.get(LEFT_OUT, b"[]"))
+        study = notes[STUDY_NOTE].decode() if STUDY_NOTE in notes else None
+        left_out = parsed(notes.get(LEFT_OUT_NOTE, b"[]"))
     except ValueError as error:
         raise InvalidInput(f"{path} has notes that cannot be read: {_first_line(error)}") from error
     if not isinstance(left_out, list) or not all(isinstance(each, str) for each in left_out):

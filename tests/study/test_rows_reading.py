@@ -1,4 +1,4 @@
-from care_sim.study.added_columns import annotated
+from care_sim.study.rows.reading import annotated
 from tests.helpers.made_rows import rows
 
 

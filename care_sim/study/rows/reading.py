@@ -1,7 +1,8 @@
-"""What a row says: its setting, its policy, and in the closed loop its first detection.
+"""What rows say: their setting, their policy, and in the closed loop their first detection.
 
 Rows of one world under the same conditions form a setting; in it, the rows of a policy at a
-budget form a cell.
+budget form a cell. Some columns are added when a study is written: what only rows side by side, or
+the policies, tell.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,9 +14,10 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
+from care_sim.policies import tags_of
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
+from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
-from care_sim.study.settings import Setting
 
 _AXES = ("scenario", "policy", "budget", "seed")
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
@@ -118,3 +120,32 @@ def detection(row: Row) -> Reading:
             "and undetected_to_m must be given"
         )
     return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
+
+
+Worlds = dict[tuple[Setting, int], Row]
+
+
+def annotated(rows: Sequence[Row]) -> list[Row]:
+    """The rows with three more columns.
+
+    `tags` of the policy, joined by '+'. `regret_m`: detection distance of the full scan of the same
+    world and seed minus this row's, 0 at best, None where the full scan was not run. `censored`:
+    the policy, or that full scan, never detected the actor, so that `regret_m` counts with the most
+    its distance can have been and is a bound.
+    """
+    full = {(setting_of(row), row["seed"]): row for row in rows if row["policy"] == "full"}
+    return [{**row, **_regret(row, full)} for row in tagged(rows)]
+
+
+def tagged(rows: Sequence[Row]) -> list[Row]:
+    """The rows with the column `tags`."""
+    return [{**row, "tags": "+".join(tags_of(row["policy"]))} for row in rows]
+
+
+def _regret(row: Row, full: Worlds) -> Row:
+    bound = full.get((setting_of(row).for_full(), row["seed"]))
+    ours = detection(row)
+    if bound is None:
+        return {"regret_m": None, "censored": ours.censored}
+    theirs = detection(bound)
+    return {"regret_m": theirs.value - ours.value, "censored": ours.censored or theirs.censored}
