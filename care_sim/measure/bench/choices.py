@@ -1,6 +1,4 @@
-"""How long a policy takes to choose with many tracks: the time between an observation and an
-action.
-"""
+"""How long a policy takes to choose its cells with many tracks around."""
 
 import time
 from collections.abc import Callable
@@ -16,48 +14,59 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.measure.bench.config import BenchConfig
-from care_sim.measure.bench.driven import driven
-from care_sim.measure.bench.scanning.street import SENSOR, street
+from care_sim.measure.bench.scanning.moving_bodies import SENSOR, moving_bodies
+from care_sim.measure.driven import driven
 from care_sim.policies.base import Policy
 
 TRACKS = 40
-UNTRACKED = 10
-"""Bodies besides, which the camera may see and no track explains."""
-SCENES = 20
-"""Different beliefs; choices go through them in turn."""
-FASTEST_MPS = 14.0
+_UNTRACKED = 10
+"""Further bodies, which the camera may see and no track explains."""
+_OBSERVATIONS = 20
+"""Different observations; the choices go through them in turn."""
+_FASTEST_MPS = 14.0
 """50 km/h."""
 
 
 def choices(config: BenchConfig) -> dict[str, list[float]]:
-    """Milliseconds per choice in every round: `p50` and `p99` of the whole, and of its parts the
-    medians `demand` and `allocation`.
+    """Milliseconds per choice in every round.
+
+    `p50` and `p99` are those of the time from an observation to the action; `demand` and
+    `allocation` are the medians of its parts.
     """
     with driven(config.episode) as env:
         env.reset(seed=config.seed)
         rig = env.get_wrapper_attr("rig")
-        observations = [observation(rig, config.seed + number) for number in range(SCENES)]
+        observations = [observation(rig, config.seed + number) for number in range(_OBSERVATIONS)]
         rounds = [_round(env.policy, observations, config.samples) for _ in range(config.repeats)]
     return {name: [figures[name] for figures in rounds] for name in rounds[0]}
 
 
 def observation(rig: Rig, seed: int) -> Observation:
-    """What the environments show of `TRACKS` tracked bodies and `UNTRACKED` others around the
+    """What the environments show of `TRACKS` tracked bodies and `_UNTRACKED` others around the
     sensor.
     """
     rng = np.random.default_rng(seed)
-    bodies = street(TRACKS + UNTRACKED, seed)
+    bodies = moving_bodies(TRACKS + _UNTRACKED, seed)
     x, y, heading = bodies.poses.T
     sizes = np.array([kind.size for kind in bodies.kinds])
     boxes = SENSOR.boxes_to_local(np.column_stack([x, y, sizes[:, 2] / 2, sizes, heading]))
+    # The classes come in turn, as `moving_bodies` makes the bodies.
     classes = np.arange(len(boxes)) % len(CLASSES)
-    velocities = rng.uniform(0, FASTEST_MPS, len(boxes))[:, None] * np.column_stack(
+    velocities = rng.uniform(0, _FASTEST_MPS, len(boxes))[:, None] * np.column_stack(
         [np.cos(heading), np.sin(heading)]
     )
+
+    # The tracks are a random choice of them, nearest first as the tracker gives them.
     tracked = np.sort(rng.permutation(len(boxes))[:TRACKS])
     tracked = tracked[np.argsort(np.hypot(x[tracked], y[tracked]))]
-    counts = np.arange(TRACKS), np.zeros(TRACKS, np.int64), np.full(TRACKS, 5)
-    tracks = Tracks(counts[0], classes[tracked], boxes[tracked], velocities[tracked], *counts[1:])
+    tracks = Tracks(
+        ids=np.arange(TRACKS),
+        classes=classes[tracked],
+        boxes=boxes[tracked],
+        velocities=velocities[tracked],
+        misses=np.zeros(TRACKS, np.int64),
+        hits=np.full(TRACKS, 5),
+    )
     detections = _seen(rig.cameras[0], boxes, classes)
     empty = np.zeros(rig.grid.shape, np.float32)
     return Belief(Ego(8.0), rig.budget, detections, tracks, empty).to_observation()
@@ -80,7 +89,8 @@ def _seen(camera: PinholeCamera, boxes: Floats, classes: np.ndarray) -> ImageDet
 
 
 def _round(policy: Policy, observations: list[Observation], samples: int) -> dict[str, float]:
-    """The whole first, undisturbed; then its parts on their own, over the same observations."""
+    """Milliseconds of the whole and of its parts, over the same observations."""
+    # The whole comes first and undisturbed. Then each part is measured on its own.
     shown = list(islice(cycle(observations), samples))
     whole = [_seconds(policy, observation) for observation in shown]
     beliefs = [policy.rig.read(observation) for observation in shown]

@@ -28,10 +28,10 @@ class BenchConfig:
     repeats: int = bounded(5, 1, 10_000)
     """Rounds; in each round everything is measured once."""
     samples: int = bounded(200, 1, 1_000_000)
-    """Scans per engine, and choices of cells, in a round; a point of the growth curves has a
-    tenth."""
+    """Scans per engine, and choices of cells, in a round; a tenth of them per point of the growth
+    curves."""
     resets: int = bounded(2000, 1, LARGEST_INTEGER)
-    """Episodes begun in the worker whose memory is watched."""
+    """Episodes that are begun in the worker whose memory is measured."""
     seeds: int = bounded(5, 0, 10_000)
     """Seeds of the paper's closed-loop study, 49 episodes each, that two workers play; 0 leaves it
     out.

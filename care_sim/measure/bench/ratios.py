@@ -1,5 +1,6 @@
-"""What one run says about speed without a clock: ratios of medians within it, larger being
-better.
+"""Speed without a clock: ratios of medians within one run, larger being better.
+
+A ratio says the same on a slow and on a fast machine. Its name is a key of `results/bench.json`.
 """
 
 from collections.abc import Sequence
@@ -7,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.measure.bench.scanning.scans import REFERENCE
+from care_sim.measure.bench.scanning.scans import REFERENCE_ENGINE
 from care_sim.measure.bench.steps import DRIVING, REACHING
 
 BenchReport = dict[str, Any]
@@ -41,7 +42,7 @@ def ratios(report: BenchReport) -> dict[str, float]:
     curves = report["growth"]["grid"]["ms"]
     steps = {name: middle(figures["steps_per_cpu_s"]) for name, figures in speed.items()}
     scan = {name: middle(figures["scan_ms"]) for name, figures in engines.items()}
-    mine = FAST if FAST in engines else REFERENCE
+    mine = FAST if FAST in engines else REFERENCE_ENGINE
     one, two = (middle(values) for values in report["vectorised"].values())
     return {
         **{

@@ -14,13 +14,14 @@ from care_sim.base.errors import MissingExtra
 from care_sim.base.extras import STANDARD_OUTPUT, import_panda_gym, silenced
 from care_sim.core.conditions import DEFAULTS
 from care_sim.measure.bench.config import BenchConfig
-from care_sim.measure.bench.driven import Environment, driven
+from care_sim.measure.driven import driven
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import ENVIRONMENT_IDS
+from care_sim.study.episode_play import Environment
 
 DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"
-"""The peers, under random actions: highway-env's driving without sensors, and panda-gym's arm, also
-over PyBullet.
+"""Known environments, under random actions: highway-env's driving without sensors, and panda-gym's
+arm, also over PyBullet.
 """
 
 Maker = Callable[[], Environment]
@@ -50,14 +51,17 @@ def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
 
 
 def speed(maker: Maker, config: BenchConfig) -> dict[str, float]:
-    """`steps_per_s`, resets included; `steps_per_cpu_s`, the same for a second of this process on
-    its core, so that others who share the core do not count; and `inits_per_s`, constructions with
-    a reset.
+    """Figures of one environment: `steps_per_s`, resets included; `steps_per_cpu_s`, steps per
+    second that this process itself had the core; and `inits_per_s`, constructions with a reset.
     """
+    # Gymnasium says int and takes any number.
     seconds = cast("int", config.seconds)
     with silenced(STANDARD_OUTPUT):
         with maker() as env:
-            started, worked = time.perf_counter(), time.process_time()
+            # What others take of the core is taken out of `steps_per_cpu_s` by the share of the
+            # time in which this process worked.
+            started = time.perf_counter()
+            worked = time.process_time()
             steps = benchmark_step(env, seconds, config.seed)
             share = (time.process_time() - worked) / (time.perf_counter() - started)
         with ExitStack() as made:

@@ -10,11 +10,11 @@ from care_sim.measure.bench.keyframe import REST
 from care_sim.measure.bench.ratios import BenchReport
 from care_sim.reports.table import Table
 
-SPREAD = "median (least to most)"
+_SPREAD = "median (least to most)"
 
 
 def bench_tables(report: BenchReport) -> list[Table]:
-    """Machine and speed, vectorised, keyframe, choices, scans, memory, ratios, targets."""
+    """Speed with the machine, vectors, the keyframe, choices, scans, memory, ratios, targets."""
     return [
         _speed(report),
         _spreads(
@@ -49,10 +49,10 @@ def _speed(report: BenchReport) -> Table:
         ", ".join(f"{name} {number}" for name, number in report["versions"].items()),
         *(f"left out: {line}" for line in report["skipped"]),
     )
-    title = f"Speed: {SPREAD} of {report['config']['repeats']}"
+    title = f"Speed: {_SPREAD} of {report['config']['repeats']}"
     return Table(
         title,
-        ("environment", "steps/s, resets included", "a CPU second", "constructions with reset/s"),
+        ("environment", "steps/s, resets included", "per CPU second", "constructions with reset/s"),
         rows,
         notes,
     )
@@ -60,8 +60,8 @@ def _speed(report: BenchReport) -> Table:
 
 def _stages(stages: Mapping[str, Sequence[float]]) -> Table:
     note = (
-        f"{REST}: what is between these: the floor's draw, the cells of an action, frames, "
-        "records, info"
+        f"{REST}: what lies between these stages: drawing the floor, the cells of an action, "
+        "frames, records, info"
     )
     return replace(_spreads("Where a keyframe's time goes, ms", "stage", stages), notes=(note,))
 
@@ -78,12 +78,12 @@ def _scans(report: BenchReport) -> Table:
         )
         for name, figures in scans["engines"].items()
     )
-    columns = ("engine", "poses", "cast", f"both, {SPREAD}", "million rays/s", "same")
+    columns = ("engine", "poses", "cast", f"both, {_SPREAD}", "million rays/s", "same")
     notes = (
-        "same: shares of the rays that meet the body which Bullet's meet, and that end within 1 mm "
-        "of them",
-        "Bullet and Embree take in bodies that have moved when they cast, so that much of their "
-        "poses is found there",
+        "same: shares of the rays that meet the same body as Bullet's, and that end within 1 mm of "
+        "them",
+        "Bullet and Embree take in moved bodies when they cast, so that much of the time for their "
+        "poses counts there",
     )
     return Table(
         f"A scan of {scans['rays']} rays at {scans['bodies']} moving bodies, ms",
@@ -123,12 +123,13 @@ def _targets(report: BenchReport) -> Table:
 
 def _spreads(title: str, column: str, figures: Mapping[str, Sequence[float]]) -> Table:
     return Table(
-        title, (column, SPREAD), tuple((name, _spread(values)) for name, values in figures.items())
+        title, (column, _SPREAD), tuple((name, _spread(values)) for name, values in figures.items())
     )
 
 
 def _spread(values: Sequence[float]) -> str:
     low, middle, high = np.quantile(values, (0.0, 0.5, 1.0)).tolist()
+    # Three significant digits or so, since medians run from microseconds to thousands of steps.
     digits = 1 if middle >= 10 else 3 if middle < 1 else 2
     return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 

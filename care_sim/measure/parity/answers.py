@@ -22,7 +22,7 @@ from care_sim.world.bullet import BulletWorld
 
 Answers = tuple[Floats, Integers]
 
-SAME_M = 0.001
+SAME_RANGE_M = 0.001
 """Ranges this close are the same."""
 GRAZE_M = 1e-6
 """A ray this close to where the answer changes grazes an edge."""
@@ -63,9 +63,9 @@ class Millimetres:
 
 
 def same(one: Answers, other: Answers) -> NDArray[np.bool_]:
-    """(n,) which rays meet the same body, ranges within `SAME_M`."""
+    """(n,) which rays meet the same body, ranges within `SAME_RANGE_M`."""
     alike: NDArray[np.bool_] = (one[1] == other[1]) & np.isclose(
-        one[0], other[0], rtol=0.0, atol=SAME_M
+        one[0], other[0], rtol=0.0, atol=SAME_RANGE_M
     )
     return alike
 

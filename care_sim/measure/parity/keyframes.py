@@ -8,7 +8,7 @@ import numpy as np
 
 from care_sim.core.frames import Frame
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.measure.bench.driven import driven
+from care_sim.measure.driven import driven
 from care_sim.measure.parity.answers import Millimetres
 from care_sim.measure.parity.pictures import Pictures
 from care_sim.measure.parity.scenes import AWAY

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.core.frames import Frame, Integers
-from care_sim.measure.parity.answers import SAME_M, Answers
+from care_sim.measure.parity.answers import SAME_RANGE_M, Answers
 from care_sim.measure.parity.verdicts import LOST, UNEXPLAINED, VERDICTS, Compared
 from care_sim.world.bodies import BodyKind
 
@@ -70,7 +70,7 @@ class AgreementCounts:
             )
             np.add.at(self.verdicts[reference], (met, verdicts), 1)
             np.add.at(self.other_ids[reference], met, differ)
-            np.add.at(self.other_ranges[reference], met, gaps > SAME_M)
+            np.add.at(self.other_ranges[reference], met, gaps > SAME_RANGE_M)
             np.maximum.at(self.widest_m[reference], met, gaps)
         self._list(compared, groups, name)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from care_sim.measure.bench.config import BenchConfig
-from care_sim.measure.bench.scanning.casters import PEERS, casters
-from care_sim.measure.bench.scanning.scans import REFERENCE, agreement, drawn_cells, scans
-from care_sim.measure.bench.scanning.street import NEAREST_M, SENSOR, SWAY_M, street
+from care_sim.measure.bench.scanning.casters import PEER_CASTERS, casters
+from care_sim.measure.bench.scanning.moving_bodies import NEAREST_M, SENSOR, SWAY_M, moving_bodies
+from care_sim.measure.bench.scanning.scans import REFERENCE_ENGINE, agreement, drawn_cells, scans
 from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import CATALOGUE
 
@@ -30,7 +30,7 @@ def cell(grid, row, column):
 
 def test_every_engine_sees_the_bodies_where_they_were_put_last(grid, opened):
     made, skipped = casters([BUS, BUS], grid, opened)
-    assert set(made) | {line.partition(":")[0] for line in skipped} == {*ENGINES, *PEERS}
+    assert set(made) | {line.partition(":")[0] for line in skipped} == {*ENGINES, *PEER_CASTERS}
     level = 8
     cells = np.array([cell(grid, level, BEHIND), cell(grid, level, AHEAD), cell(grid, level, LEFT)])
     down = np.array([cell(grid, grid.rows - 1, BEHIND)])
@@ -60,17 +60,17 @@ def test_a_body_beyond_the_reach_is_not_hit(grid, opened):
 
 def test_all_engines_agree_on_the_scene_that_is_measured(grid, opened):
     """Triangles of round parts may lose a ray in a thousand to the body behind them."""
-    bodies = street(30, 1)
+    bodies = moving_bodies(30, 1)
     made, _ = casters(bodies.kinds, grid, opened)
     shares = agreement(made, bodies, drawn_cells(grid, 1638, 1))
-    assert shares[REFERENCE] == {"same_body": 1.0, "same_range": 1.0}
+    assert shares[REFERENCE_ENGINE] == {"same_body": 1.0, "same_range": 1.0}
     for name, share in shares.items():
         assert share["same_body"] > 0.998, name
         assert share["same_range"] > 0.99, name
 
 
 def test_bodies_move_with_every_scan_and_stay_in_reach(grid):
-    bodies = street(300, 0)
+    bodies = moving_bodies(300, 0)
     first, second = bodies.at(0), bodies.at(1)
     moved = np.hypot(*(first - second)[:, :2].T)
     assert np.all(moved > 0.01)

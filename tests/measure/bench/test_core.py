@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from care_sim.measure.bench.core import one_core
+from care_sim.measure.bench.run import one_core
 
 
 @pytest.mark.skipif(

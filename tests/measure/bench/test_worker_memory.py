@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from care_sim.measure.bench.config import BenchConfig
-from care_sim.measure.bench.memory import worker_memory
+from care_sim.measure.bench.workers import worker_memory
 from care_sim.study.episode_play import peak_rss_mb
 
 COUNTED_LATE_MB = 1.0

@@ -1,4 +1,4 @@
-"""All that casts rays at the same bodies: the engines of the benchmark, and those beside them."""
+"""What casts rays at the same bodies: the engines of the benchmark, and known ones beside them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -30,10 +30,11 @@ class Caster(Protocol):
         ...
 
 
-PEERS: dict[str, Callable[[Sequence[BodyKind], AngularGrid], Caster]] = {
+PEER_CASTERS: dict[str, Callable[[Sequence[BodyKind], AngularGrid], Caster]] = {
     "Embree (Open3D)": Embree,
     "MuJoCo": MuJoCo,
 }
+"""Known engines, by name. Each raises MissingExtra without its library."""
 
 
 class OverWorld:
@@ -56,8 +57,8 @@ class OverWorld:
 def casters(
     kinds: Sequence[BodyKind], grid: AngularGrid, opened: ExitStack
 ) -> tuple[dict[str, Caster], list[str]]:
-    """Every engine over bodies of these kinds, and in one line each what is left out; `opened`
-    frees them.
+    """Every engine over bodies of these kinds, by name; and in one line each, what is left out.
+    `opened` frees them.
     """
     made: dict[str, Caster] = {}
     for name in ENGINES:
@@ -65,7 +66,7 @@ def casters(
         opened.callback(caster.world.close)
         made[name] = caster
     skipped = []
-    for name, peer in PEERS.items():
+    for name, peer in PEER_CASTERS.items():
         try:
             made[name] = peer(kinds, grid)
         except MissingExtra as missing:

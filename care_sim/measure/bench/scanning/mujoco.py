@@ -17,6 +17,10 @@ class MuJoCo:
     def __init__(self, kinds: Sequence[BodyKind], grid: AngularGrid):
         self._grid = grid
         self._mujoco = mujoco = import_mujoco()
+
+        # Bodies count from 1 in the order in which they are added, and body 0 is the world with its
+        # plane: the ids of a caster. MuJoCo takes half extents; of a cylinder, radius and half
+        # height.
         shapes = {
             name: getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")
             for name in ("box", "cylinder", "sphere")
@@ -35,6 +39,7 @@ class MuJoCo:
     def place(self, poses: Floats) -> None:
         """Move all bodies: (n, 3) x, y, heading."""
         self._data.mocap_pos[:, :2] = poses[:, :2]
+        # The quaternion (w, 0, 0, z) of a turn about the vertical.
         self._data.mocap_quat[:, 0] = np.cos(poses[:, 2] / 2)
         self._data.mocap_quat[:, 3] = np.sin(poses[:, 2] / 2)
         self._mujoco.mj_kinematics(self._model, self._data)
@@ -42,21 +47,21 @@ class MuJoCo:
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges (n,) in metres, inf without a hit, and body ids (n,), -1 there."""
         directions = sensor.vectors_to_world(self._grid.directions[cells]).ravel()
-        n, reach = len(cells), self._grid.range_m
-        geoms, ranges = np.empty(n, np.int32), np.empty(n)
+        geoms = np.empty(len(cells), np.int32)
+        ranges = np.empty(len(cells))
         self._mujoco.mj_multiRay(
             self._model,
             self._data,
             sensor.origin,
             directions,
-            None,
-            True,
-            -1,
+            None,  # geoms of every group
+            True,  # static ones too
+            -1,  # no body left out
             geoms,
             ranges,
-            None,
-            n,
-            reach,
+            None,  # no normals
+            len(cells),
+            self._grid.range_m,
         )
-        met = (geoms >= 0) & (ranges <= reach)
+        met = (geoms >= 0) & (ranges <= self._grid.range_m)
         return np.where(met, ranges, np.inf), np.where(met, self._model.geom_bodyid[geoms], NO_BODY)

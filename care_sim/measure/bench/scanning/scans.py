@@ -12,21 +12,23 @@ from care_sim.core.frames import Floats
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.scanning.casters import Caster, casters
-from care_sim.measure.bench.scanning.street import SENSOR, Street, street
+from care_sim.measure.bench.scanning.moving_bodies import SENSOR, MovingBodies, moving_bodies
+from care_sim.measure.parity.answers import SAME_RANGE_M
 
-BODIES = 30
+SCAN_BODIES = 30
 """Bodies of the scan that the targets speak of."""
-REFERENCE = "bullet"
-SAME_M = 0.001
-"""Ranges this close are the same."""
+REFERENCE_ENGINE = "bullet"
 
 
 def scans(config: BenchConfig) -> tuple[dict[str, Any], list[str]]:
-    """Of every engine the medians of every round, in ms: `poses_ms` to move all bodies, `cast_ms`
-    to answer the rays, `scan_ms` for both; `rays_per_s` of the scan; `same_body` and `same_range`,
-    shares of the rays answered as Bullet answers them. And what is left out, in one line each.
+    """The figures of every engine, and what is left out in one line each.
+
+    Medians of every round in ms: `poses_ms` to move all bodies, `cast_ms` to answer the rays,
+    `scan_ms` for both. `rays_per_s` of the scan. `same_body` and `same_range` are the shares of the
+    rays that are answered as Bullet answers them.
     """
-    grid, bodies = AngularGrid(), street(BODIES, config.seed)
+    grid = AngularGrid()
+    bodies = moving_bodies(SCAN_BODIES, config.seed)
     cells = drawn_cells(grid, budget_cells(config.budget, grid.size), config.seed)
     with ExitStack() as opened:
         made, skipped = casters(bodies.kinds, grid, opened)
@@ -37,7 +39,7 @@ def scans(config: BenchConfig) -> tuple[dict[str, Any], list[str]]:
         | answers[name]
         for name in made
     }
-    return {"rays": len(cells), "bodies": BODIES, "engines": figures}, skipped
+    return {"rays": len(cells), "bodies": SCAN_BODIES, "engines": figures}, skipped
 
 
 def drawn_cells(grid: AngularGrid, number: int, seed: int) -> Cells:
@@ -46,28 +48,27 @@ def drawn_cells(grid: AngularGrid, number: int, seed: int) -> Cells:
 
 
 def agreement(
-    made: Mapping[str, Caster], bodies: Street, cells: Cells
+    made: Mapping[str, Caster], bodies: MovingBodies, cells: Cells
 ) -> dict[str, dict[str, float]]:
-    """How far every engine answers as Bullet does, over bodies that have moved; it also warms every
-    engine up.
-    """
+    """How far every engine answers as Bullet does, over bodies that have moved."""
+    # The second scan is of bodies that have moved. Both warm the engines up for what is timed next.
     answers = {}
     for name, caster in made.items():
         for number in range(2):
             caster.place(bodies.at(number))
             answers[name] = caster.cast(SENSOR, cells)
-    ranges, ids = answers[REFERENCE]
+    ranges, ids = answers[REFERENCE_ENGINE]
     return {
         name: {
             "same_body": float(np.mean(others == ids)),
-            "same_range": float(np.mean(np.isclose(found, ranges, rtol=0, atol=SAME_M))),
+            "same_range": float(np.mean(np.isclose(found, ranges, rtol=0, atol=SAME_RANGE_M))),
         }
         for name, (found, others) in answers.items()
     }
 
 
 def laps(
-    made: Mapping[str, Caster], bodies: Street, cells: Cells, samples: int
+    made: Mapping[str, Caster], bodies: MovingBodies, cells: Cells, samples: int
 ) -> dict[str, Floats]:
     """(samples, 3) seconds of poses, cast and both, of every engine; the engines take turns, scan
     by scan.

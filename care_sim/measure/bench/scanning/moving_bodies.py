@@ -9,8 +9,10 @@ from care_sim.core.types import CLASSES
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE, BodyKind
 
-NEAREST_M, FARTHEST_M = 8.0, 48.0
-"""No bus, which is 11 m long, reaches the sensor; every body lies within its reach of 50 m."""
+NEAREST_M = 8.0
+"""No bus, which is 11 m long, reaches the sensor."""
+_FARTHEST_M = 48.0
+"""Every body lies within the reach of 50 m."""
 SWAY_M = 0.8
 """How far bodies move from scan to scan at most: 8 m/s over 0.1 s."""
 
@@ -18,7 +20,7 @@ SENSOR = Frame(0.0, 0.0, LIDAR_POSITION[2], 0.0)
 
 
 @dataclass(frozen=True)
-class Street:
+class MovingBodies:
     """`kinds` of the n bodies and where they stand on average: `poses` (n, 3) as x, y and
     heading.
     """
@@ -35,12 +37,13 @@ class Street:
         return moved
 
 
-def street(bodies: int, seed: int) -> Street:
-    """Bodies of the five classes in turn, evenly spread over the disc around the sensor."""
+def moving_bodies(bodies: int, seed: int) -> MovingBodies:
+    """Bodies of the five classes in turn, evenly spread over the ring around the sensor."""
     rng = np.random.default_rng(seed)
-    distance = np.sqrt(rng.uniform(NEAREST_M**2, FARTHEST_M**2, bodies))
+    # Uniform in the square of the distance is uniform in area.
+    distance = np.sqrt(rng.uniform(NEAREST_M**2, _FARTHEST_M**2, bodies))
     bearing, heading = rng.uniform(-np.pi, np.pi, (2, bodies))
     kinds = tuple(CATALOGUE[CLASSES[number % len(CLASSES)]] for number in range(bodies))
-    return Street(
-        kinds, np.column_stack([distance * np.cos(bearing), distance * np.sin(bearing), heading])
-    )
+    x = distance * np.cos(bearing)
+    y = distance * np.sin(bearing)
+    return MovingBodies(kinds, np.column_stack([x, y, heading]))

@@ -1,4 +1,4 @@
-"""Environments that drive themselves: speed measures need no agent."""
+"""Environments that drive themselves: measures of speed need no agent."""
 
 from typing import Any
 
@@ -8,8 +8,7 @@ from gymnasium import spaces
 from care_sim.envs.sensing import Observed
 from care_sim.policies.base import Policy
 from care_sim.study.episode_config import EpisodeConfig
-
-Environment = gymnasium.Env[Any, Any]
+from care_sim.study.episode_play import Environment
 
 
 class Driven(gymnasium.Wrapper[Observed, Any, Any, Any]):
@@ -17,6 +16,8 @@ class Driven(gymnasium.Wrapper[Observed, Any, Any, Any]):
 
     def __init__(self, env: Environment, policy: Policy):
         super().__init__(env)
+        # Gymnasium's measures draw an action for every step: to draw scores of 16,384 cells would
+        # count as time of the environment.
         self.action_space = spaces.Discrete(1)
         self.policy = policy
 
