@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from care_sim.measure.certify.config import CertifyConfig
-from care_sim.measure.certify.run import run_certify
+from care_sim.measure.certify.run import CertifyConfig, run_certify
 
 
 @dataclass(frozen=True, kw_only=True)

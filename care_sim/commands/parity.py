@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from care_sim.measure.parity.config import ParityConfig
-from care_sim.measure.parity.run import run_parity
+from care_sim.measure.parity.run import ParityConfig, run_parity
 
 
 @dataclass(frozen=True, kw_only=True)

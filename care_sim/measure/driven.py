@@ -8,13 +8,13 @@ from gymnasium import spaces
 from care_sim.envs.sensing import Observed
 from care_sim.policies.base import Policy
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.episode_play import Environment
+from care_sim.study.episode_play import GymEnv
 
 
 class Driven(gymnasium.Wrapper[Observed, Any, Any, Any]):
     """An environment that a policy steers, whatever the action."""
 
-    def __init__(self, env: Environment, policy: Policy):
+    def __init__(self, env: GymEnv, policy: Policy):
         super().__init__(env)
         # Gymnasium's measures draw an action for every step: to draw scores of 16,384 cells would
         # count as time of the environment.

@@ -17,14 +17,14 @@ from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.driven import driven
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import ENVIRONMENT_IDS
-from care_sim.study.episode_play import Environment
+from care_sim.study.episode_play import GymEnv
 
 DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"
 """Known environments, under random actions: highway-env's driving without sensors, and panda-gym's
 arm, also over PyBullet.
 """
 
-Maker = Callable[[], Environment]
+Maker = Callable[[], GymEnv]
 
 
 def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
@@ -69,7 +69,7 @@ def speed(maker: Maker, config: BenchConfig) -> dict[str, float]:
     return {"steps_per_s": steps, "steps_per_cpu_s": steps / share, "inits_per_s": inits}
 
 
-def _one_at_a_time(maker: Maker, made: ExitStack) -> Environment:
+def _one_at_a_time(maker: Maker, made: ExitStack) -> GymEnv:
     """A new environment in the place of the one before, which `benchmark_init` leaves open."""
     made.close()
     return made.enter_context(maker())

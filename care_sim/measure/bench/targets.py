@@ -26,7 +26,9 @@ _STUDY_EPISODES = 245
 _STUDY_S = 60.0
 _CHOICE_MS = 0.5
 _FLAT_MB = 5.0
-"""A worker may grow by this after the first tenth of its resets: of 2,000, 3 kB each is too much."""
+"""A worker may grow by this after the first tenth of its resets: of 2,000, 3 kB each is too
+much.
+"""
 _RATIO_BOUNDS = {
     over(FAST, REFERENCE_ENGINE): 20.0,
     over(FAST, "Embree (Open3D)"): 3.0,

@@ -73,7 +73,7 @@ def _vector(config: BenchConfig, number: int) -> Iterator[AsyncVectorEnv]:
 
 
 def study(seeds: int) -> dict[str, float]:
-    """The paper's closed-loop study: `episodes` of that many seeds, and the `seconds` that two workers
+    """The paper's closed-loop study: `episodes` of that many seeds, and the `seconds` two workers
     take from their start to the last row. Raises RuntimeError when an episode fails.
     """
     configs = paper_study(range(seeds))

@@ -1,9 +1,10 @@
-"""The list: what an episode of a number is made of.
+"""The list of episodes: what the episode of a number is made of.
 
-Every factor is drawn by itself, so that a thousand episodes hold every pair of an environment, a
-policy, a fault, a setting and a mode that can meet. The open loop detects with the paper's proxy:
-the detector `cluster` fits the road by iteration, which ends a little elsewhere on another
-processor.
+Everything is drawn independently, so that a thousand episodes hold every pair of an environment, a
+policy, a fault, a setting and a mode that can meet. The order of the draws is a part of the list.
+
+The open loop detects with the paper's proxy. The detector `cluster` fits the road by iteration,
+which ends a little differently on another processor.
 """
 
 from dataclasses import dataclass
@@ -15,11 +16,12 @@ from care_sim.policies import BUILT_IN
 from care_sim.policies.parameters import is_privileged
 
 CLOSED = ("CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0")
-STREET, REPLAY = "CARE-Street-v0", "CARE-Replay-v0"
-ENVIRONMENTS = (*CLOSED, *CLOSED, STREET, REPLAY)
-"""Drawn from: the closed loop takes three quarters."""
+STREET = "CARE-Street-v0"
+REPLAY = "CARE-Replay-v0"
+_ENVIRONMENTS = (*CLOSED, *CLOSED, STREET, REPLAY)
+"""What an environment is drawn from: the closed loop takes three quarters."""
 
-POLICIES = (
+CERTIFIED_POLICIES = (
     "full",
     "random",
     "history",
@@ -38,23 +40,24 @@ POLICIES = (
     "ppo-dartout",
     "seed-finder",
 )
-"""Written out, because one more changes what every episode is made of."""
+"""Written out, because one more changes what every episode of the list is made of."""
 
 AS_LISTED: dict[str, dict[str, Any]] = {"seed-finder": {"scenario": "dense"}}
-"""Parameters of policies in the whole list, which was published when `seed-finder` knew the dense
-street alone.
+"""Parameters of policies, the same in the whole list: when it was first published, `seed-finder`
+knew the dense street alone.
 """
 
 SINGLE, INTERLEAVED, SYNC, ASYNC, SUBPROCESS, HASH_SEED = MODES = (
     "single", "interleaved", "sync", "async", "subprocess", "hash-seed",
 )  # fmt: skip
 """How an episode is played: alone; in turns with others in one process; in Gymnasium's vectors; in
-the subprocesses of Stable-Baselines3; in an interpreter with another hash seed. None may change it.
+the subprocesses of Stable-Baselines3; in an interpreter with another hash seed. No mode may change
+an episode.
 """
-IN_OTHER_PROCESSES = (ASYNC, SUBPROCESS)
+_IN_OTHER_PROCESSES = (ASYNC, SUBPROCESS)
 
-BUDGETS = (0.01, 0.03, 0.05, 0.1, 0.2, 0.35)
-FAULTS: dict[str, dict[str, Any]] = {
+_BUDGETS = (0.01, 0.03, 0.05, 0.1, 0.2, 0.35)
+CERTIFIED_FAULTS: dict[str, dict[str, Any]] = {
     "false_negative_rate": {"false_negative_rate": 0.4},
     "false_negative_per_m": {"false_negative_per_m": 0.02},
     "false_negative_burst": {"false_negative_rate": 0.3, "false_negative_burst": 4},
@@ -69,8 +72,8 @@ FAULTS: dict[str, dict[str, Any]] = {
     "lidar_dead_rows": {"lidar_dead_rows": (9, 10, 17)},
     "ego_speed_sigma": {"ego_speed_sigma": 0.5},
 }
-"""Every fault of `care_sim.core.conditions`, strong enough to be felt in a few keyframes."""
-SETTINGS: dict[str, dict[str, Any]] = {
+"""Every fault of `care_sim.core.conditions`, strong enough to act within a few keyframes."""
+CERTIFIED_SETTINGS: dict[str, dict[str, Any]] = {
     "engine": {"engine": "bullet"},
     "keyframe_s": {"keyframe_s": 0.25},
     "min_returns": {"min_returns": 1},
@@ -81,16 +84,18 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "azimuth_margin": {"azimuth_margin": 4},
     "elevation_margin": {"elevation_margin": 0},
 }
-CLOSED_ALONE = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine", "keyframe_s")
-"""What a film cannot take on."""
+_CLOSED_ALONE = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine", "keyframe_s")
+"""Faults and settings that the open loop does not have."""
 
-CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)
-OPEN_KEYFRAMES = (2, 4, 4, 8, 8, 12, 40)
-"""Lengths: mostly short, some whole."""
-STREETS, MORE_STREETS = (3000, 3001), tuple(range(3000, 3012))
-"""Seeds that belong to no list. A street takes seconds to make, so that a thousand episodes share
-two.
+_CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)
+_OPEN_KEYFRAMES = (2, 4, 4, 8, 8, 12, 40)
+"""Numbers of keyframes that are played: mostly few, sometimes the whole episode."""
+STREETS = (3000, 3001)
+"""Seeds of streets of the first thousand episodes, which share two because a street takes seconds
+to make. They are none of a split.
 """
+_MORE_STREETS = tuple(range(3000, 3012))
+"""Seeds of streets of the others."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ class Drawn:
 
     @property
     def text(self) -> str:
-        """Everything that decides it, in a line."""
+        """Everything that decides the episode, in one line."""
         arguments = "".join(f", {name}={value!r}" for name, value in self.arguments)
         played = f"policy {self.policy}, seed {self.seed}, {self.keyframes} keyframes"
         return f'gym.make("{self.environment}"{arguments}), {played}'
@@ -117,33 +122,33 @@ class Drawn:
 def drawn(number: int) -> Drawn:
     """The episode of a number."""
     rng = Random(f"care-sim certify {number}")
-    environment, policy = rng.choice(ENVIRONMENTS), rng.choice(POLICIES)
-    budget, closed = rng.choice(BUDGETS), environment in CLOSED
+    environment = rng.choice(_ENVIRONMENTS)
+    policy = rng.choice(CERTIFIED_POLICIES)
+    budget = rng.choice(_BUDGETS)
+    closed = environment in CLOSED
+
+    # A few faults, then a few settings, of those that the environment takes.
     arguments: dict[str, Any] = {"budget": 1.0 if policy == "full" else budget}
-    for choices, most in ((FAULTS, (0, 1, 1, 2, 3)), (SETTINGS, (0, 1, 1, 2))):
-        possible = [name for name in choices if closed or name not in CLOSED_ALONE]
+    for choices, most in ((CERTIFIED_FAULTS, (0, 1, 1, 2, 3)), (CERTIFIED_SETTINGS, (0, 1, 1, 2))):
+        possible = [name for name in choices if closed or name not in _CLOSED_ALONE]
         for name in rng.sample(possible, rng.choice(most)):
             arguments |= choices[name]
-    return Drawn(
-        number,
-        environment,
-        tuple(arguments.items()),
-        policy,
-        rng.choice(STREETS if number < 1000 else MORE_STREETS)
-        if environment == STREET
-        else rng.randrange(1000),
-        rng.choice(CLOSED_KEYFRAMES if closed else OPEN_KEYFRAMES),
-        rng.choice(modes(environment, policy)),
-    )
+
+    if environment == STREET:
+        seed = rng.choice(STREETS if number < 1000 else _MORE_STREETS)
+    else:
+        seed = rng.randrange(1000)
+    keyframes = rng.choice(_CLOSED_KEYFRAMES if closed else _OPEN_KEYFRAMES)
+    mode = rng.choice(modes(environment, policy))
+    return Drawn(number, environment, tuple(arguments.items()), policy, seed, keyframes, mode)
 
 
 def modes(environment: str, policy: str) -> list[str]:
-    """How such an episode can be played: truth does not travel between processes, and a street is
-    made once a process.
-
-    Those that are quick to begin stand several times.
+    """The modes in which such an episode can be played; those that begin quickly stand several
+    times.
     """
-    apart = IN_OTHER_PROCESSES if is_privileged(BUILT_IN[policy]) else ()
+    # Truth does not travel between processes, and every interpreter makes a street anew.
+    apart = _IN_OTHER_PROCESSES if is_privileged(BUILT_IN[policy]) else ()
     elsewhere = (HASH_SEED,) if environment == STREET else ()
     return [
         mode

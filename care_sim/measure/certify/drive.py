@@ -1,5 +1,5 @@
-"""A recorded drive that needs no download: an Argoverse 2 log of five seconds, written where it is
-wanted.
+"""A recorded drive that needs no download: an Argoverse 2 log of five seconds, written when it is
+needed.
 """
 
 from pathlib import Path
@@ -8,25 +8,27 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import feather
 
-NAME = "certified-drive"
-SWEEPS, SWEEP_S, START_NS = 50, 0.1, 315_000_000_000_000_000
-AHEAD = {"qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
-ACROSS = {"qw": 0.8, "qx": 0.0, "qy": 0.0, "qz": -0.6}
-"""Straight ahead, and turned to the right by 74 degrees."""
+_LOG = "certified-drive"
+_SWEEPS = 50
+_SWEEP_S = 0.1
+_START_NS = 315_000_000_000_000_000
+_AHEAD = {"qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
+_ACROSS = {"qw": 0.8, "qx": 0.0, "qy": 0.0, "qz": -0.6}
+"""A turn to the right by 74 degrees: cos and sin of half of it are exact to one digit."""
 
 
 def write_drive(folder: Path) -> str:
-    """Write the log below `folder`; the source of recordings that names it.
+    """Write the log below `folder`; returns the source of recordings that names it.
 
     The car drives 5 m/s past a van, parked cars and an oncoming bus; halfway a person steps out
     from behind the van, and a bicycle comes after.
     """
-    log = folder / NAME
+    log = folder / _LOG
     log.mkdir(parents=True)
-    boxes = [box for sweep in range(SWEEPS) for box in _boxes(sweep)]
+    boxes = [box for sweep in range(_SWEEPS) for box in _boxes(sweep)]
     poses = [
-        {"timestamp_ns": _stamp(n), "tx_m": 1000.0 + 0.5 * n, "ty_m": -500.0, "tz_m": 60.0} | AHEAD
-        for n in range(SWEEPS)
+        {"timestamp_ns": _stamp(n), "tx_m": 1000.0 + 0.5 * n, "ty_m": -500.0, "tz_m": 60.0} | _AHEAD
+        for n in range(_SWEEPS)
     ]
     feather.write_feather(pa.Table.from_pylist(boxes), log / "annotations.feather")
     feather.write_feather(pa.Table.from_pylist(poses), log / "city_SE3_egovehicle.feather")
@@ -35,6 +37,7 @@ def write_drive(folder: Path) -> str:
 
 def _boxes(sweep: int) -> list[dict[str, Any]]:
     """What stands and moves at a sweep, in the frame of the car."""
+    # The car drives 0.5 m per sweep, so that what stands still comes nearer by as much.
     ahead = 30.0 - 0.5 * sweep
     seen = [
         _box(sweep, "BOX_TRUCK", "van", (ahead, -4.0, 0.9), (6.0, 2.2, 2.6)),
@@ -52,7 +55,7 @@ def _boxes(sweep: int) -> list[dict[str, Any]]:
                 "person",
                 (ahead + 5.0, -4.0 + 0.13 * (sweep - 20), 0.6),
                 (0.6, 0.7, 1.8),
-                ACROSS,
+                _ACROSS,
             )
         )
     if sweep >= 30:
@@ -63,7 +66,7 @@ def _boxes(sweep: int) -> list[dict[str, Any]]:
                 "bicycle",
                 (ahead + 12.0, 6.0 - 0.3 * (sweep - 30), 0.4),
                 (1.8, 0.6, 1.4),
-                ACROSS,
+                _ACROSS,
             )
         )
     return seen
@@ -75,7 +78,7 @@ def _box(
     track: str,
     place: tuple[float, ...],
     size: tuple[float, ...],
-    turn: dict[str, float] = AHEAD,
+    turn: dict[str, float] = _AHEAD,
 ) -> dict[str, Any]:
     numbers = dict(
         zip(
@@ -84,14 +87,14 @@ def _box(
             strict=True,
         )
     )
-    named = {
+    record = {
         "timestamp_ns": _stamp(sweep),
         "track_uuid": track,
         "category": category,
         "num_interior_pts": 10,
     }
-    return named | numbers | turn
+    return record | numbers | turn
 
 
 def _stamp(sweep: int) -> int:
-    return START_NS + round(sweep * SWEEP_S * 1e9)
+    return _START_NS + round(sweep * _SWEEP_S * 1e9)

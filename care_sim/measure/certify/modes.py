@@ -1,5 +1,5 @@
-"""How episodes of the list are played: alone, in turns, in vectors, in an interpreter with another
-hash seed.
+"""How episodes of the list are played: alone, in turns, in vectors, or in an interpreter with
+another hash seed.
 """
 
 import json
@@ -33,22 +33,22 @@ from care_sim.measure.certify.trail import Trail
 from care_sim.policies import make_policy
 from care_sim.policies.base import Policy
 
-Left = bytes | str
+Played = bytes | str
 """The trail of an episode, or in one line why there is none."""
 
-TOGETHER = 4
-"""Episodes of a vector, and of those that take turns."""
-HASH_SEEDS = "0123456789"
+_TOGETHER = 4
+"""Episodes of a vector, and episodes that take turns."""
+_HASH_SEEDS = "0123456789"
 
 
-def play(mode: str, episodes: Sequence[Drawn], source: str) -> list[Left]:
+def play_in_mode(mode: str, episodes: Sequence[Drawn], source: str) -> list[Played]:
     """The trails of episodes played in a mode; `source` names the recordings of the replay.
 
     In a vector all are of one environment, or of the closed loop: their spaces are the same.
     """
     if mode == HASH_SEED:
         return elsewhere(episodes, source)
-    groups = together(episodes, 1 if mode == SINGLE else TOGETHER)
+    groups = together(episodes, 1 if mode == SINGLE else _TOGETHER)
     return [trail for group in groups for trail in _PLAYERS[mode](group, source)]
 
 
@@ -57,24 +57,26 @@ def together(episodes: Sequence[Drawn], most: int) -> list[Sequence[Drawn]]:
     return [episodes[start : start + most] for start in range(0, len(episodes), most)]
 
 
-def in_turns(episodes: Sequence[Drawn], source: str) -> list[Left]:
+def in_turns(episodes: Sequence[Drawn], source: str) -> list[Played]:
     """A keyframe of each in turn, until all are over."""
     with ExitStack() as stack:
-        envs = [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+        envs = [
+            stack.enter_context(closing(certified_env(episode, source))) for episode in episodes
+        ]
         policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
         observations = [env.reset()[0] for env in envs]
         while not all(env.over for env in envs):
             for n, env in enumerate(envs):
                 if not env.over:
                     observations[n] = env.step(policies[n](observations[n]))[0]
-        return [env.left for env in envs]
+        return [env.played for env in envs]
 
 
-def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None) -> list[Left]:
+def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None) -> list[Played]:
     """In a vector of Gymnasium: of this process, or of processes of a `context` of
     multiprocessing.
     """
-    makers = [partial(make, episode, source) for episode in episodes]
+    makers = [partial(certified_env, episode, source) for episode in episodes]
     with ExitStack() as stack:
         twins = _twins(stack, episodes, source) if context else []
         vector = stack.enter_context(
@@ -89,11 +91,13 @@ def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorE
         return AsyncVectorEnv([partial(following, maker) for maker in makers], context=context)
 
 
-def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
+def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Played]:
     """In the subprocesses of Stable-Baselines3 (extra 'rl')."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
-    makers: list[Any] = [partial(following, partial(make, episode, source)) for episode in episodes]
+    makers: list[Any] = [
+        partial(following, partial(certified_env, episode, source)) for episode in episodes
+    ]
     with ExitStack() as stack:
         twins = _twins(stack, episodes, source)
         with starting():
@@ -101,9 +105,11 @@ def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Left]:
         return _stepped(episodes, twins, vector, vector.reset())
 
 
-def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Left]:
-    """In an interpreter whose hash seed is another than this one's."""
-    seed = next(seed for seed in HASH_SEEDS if seed != os.environ.get("PYTHONHASHSEED"))
+def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Played]:
+    """In an interpreter with another hash seed than that of this one."""
+    # Python takes a hash seed only when it starts. It reads what to play from its input, and prints
+    # trails as hexadecimal text and reasons as lists of one text.
+    seed = next(seed for seed in _HASH_SEEDS if seed != os.environ.get("PYTHONHASHSEED"))
     asked = json.dumps([os.getpid(), [episode.number for episode in episodes], source])
     command = [
         sys.executable,
@@ -123,20 +129,22 @@ def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Left]:
             f"the interpreter of another hash seed ended: {done.stderr.strip().splitlines()[-1:]}"
         )
     return [
-        bytes.fromhex(left) if isinstance(left, str) else left[0]
-        for left in json.loads(done.stdout)
+        bytes.fromhex(trail) if isinstance(trail, str) else trail[0]
+        for trail in json.loads(done.stdout)
     ]
 
 
 def answer_parent() -> None:
-    """What that interpreter does: play what it is told on stdin, and print the trails."""
+    """What the interpreter of another hash seed does: play what it is told on stdin, and print the
+    trails.
+    """
     starter, numbers, source = json.load(sys.stdin)
     end_with_starter(starter)
     trails = [in_turns([drawn(number)], source)[0] for number in numbers]
     print(json.dumps([trail.hex() if isinstance(trail, bytes) else [trail] for trail in trails]))
 
 
-def make(episode: Drawn, source: str) -> Trail:
+def certified_env(episode: Drawn, source: str) -> Trail:
     """The environment of an episode, which leaves its trail."""
     recorded = {"source": source} if episode.environment == REPLAY else {}
     arguments = dict(episode.arguments) | recorded
@@ -147,11 +155,13 @@ def make(episode: Drawn, source: str) -> Trail:
 
 
 def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Trail]:
-    """Environments of this process beside those of others: policies are made for their rigs."""
-    twins = [stack.enter_context(closing(make(episode, source))) for episode in episodes]
+    """Environments of this process beside those of other processes, for whose rigs policies are
+    made.
+    """
+    twins = [stack.enter_context(closing(certified_env(episode, source))) for episode in episodes]
     for twin, episode in zip(twins, episodes, strict=True):
         if episode.environment == STREET:
-            # Made here, a street is there for all that are forked from now on.
+            # Made in this process, a street is there in all that are forked from now on.
             twin.reset()
     return twins
 
@@ -164,10 +174,10 @@ def _begun(episode: Drawn, env: gymnasium.Env[Any, Any]) -> Policy:
 
 def _stepped(
     episodes: Sequence[Drawn], envs: Sequence[Any], vector: Any, observations: Any
-) -> list[Left]:
-    """Play a vector until the longest episode is over; the policies choose here. Where one is over
-    its last action is given on: truth ends with it.
-    """
+) -> list[Played]:
+    """Play a vector until the longest episode is over; the policies choose in this process."""
+    # An episode that is over takes its last action again, and leaves it without effect: a
+    # privileged policy has nothing to ask then.
     policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
     actions: list[Any] = [None] * len(episodes)
     for _ in range(max(episode.keyframes for episode in episodes)):
@@ -175,10 +185,10 @@ def _stepped(
             if not env.over:
                 actions[n] = policies[n]({name: column[n] for name, column in observations.items()})
         observations = vector.step(np.stack(actions))[0]
-    return list(vector.get_attr("left"))
+    return list(vector.get_attr("played"))
 
 
-_PLAYERS: dict[str, Callable[[Sequence[Drawn], str], list[Left]]] = {
+_PLAYERS: dict[str, Callable[[Sequence[Drawn], str], list[Played]]] = {
     SINGLE: in_turns,
     INTERLEAVED: in_turns,
     SYNC: in_vector,

@@ -1,23 +1,62 @@
-"""The episodes of the list in batches, which worker processes play."""
+"""Episodes of the list in batches, which worker processes play; and which can be played here."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, as_completed
+from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from care_sim.base.errors import MissingExtra
+from care_sim.base.extras import import_open3d
 from care_sim.measure.certify.design import CLOSED, HASH_SEED, STREET, SUBPROCESS, Drawn, drawn
 from care_sim.measure.certify.drive import write_drive
-from care_sim.measure.certify.modes import Left, play, together
+from care_sim.measure.certify.modes import Played, play_in_mode, together
 from care_sim.study.episode_play import answer
 from care_sim.study.executors import ExecutorFactory, Processes, processes
 
-Trails = dict[int, Left]
+Trails = dict[int, Played]
 """The trail of every episode by number, or in one line why there is none."""
 
-A_BATCH = 24
-A_LONG_BATCH = 120
-"""Episodes of a batch; more where it takes a while to begin: another interpreter, PyTorch."""
+FARTHEST = "farthest-points"
+"""The policy that needs Open3D."""
+
+_BATCH = 24
+_LONG_BATCH = 120
+"""Episodes of a batch; more of them where a mode takes a while to begin: another interpreter,
+PyTorch.
+"""
+
+
+def _need_stable_baselines3() -> None:
+    """Raise MissingExtra where it is not installed."""
+    # It is looked for and not imported, which would take seconds.
+    if find_spec("stable_baselines3") is None:
+        raise MissingExtra("Stable-Baselines3 needs the extra 'rl': pip install 'care-sim[rl]'")
+
+
+_NEEDS: tuple[tuple[Callable[[Drawn], bool], Callable[[], object]], ...] = (
+    (lambda episode: episode.policy == FARTHEST, import_open3d),
+    (lambda episode: episode.mode == SUBPROCESS, _need_stable_baselines3),
+)
+"""Which episodes need an extra, and what raises MissingExtra without it."""
+
+
+def playable_here(episodes: Sequence[Drawn]) -> tuple[list[Drawn], list[str]]:
+    """The episodes that can be played with what is installed, and a line for each extra that is
+    missing.
+    """
+    left = list(episodes)
+    lines = []
+    for needed, load in _NEEDS:
+        lacking = [episode for episode in left if needed(episode)]
+        try:
+            if lacking:
+                load()
+        except MissingExtra as error:
+            left = [episode for episode in left if not needed(episode)]
+            lines.append(f"{len(lacking):,} of {len(episodes):,} not played: {error}")
+    return left, lines
 
 
 def trails_of(
@@ -30,7 +69,7 @@ def trails_of(
     found: Trails = {}
     with TemporaryDirectory(prefix="care-sim-certify-") as folder:
         source = write_drive(Path(folder))
-        waiting = batches([drawn(number) for number in numbers])
+        waiting = episode_batches([drawn(number) for number in numbers])
         executor = make_executor(min(workers, max(len(waiting), 1)))
         try:
             futures = {executor.submit(attempt, batch, source): batch for batch in waiting}
@@ -52,23 +91,22 @@ def trails_of(
     return found
 
 
-def batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
-    """Episodes that are played one after the other: those of a street together, since it takes
-    seconds to make; the others by mode. The longest to begin come first.
+def episode_batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
+    """Episodes in lists that are played one after the other: those of a street together, since it
+    takes seconds to make, and the others by mode.
     """
     ordered = sorted(episodes, key=lambda episode: (*_world(episode), episode.mode, episode.number))
     made: list[list[Drawn]] = []
     for (world, mode), group in groupby(
         ordered, lambda one: (_world(one), one.mode * (one.environment != STREET))
     ):
-        most = (
-            len(episodes)
-            if world[0] == STREET
-            else A_LONG_BATCH
-            if mode in (HASH_SEED, SUBPROCESS)
-            else A_BATCH
-        )
+        most = _BATCH
+        if world[0] == STREET:
+            most = len(episodes)
+        elif mode in (HASH_SEED, SUBPROCESS):
+            most = _LONG_BATCH
         made += [list(batch) for batch in together(list(group), most)]
+    # What takes longest to begin comes first, so that no worker ends long after the others.
     return sorted(
         made,
         key=lambda batch: (
@@ -84,20 +122,20 @@ def attempt(batch: Sequence[Drawn], source: str) -> Trails:
     """
     found: Trails = {}
     for group in _alike(batch):
-        trails = answer(play, group[0].mode, group, source)
+        trails = answer(play_in_mode, group[0].mode, group, source)
         if isinstance(trails, str):
             trails = [_alone(episode, source) for episode in group]
         found |= {episode.number: trail for episode, trail in zip(group, trails, strict=True)}
     return found
 
 
-def _alone(episode: Drawn, source: str) -> Left:
-    trails = answer(play, episode.mode, [episode], source)
+def _alone(episode: Drawn, source: str) -> Played:
+    trails = answer(play_in_mode, episode.mode, [episode], source)
     return trails if isinstance(trails, str) else trails[0]
 
 
 def _alike(batch: Sequence[Drawn]) -> Iterator[list[Drawn]]:
-    """Those of one mode."""
+    """Groups of one mode."""
     for _, group in groupby(batch, lambda episode: episode.mode):
         yield list(group)
 

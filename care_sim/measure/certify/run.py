@@ -1,22 +1,63 @@
-"""`care-sim certify`: play the list, compare, tell."""
+"""`care-sim certify`: play the list, compare it with what is published, report."""
 
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import Annotated
 
+import tyro
+
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, MissingExtra, report_problems
-from care_sim.measure.certify.config import CertifyConfig
 from care_sim.measure.certify.design import drawn
-from care_sim.measure.certify.needs import playable_here
-from care_sim.measure.certify.playing import Trails, trails_of
+from care_sim.measure.certify.playing import Trails, playable_here, trails_of
 from care_sim.measure.certify.published import combined, read, write
 from care_sim.measure.certify.verdict import verdict_of
+from care_sim.study.executors import MOST_WORKERS
 from care_sim.study.progress import ProgressLines, progress_bar
+
+CERTIFIED_EPISODES = 1_000
+_ALL_EPISODES = 10_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertifyConfig:
+    """Play a published list of episodes and say whether they go as published, or where one does
+    not. It holds every environment, built-in policy and fault, alone and in every kind of vector.
+    """
+
+    every: Annotated[bool, tyro.conf.arg(name="all"), tyro.conf.FlagCreatePairsOff] = False
+    """All 10,000 episodes, not only the first 1,000."""
+    episode: int | None = None
+    """This episode alone, by its number in the list."""
+    workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)
+    """Processes that play at the same time."""
+    write: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """For maintainers, with all: make what is played now the published list."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.episode is not None:
+            check_whole("episode", self.episode, 0, _ALL_EPISODES - 1)
+            if self.every or self.write:
+                raise InvalidInput("episode plays one alone: give neither all nor write with it")
+        elif self.write and not self.every:
+            raise InvalidInput("write publishes the whole list: give all with it")
+
+    @property
+    def numbers(self) -> list[int]:
+        """The episodes by number."""
+        if self.episode is not None:
+            return [self.episode]
+        return list(range(_ALL_EPISODES if self.every else CERTIFIED_EPISODES))
 
 
 def run_certify(config: CertifyConfig) -> int:
-    """Play the list and tell; 0 where every episode that can be played here goes as published, else
-    1.
+    """Play the list and print how it goes; 0 where every episode that can be played here goes as
+    published, else 1.
 
     Raises MissingExtra where none can be played, or not all that are to be published.
     """

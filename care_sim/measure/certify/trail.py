@@ -1,5 +1,5 @@
-"""The trail that an episode leaves: a byte of a running hash after every stage, so that the first
-stage at which two episodes part can be told.
+"""The trail that an episode leaves: a byte of a running hash after every stage, which tells the
+first stage at which two episodes differ.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.measure.certify.design import Drawn
 
 CONFIGURATION, OUTCOME = "configuration", "outcome"
-STAGES = (
+TRAIL_STAGES = (
     "scenario and poses",
     "camera detections",
     "tracks",
@@ -33,11 +33,11 @@ DIGEST_BYTES = 8
 
 
 class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Plays one episode of the list, whatever `reset` is told, and keeps its trail; what follows
-    leaves no trace.
+    """Plays one episode of the list, whatever `reset` is told, and keeps its trail. Steps after the
+    end have no effect.
 
-    An exception ends the episode and is kept: in the process of a vector it would leave the others
-    waiting.
+    An exception ends the episode and is kept. Raised in a process of a vector, it would leave the
+    others waiting.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], episode: Drawn):
@@ -45,16 +45,17 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._episode = episode
         self._content = hashlib.sha256()
         self._stages = bytearray()
-        self._keyframes, self._gained = 0, Gained()
+        self._keyframes = 0
+        self._gained = _Gained()
         self._observation: Any = None
         self._failure = ""
         self.over = False
         """Whether the trail is whole."""
 
     @property
-    def left(self) -> bytes | str:
-        """The trail: `DIGEST_BYTES` of the hash over all, then a byte a stage; or in one line why
-        there is none.
+    def played(self) -> bytes | str:
+        """The trail: `DIGEST_BYTES` of the hash over all, then a byte per stage; or in one line
+        why there is none.
         """
         if not self.over:
             return "it did not come to its end"
@@ -78,10 +79,8 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
             try:
                 self._play(action)
             except Exception as error:
-                self._failure, self.over = (
-                    " ".join(f"{type(error).__name__}: {error}".split()),
-                    True,
-                )
+                self._failure = " ".join(f"{type(error).__name__}: {error}".split())
+                self.over = True
         return self._observation, 0.0, False, False, {}
 
     def _play(self, action: Any) -> None:
@@ -113,47 +112,54 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._stages.append(self._content.digest()[-1])
 
 
-class Gained:
-    """What an episode has brought so far, whole or not."""
+class _Gained:
+    """Reward and findings of an episode so far, whether or not it is played to its end."""
 
     def __init__(self) -> None:
-        self._reward, self._objects, self._found = 0.0, 0, 0
+        self._reward = 0.0
+        self._objects = 0
+        self._found = 0
 
     def add(self, reward: Any, info: Mapping[str, Any]) -> None:
         """Count a keyframe."""
         self._reward += float(reward)
-        self._objects, self._found = (
-            self._objects + info.get("objects", 0),
-            self._found + info.get("found", 0),
-        )
+        self._objects += info.get("objects", 0)
+        self._found += info.get("found", 0)
 
     def outcome(self, env: Any, info: Mapping[str, Any]) -> tuple[Any, ...]:
-        """The outcome so far; of the open loop, which knows it at the end alone, what was found."""
+        """All that was gained; the outcome of the closed loop is that of the keyframes so far, that
+        of the open loop is empty before its end.
+        """
         sums = (
             asdict(outcome(env.keyframes))
             if isinstance(env, ClosedLoopEnv)
             else info.get("outcome", {})
         )
+        # None has no bytes of its own: NaN stands for it.
         values = tuple((name, math.nan if value is None else value) for name, value in sums.items())
         return self._reward, self._objects, self._found, values
 
 
-def stage(trail: bytes, other: bytes) -> tuple[str, int | None]:
+def first_difference(trail: bytes, other: bytes) -> tuple[str, int | None]:
     """The first stage at which two trails differ, and the keyframe, None of what belongs to none.
 
-    One time in 256 two different hashes have the same byte, and the stage after is named.
+    One time in 256 two different hashes have the same byte, and a later stage is named.
     """
-    one, two = trail[DIGEST_BYTES:], other[DIGEST_BYTES:]
+    one = trail[DIGEST_BYTES:]
+    two = other[DIGEST_BYTES:]
     last = min(len(one), len(two)) - 1
     place = next(
         (n for n, pair in enumerate(zip(one, two, strict=False)) if pair[0] != pair[1]), last
     )
+
+    # The first byte is the configuration's, the last the outcome's, and between them the stages of
+    # keyframe after keyframe.
     if place <= 0:
         return CONFIGURATION, None
     if place == last:
         return OUTCOME, None
-    keyframe, number = divmod(place - 1, len(STAGES))
-    return STAGES[number], keyframe
+    keyframe, number = divmod(place - 1, len(TRAIL_STAGES))
+    return TRAIL_STAGES[number], keyframe
 
 
 def _moving(loop: ClosedLoop) -> tuple[Any, ...]:

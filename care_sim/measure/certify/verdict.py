@@ -1,4 +1,4 @@
-"""What is said of episodes that were played again."""
+"""How episodes that were played again compare with the published ones."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from care_sim.measure.certify.design import drawn
 from care_sim.measure.certify.playing import Trails
 from care_sim.measure.certify.published import combined
-from care_sim.measure.certify.trail import stage
+from care_sim.measure.certify.trail import first_difference
 
-NOT_PLAYED = "not played"
+_NOT_PLAYED = "not played"
 
 
 @dataclass(frozen=True)
@@ -54,20 +54,25 @@ class Verdict:
 
 
 def verdict_of(found: Trails, published: Sequence[bytes], asked: int = 0) -> Verdict:
-    """Hold trails against the published ones of the same numbers; `asked`, where more were asked
-    for than played.
+    """Compare trails with the published ones of the same numbers; `asked` is how many episodes were
+    asked for, where not all of them were played.
     """
     failures = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, str)}
     trails = {number: trail for number, trail in sorted(found.items()) if isinstance(trail, bytes)}
     parted = {
-        number: stage(published[number], trail)
+        number: first_difference(published[number], trail)
         for number, trail in trails.items()
         if trail != published[number]
     }
-    differing = parted | dict.fromkeys(failures, (NOT_PLAYED, None))
-    asked, hash_ = asked or len(found), None if failures else combined([*trails.values()])
+    differing = parted | dict.fromkeys(failures, (_NOT_PLAYED, None))
+    asked = asked or len(found)
     return Verdict(
-        len(found), asked, hash_, differing, failures, next(iter(found)) if asked == 1 else None
+        episodes=len(found),
+        asked=asked,
+        hash=None if failures else combined([*trails.values()]),
+        differing=differing,
+        failures=failures,
+        only=next(iter(found)) if asked == 1 else None,
     )
 
 
@@ -76,4 +81,4 @@ def _made_of(number: int) -> str:
 
 
 def _where(name: str) -> str:
-    return name if name == NOT_PLAYED else f"first in {name}"
+    return name if name == _NOT_PLAYED else f"first in {name}"

@@ -1,8 +1,8 @@
-"""What engines answer to the same rays, and whether an answer hangs on a micrometre.
+"""What engines answer to the same rays, and whether a micrometre decides an answer.
 
-Bullet finds surfaces by iteration and stops within 1 mm, whatever the unit: it widens round parts
-and edges by as much, and moves surfaces that a ray grazes by more. Told every length in millimetres
-it stops within a micrometre.
+Bullet finds surfaces by iteration and stops within 0.001 units of length. With metres, it widens
+round parts and edges by 1 mm, and moves surfaces that a ray grazes by more. Told every length in
+millimetres, it stops within a micrometre.
 """
 
 from collections.abc import Sequence
@@ -21,31 +21,34 @@ from care_sim.world.bodies import BodyKind, Triple
 from care_sim.world.bullet import BulletWorld
 
 Answers = tuple[Floats, Integers]
+"""Ranges (n,) in metres and body ids (n,) of n rays, as a `care_sim.sensors.engines.RayEngine`
+answers.
+"""
 
 SAME_RANGE_M = 0.001
 """Ranges this close are the same."""
-GRAZE_M = 1e-6
+_GRAZE_M = 1e-6
 """A ray this close to where the answer changes grazes an edge."""
-MM = 1000.0
+_MM = 1000.0
 
 _SIDES = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
-_NUDGES = GRAZE_M * Rotation.from_rotvec((0.3, 0.5, 0.7)).apply(
+_NUDGES = _GRAZE_M * Rotation.from_rotvec((0.3, 0.5, 0.7)).apply(
     _SIDES / np.linalg.norm(_SIDES, axis=1, keepdims=True)
 )
-"""(26, 3) none of them along an axis: an error in one place alone, as where a body is exactly
-overhead, is no edge.
+"""(26, 3) metres, towards the faces, edges and corners of a cube. They are turned, so that none
+lies along an axis: an error in one place alone, as where a body is exactly overhead, is no edge.
 """
 
 
 class Millimetres:
-    """Bullet asked more exactly: a world of its own with the same bodies, ids from 1, in
-    millimetres.
+    """Bullet asked more exactly: over a world of its own, in millimetres, with the same bodies and
+    ids from 1.
     """
 
     def __init__(self, kinds: Sequence[BodyKind], grid: AngularGrid):
         self._world = BulletWorld()
         self._bodies = [self._world.add(_enlarged(kind), (0.0, 0.0, 0.0)) for kind in kinds]
-        self._rays = Bullet(self._world, replace(grid, range_m=MM * grid.range_m))
+        self._rays = Bullet(self._world, replace(grid, range_m=_MM * grid.range_m))
 
     def place(self, frames: Sequence[Frame]) -> None:
         """Move all bodies; the frames are in metres."""
@@ -55,7 +58,7 @@ class Millimetres:
     def cast(self, sensor: Frame, cells: Cells) -> Answers:
         """Ranges in metres, and body ids; see `care_sim.sensors.engines.RayEngine`."""
         ranges, ids = self._rays.cast(_far(sensor), cells)
-        return ranges / MM, ids
+        return ranges / _MM, ids
 
     def close(self) -> None:
         """Free the world."""
@@ -71,8 +74,8 @@ def same(one: Answers, other: Answers) -> NDArray[np.bool_]:
 
 
 def aside(engine: RayEngine, sensor: Frame, cell: int, answer: Answers) -> bool:
-    """Whether `engine` gives `answer`, of one ray, to any of 26 rays `GRAZE_M` around that of
-    `cell`.
+    """Whether `engine` gives `answer`, of one ray, to any of 26 rays beside that of `cell`, which
+    start a micrometre from it.
     """
     cells = np.array([cell])
     places = (sensor.origin + _NUDGES).tolist()
@@ -83,7 +86,7 @@ def aside(engine: RayEngine, sensor: Frame, cell: int, answer: Answers) -> bool:
 
 
 def _far(frame: Frame) -> Frame:
-    return replace(frame, x=MM * frame.x, y=MM * frame.y, z=MM * frame.z)
+    return replace(frame, x=_MM * frame.x, y=_MM * frame.y, z=_MM * frame.z)
 
 
 def _enlarged(kind: BodyKind) -> BodyKind:
@@ -95,4 +98,4 @@ def _enlarged(kind: BodyKind) -> BodyKind:
 
 def _longer(triple: Triple) -> Triple:
     x, y, z = triple
-    return MM * x, MM * y, MM * z
+    return _MM * x, _MM * y, _MM * z

@@ -17,7 +17,7 @@ from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.body_tables import SHAPES, Primitives
 from care_sim.world.bullet import BulletWorld
 
-NAME = "bullet in millimetres"
+_ENGINE_NAME = "bullet in millimetres"
 _UNSEEN = BodyKind(
     "unseen",
     None,
@@ -27,20 +27,25 @@ _UNSEEN = BodyKind(
 
 
 class Exact(Bullet):
-    """Rays of the bodies of a world, wherever they are, asked in millimetres; pictures as Bullet
+    """Rays at the bodies of a world where they are now, asked in millimetres; pictures as Bullet
     draws them.
     """
 
     def __init__(self, world: BulletWorld, grid: AngularGrid):
         super().__init__(world, grid)
-        self._bodies, self._exact = 0, Millimetres([], grid)
+        self._bodies = 0
+        self._exact = Millimetres([], grid)
 
     def cast(self, sensor: Frame, cells: Cells) -> Answers:
         """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        # The copy is made at the first cast, and anew where bodies were added since.
         known = self._world.primitives
         if self._bodies != len(known.poses):
             self.close()
-            self._bodies, self._exact = len(known.poses), Millimetres(_kinds(known), self._grid)
+            self._bodies = len(known.poses)
+            self._exact = Millimetres(_kinds(known), self._grid)
+
+        # Bodies that no ray can meet, as the car itself, are kept away.
         hit = set(known.owners.tolist())
         self._exact.place(
             [_frame(known.poses[body]) if body in hit else AWAY for body in range(1, self._bodies)]
@@ -54,24 +59,24 @@ class Exact(Bullet):
 
 @contextmanager
 def exactly() -> Iterator[str]:
-    """An engine by this name while this lasts."""
+    """Register Bullet in millimetres as an engine while this lasts; its name."""
     made: list[Exact] = []
 
     def make(*arguments: Any) -> Exact:
         made.append(Exact(*arguments))
         return made[-1]
 
-    ENGINES[NAME] = make
+    ENGINES[_ENGINE_NAME] = make
     try:
-        yield NAME
+        yield _ENGINE_NAME
     finally:
-        del ENGINES[NAME]
+        del ENGINES[_ENGINE_NAME]
         for engine in made:
             engine.close()
 
 
 def _kinds(known: Primitives) -> list[BodyKind]:
-    """The bodies from id 1 on, of those that rays can meet the primitives."""
+    """The bodies from id 1 on, with the primitives that rays can meet."""
     return [
         _kind(known, np.flatnonzero(known.owners == body)) for body in range(1, len(known.poses))
     ]

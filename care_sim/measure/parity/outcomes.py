@@ -1,5 +1,5 @@
-"""Engines compared in whole episodes: the cells a policy fires, what is detected, how the car
-drives, how it ends.
+"""Engines compared in whole episodes: the cells that fire, what is detected, how the car drives,
+how it ends.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,23 +15,24 @@ from care_sim.study.designs.paper import paper_study
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
 
-COMPARED = ("fast", "bullet")
+_ENGINES = ("fast", "bullet")
 
 
 class Outcomes:
-    """Episodes played under both engines, and those that differ, in the outcome or at any keyframe.
-    What ends otherwise is played under Bullet in millimetres too.
+    """Counts of episodes played under both engines, and labels of those that differ, in the outcome
+    or at any keyframe. Where the outcomes differ, Bullet in millimetres plays the episode too.
     """
 
     def __init__(self) -> None:
-        self.episodes = self.keyframes = 0
+        self.episodes = 0
+        self.keyframes = 0
         self.other_outcomes: list[str] = []
         self.other_keyframes: list[str] = []
         self.other_than_exact: list[str] = []
 
     def compare(self, config: EpisodeConfig) -> None:
         """Play an episode under both engines."""
-        (_, drawn), (_, expected) = (trace(config.changed(engine=engine)) for engine in COMPARED)
+        (_, drawn), (_, expected) = (trace(config.changed(engine=engine)) for engine in _ENGINES)
         self.episodes += 1
         self.keyframes += len(expected)
         if outcome(drawn) != outcome(expected):

@@ -4,19 +4,21 @@ import json
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeVar
 
 from rich.console import Console
 
+from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.files import JSON, replacing
-from care_sim.measure.parity.config import ParityConfig
 from care_sim.measure.parity.keyframes import keyframes
 from care_sim.measure.parity.outcomes import outcomes
 from care_sim.measure.parity.random_scenes import random_scenes
 from care_sim.measure.parity.tables import parity_tables
-from care_sim.measure.parity.tally import REFERENCES
+from care_sim.measure.parity.tally import REFERENCE_NAMES
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.progress import ProgressLines, progress_bar
 from care_sim.study.provenance import machine, versions
@@ -24,10 +26,31 @@ from care_sim.study.provenance import machine, versions
 Figures = TypeVar("Figures")
 
 
+@dataclass(frozen=True, kw_only=True)
+class ParityConfig:
+    """Compare the engine `fast` with Bullet: in random scenes, in full scans and pictures of the
+    keyframes of every scenario, and in the course of the episodes of the paper's study.
+    """
+
+    scenes: int = bounded(100_000, 0, LARGEST_INTEGER)
+    """Random scenes."""
+    episodes: int = bounded(5, 0, 10_000)
+    """Number of seeds, from 0, of every scenario, whose keyframes are all scanned in full, and of
+    the paper's study.
+    """
+    seed: int = bounded(0, 0, LARGEST_INTEGER)
+    """Seed of the random scenes."""
+    out: Path | None = None
+    """File for the figures as JSON."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
 def run_parity(config: ParityConfig) -> int:
-    """Compare, print the tables, write JSON; 1 if the engines do not agree, see `agree`."""
+    """Compare, print the tables, write JSON; 0 where the engines agree as `agree` says, else 1."""
     with nullcontext() if config.out is None else replacing(config.out, JSON) as unfinished:
-        report = measure(config)
+        report = parity_report(config)
         console = Console(highlight=False)
         for table in parity_tables(report):
             console.print(table.rich())
@@ -39,14 +62,16 @@ def run_parity(config: ParityConfig) -> int:
 def agree(report: dict[str, Any]) -> bool:
     """Whether every difference from Bullet in millimetres has an explanation, visible boxes end
     within a pixel, and episodes end as under Bullet.
+
+    Bullet in its own metres is no judge of rays: its tolerance of 1 mm decides some.
     """
     boxes = max((figures["widest_px"] for figures in report["pictures"].values()), default=0.0)
     return not unexplained(report) and boxes <= 1 and not report["outcomes"]["other_outcomes"]
 
 
-def measure(config: ParityConfig) -> dict[str, Any]:
-    """`config`, `machine`, `versions`, `scans`: the figures of random scenes and of every scenario,
-    `pictures`: those of every scenario, and `outcomes`: those of whole episodes.
+def parity_report(config: ParityConfig) -> dict[str, Any]:
+    """`config`, `machine` and `versions`; `scans`, the figures of random scenes and of every
+    scenario; `pictures`, those of every scenario; and `outcomes`, those of whole episodes.
     """
     random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
     played = {
@@ -68,7 +93,9 @@ def measure(config: ParityConfig) -> dict[str, Any]:
 
 def unexplained(report: dict[str, Any]) -> int:
     """How many rays differ from Bullet in millimetres without an explanation."""
-    met = (figures["references"][REFERENCES[-1]].values() for figures in report["scans"].values())
+    met = (
+        figures["references"][REFERENCE_NAMES[-1]].values() for figures in report["scans"].values()
+    )
     return sum(counts["unexplained"] for groups in met for counts in groups)
 
 

@@ -1,5 +1,7 @@
-"""Random scenes: bodies in any pose around a sensor in any pose, and rays aimed mostly at the
-bodies.
+"""Random scenes: bodies of any kind in any pose around a sensor in any pose, and rays aimed mostly
+at the bodies.
+
+The order of the draws decides what a scene of a number is.
 """
 
 from collections.abc import Callable
@@ -9,28 +11,37 @@ import numpy as np
 
 from care_sim.core.frames import Floats, Frame
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.measure.parity.bodies import draw_kind
-from care_sim.world.bodies import BodyKind, Part
+from care_sim.core.types import CLASSES
+from care_sim.world.bodies import CATALOGUE, BodyKind, Part, sized
 
-BODIES = 8
-SCENES_A_CAST = 100
-"""Scenes in which the same bodies stand otherwise: a world of Bullet is not made in a moment."""
-GRIDS = (
+_BODIES = 8
+"""Bodies of a scene at the most."""
+SCENES_PER_CAST = 100
+"""Scenes that share their bodies, each in other places: a world of Bullet takes a while to make."""
+SCENE_GRIDS = (
     AngularGrid(),
     AngularGrid(columns=180, rows=24),
     AngularGrid(columns=2048, rows=128, range_m=30.0),
 )
-AIMED, STRAY = 24, 8
-"""Rays of a scene towards points in and just around parts, and anywhere."""
-AROUND = 1.05
-UNCLEAR_M = 0.001
-"""Bullet does not say what a ray meets that starts so close to a surface, or within a sphere."""
+_AIMED = 24
+"""Rays of a scene towards points in and just around parts."""
+_AROUND = 1.05
+"""Those points lie in the box around a part, made larger by this factor."""
+_STRAY = 8
+"""Rays of a scene anywhere."""
+_UNCLEAR_M = 0.001
+"""What a ray meets that starts so close to a surface, or within a sphere, Bullet leaves open."""
 AWAY = Frame(1000.0, 1000.0, 0.0, 0.0)
-"""Where bodies wait that a scene does not use."""
+"""Where bodies stand that a scene does not use: beyond the reach of every grid."""
+_SMALLEST_M = 0.05
+_LARGEST_M = 12.0
+_STRETCH = (0.5, 1.5)
+"""Sizes of vehicles and people as shares of the catalogue's."""
+_GREY = (0.5, 0.5, 0.5)
 
 
 @dataclass(frozen=True)
-class Scene:
+class RandomScene:
     """`frames` of all bodies, body by body, and `cells` fired from `sensor`."""
 
     frames: tuple[Frame, ...]
@@ -39,14 +50,16 @@ class Scene:
 
 
 def draw_bodies(seed: int, cast: int) -> tuple[BodyKind, ...]:
-    """The bodies that `SCENES_A_CAST` scenes share."""
+    """The bodies that `SCENES_PER_CAST` scenes share."""
     rng = np.random.default_rng((seed, 0, cast))
-    return tuple(draw_kind(rng) for _ in range(BODIES))
+    return tuple(_draw_kind(rng) for _ in range(_BODIES))
 
 
-def draw_scene(seed: int, number: int, kinds: tuple[BodyKind, ...], grid: AngularGrid) -> Scene:
-    """The scene of a number: some of the bodies anywhere, the first of them in a place that asks
-    for care.
+def draw_scene(
+    seed: int, number: int, kinds: tuple[BodyKind, ...], grid: AngularGrid
+) -> RandomScene:
+    """The scene of a number: some of the bodies anywhere, the first of them in a place that is hard
+    for an engine.
     """
     rng = np.random.default_rng((seed, 1, number))
     while _is_unclear(scene := _draw_scene(rng, kinds, grid), kinds):
@@ -54,24 +67,59 @@ def draw_scene(seed: int, number: int, kinds: tuple[BodyKind, ...], grid: Angula
     return scene
 
 
-def _draw_scene(rng: np.random.Generator, kinds: tuple[BodyKind, ...], grid: AngularGrid) -> Scene:
+def _draw_kind(rng: np.random.Generator) -> BodyKind:
+    """A body of the catalogue, one of another size, or a single primitive."""
+    return [_catalogued, _resized, _primitive][rng.integers(3)](rng)
+
+
+def _catalogued(rng: np.random.Generator) -> BodyKind:
+    return CATALOGUE[rng.choice(sorted(CATALOGUE))]
+
+
+def _resized(rng: np.random.Generator) -> BodyKind:
+    label = CLASSES[rng.integers(len(CLASSES))]
+    x, y, z = (np.array(CATALOGUE[label].size) * rng.uniform(*_STRETCH, 3)).tolist()
+    return sized(label, label, (x, y, z))
+
+
+def _primitive(rng: np.random.Generator) -> BodyKind:
+    x, y, z = np.exp(rng.uniform(np.log(_SMALLEST_M), np.log(_LARGEST_M), 3)).tolist()
+    centre = tuple(rng.uniform(-1.0, 1.0, 3).tolist())
+    part = [
+        Part("box", (x, y, z), centre, _GREY),
+        Part("cylinder", (x, x, z), centre, _GREY),
+        Part("sphere", (x, x, x), centre, _GREY),
+    ][rng.integers(3)]
+    return BodyKind(part.shape, None, part.size, (part,))
+
+
+def _draw_scene(
+    rng: np.random.Generator, kinds: tuple[BodyKind, ...], grid: AngularGrid
+) -> RandomScene:
+    # In half of the scenes the sensor leans, by up to 11 degrees; in half the bodies are tilted, by
+    # up to 86.
     lean = 0.2 if rng.random() < 0.5 else 0.0
     sensor = Frame(*_place(rng), float(rng.uniform(0.3, 6.0)), *_turn(rng, lean))
-    tilt, used = 1.5 if rng.random() < 0.5 else 0.0, int(rng.integers(1, BODIES + 1))
+    tilt = 1.5 if rng.random() < 0.5 else 0.0
+    used = int(rng.integers(1, _BODIES + 1))
     frames = [_stand(rng, tilt) for _ in range(used)]
-    situation = SITUATIONS[rng.integers(len(SITUATIONS))]
+
+    # The first body goes where engines are most likely to differ.
+    situation = _SITUATIONS[rng.integers(len(_SITUATIONS))]
     here, there = situation(rng, kinds[0].parts[0], grid)
     frames[0] = _put(frames[0], here, sensor.origin + sensor.vectors_to_world(there))
-    everything = (*frames, *[AWAY] * (BODIES - used))
-    return Scene(everything, sensor, _aim(rng, kinds[:used], frames, sensor, grid))
+
+    cells = _aim(rng, kinds[:used], frames, sensor, grid)
+    return RandomScene((*frames, *[AWAY] * (_BODIES - used)), sensor, cells)
 
 
-def _is_unclear(scene: Scene, kinds: tuple[BodyKind, ...]) -> bool:
+def _is_unclear(scene: RandomScene, kinds: tuple[BodyKind, ...]) -> bool:
+    """Whether rays start where Bullet's answer means nothing."""
     for kind, frame in zip(kinds, scene.frames, strict=True):
         sensor = frame.vectors_to_local(scene.sensor.origin - frame.origin)
         for part in kind.parts:
             outside = _outside(part, sensor - part.centre)
-            if outside <= UNCLEAR_M and (part.shape == "sphere" or outside >= -UNCLEAR_M):
+            if outside <= _UNCLEAR_M and (part.shape == "sphere" or outside >= -_UNCLEAR_M):
                 return True
     return False
 
@@ -106,7 +154,7 @@ def _put(frame: Frame, here: Floats, world: Floats) -> Frame:
     return Frame(x, y, z, frame.yaw, frame.roll, frame.pitch)
 
 
-Situation = Callable[[np.random.Generator, Part, AngularGrid], tuple[Floats, Floats]]
+_Situation = Callable[[np.random.Generator, Part, AngularGrid], tuple[Floats, Floats]]
 """A point of a body's frame, and where it shall be in the sensor's."""
 
 
@@ -120,7 +168,7 @@ def _overhead(rng: np.random.Generator, part: Part, grid: AngularGrid) -> tuple[
 
 
 def _behind(rng: np.random.Generator, part: Part, grid: AngularGrid) -> tuple[Floats, Floats]:
-    """On the seam between the first and the last column."""
+    """Behind the sensor, on the seam between the first and the last column."""
     reach = max(part.size) + rng.uniform(0.0, 20.0)
     return np.array(part.centre), np.array([-reach, rng.uniform(-0.5, 0.5), rng.uniform(-3.0, 3.0)])
 
@@ -139,7 +187,7 @@ def _inside(rng: np.random.Generator, part: Part, grid: AngularGrid) -> tuple[Fl
     return _within(rng, part, 1.0), np.zeros(3)
 
 
-SITUATIONS: tuple[Situation, ...] = (
+_SITUATIONS: tuple[_Situation, ...] = (
     _anywhere,
     _overhead,
     _behind,
@@ -150,12 +198,15 @@ SITUATIONS: tuple[Situation, ...] = (
 
 
 def _within(rng: np.random.Generator, part: Part, share: float) -> Floats:
+    """A point of the box around a part, which is enlarged by the factor `share`."""
     return np.array(part.centre) + share * np.array(part.size) / 2 * rng.uniform(-1.0, 1.0, 3)
 
 
 def _surface(rng: np.random.Generator, part: Part, gap: float) -> Floats:
     """A point `gap` metres outside a face of the box around a part."""
-    point, axis, side = _within(rng, part, 1.0), rng.integers(3), rng.choice((-1.0, 1.0))
+    point = _within(rng, part, 1.0)
+    axis = rng.integers(3)
+    side = rng.choice((-1.0, 1.0))
     point[axis] = part.centre[axis] + side * (part.size[axis] / 2 + gap)
     return point
 
@@ -167,13 +218,13 @@ def _aim(
     sensor: Frame,
     grid: AngularGrid,
 ) -> Cells:
-    """Ascending cells."""
+    """Ascending cells: those of points in and around the bodies, and some anywhere."""
     points = []
-    for body in rng.integers(len(kinds), size=AIMED):
+    for body in rng.integers(len(kinds), size=_AIMED):
         part = kinds[body].parts[rng.integers(len(kinds[body].parts))]
         points.append(
-            frames[body].origin + frames[body].vectors_to_world(_within(rng, part, AROUND))
+            frames[body].origin + frames[body].vectors_to_world(_within(rng, part, _AROUND))
         )
     cells = grid.cells_of(sensor.vectors_to_local(np.array(points) - sensor.origin))
-    stray = rng.integers(grid.size, size=STRAY)
+    stray = rng.integers(grid.size, size=_STRAY)
     return np.unique(np.concatenate([cells[cells >= 0], stray]))

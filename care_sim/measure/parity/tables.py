@@ -6,14 +6,13 @@ from typing import Any
 from care_sim.measure.parity.verdicts import VERDICTS
 from care_sim.reports.table import Table
 
-COLUMNS = ("against", "rays", "other body", "over 1 mm off", *VERDICTS[1:], "widest gap, m")
-NOTES = (
-    "of rays 1 um aside, grazing: `fast` gives some the other's answer; lost: the other gives some "
-    "that of `fast`;"
-    " tolerance: Bullet in millimetres sides with `fast`; widest gap: between ranges to the same "
-    "body",
+_COLUMNS = ("against", "rays", "other body", "over 1 mm off", *VERDICTS[1:], "widest gap, m")
+_NOTES = (
+    "grazing: `fast` answers some rays 1 um aside as the other did; lost: the other answers some "
+    "of them as `fast` did; tolerance: Bullet in millimetres sides with `fast`; widest gap: "
+    "between ranges to the same body",
 )
-PICTURES = {
+_PICTURE_COUNTS = {
     "pictures": "pictures",
     "pixels": "pixels that show a body",
     "other_pixels": "another body",
@@ -25,11 +24,12 @@ PICTURES = {
 
 
 def parity_tables(report: dict[str, Any]) -> list[Table]:
-    """One for random scenes and for each scenario, the notes below the last of them, one of the
-    pictures and one of the outcomes.
+    """One table for random scenes and for each scenario, one of the pictures and one of the
+    outcomes; what was not compared has none.
     """
+    # The notes stand below the last table of scans, once for all of them.
     made = [_table(title, figures) for title, figures in report["scans"].items()]
-    scans = [*made[:-1], *(replace(last, notes=NOTES) for last in made[-1:])]
+    scans = [*made[:-1], *(replace(last, notes=_NOTES) for last in made[-1:])]
     seen = [_pictures(report["pictures"])] if report["pictures"] else []
     return [
         *scans,
@@ -40,10 +40,13 @@ def parity_tables(report: dict[str, Any]) -> list[Table]:
 
 def _pictures(pictures: dict[str, Any]) -> Table:
     rows = (
-        (name, *(f"{figures[key]:.0f}" for key in PICTURES)) for name, figures in pictures.items()
+        (name, *(f"{figures[key]:.0f}" for key in _PICTURE_COUNTS))
+        for name, figures in pictures.items()
     )
     return Table(
-        "Pictures of the camera against Bullet", ("scenario", *PICTURES.values()), tuple(rows)
+        "Pictures of the camera against Bullet",
+        ("scenario", *_PICTURE_COUNTS.values()),
+        tuple(rows),
     )
 
 
@@ -55,7 +58,7 @@ def _table(title: str, figures: dict[str, Any]) -> Table:
             (reference,),
             *(_row(group, counts) for group, counts in met.items() if counts["rays"]),
         ]
-    return Table(f"{title}: {figures['scans']} scans", COLUMNS, tuple(rows))
+    return Table(f"{title}: {figures['scans']} scans", _COLUMNS, tuple(rows))
 
 
 def _row(group: str, counts: dict[str, float]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Rays that two engines answer otherwise, and why."""
+"""Rays to which two engines give different answers, and why."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,21 @@ from care_sim.measure.parity.answers import Answers, aside, same
 from care_sim.sensors.engines import RayEngine
 
 VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
-"""Grazing: of rays a micrometre aside `fast` gives some the reference's answer, some its own. Lost:
-it does not, but the reference gives some the answer of `fast`. Tolerance: not grazing, but Bullet
-in millimetres sides with `fast`.
+"""Why `fast` differs from a reference, which is Bullet in metres or in millimetres.
+
+Grazing: of rays a micrometre aside, `fast` answers some as the reference did and some as itself.
+Lost: not grazing, but the reference answers some rays aside as `fast` did.
+Tolerance: not grazing, but Bullet in millimetres sides with `fast`.
+Unexplained: none of these.
 """
 SAME, GRAZING, LOST, TOLERANCE, UNEXPLAINED = range(5)
 
 
 @dataclass(frozen=True)
 class Engines:
-    """The engine in question, the reference, and the reference asked in millimetres."""
+    """The engine in question, the reference, and the reference asked in millimetres, over the same
+    bodies.
+    """
 
     fast: RayEngine
     bullet: RayEngine
@@ -27,7 +32,7 @@ class Engines:
 
 
 @dataclass(frozen=True)
-class Compared:
+class JudgedRays:
     """Answers to the same rays, and for either reference the verdict (n,) on each ray."""
 
     fast: Answers
@@ -37,11 +42,13 @@ class Compared:
     on_exact: Integers
 
 
-def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
+def compare(engines: Engines, sensor: Frame, cells: Cells) -> JudgedRays:
     """Cast ascending `cells` with all engines and judge every difference."""
     fast, bullet, exact = (
         engine.cast(sensor, cells) for engine in (engines.fast, engines.bullet, engines.exact)
     )
+
+    # First against Bullet in millimetres, since the second verdict makes use of the first.
     on_exact = np.full(len(cells), SAME)
     on_bullet = np.full(len(cells), SAME)
     for n in np.flatnonzero(~same(fast, exact)).tolist():
@@ -52,10 +59,11 @@ def compare(engines: Engines, sensor: Frame, cells: Cells) -> Compared:
         verdict = _judge(
             engines.fast, engines.bullet, sensor, cells[n], _only(fast, n), _only(bullet, n)
         )
+        # Bullet in metres is at fault where Bullet in millimetres answers as `fast` does.
         on_bullet[n] = (
             TOLERANCE if verdict != GRAZING and on_exact[n] in (SAME, GRAZING) else verdict
         )
-    return Compared(fast, bullet, exact, on_bullet, on_exact)
+    return JudgedRays(fast, bullet, exact, on_bullet, on_exact)
 
 
 def _judge(

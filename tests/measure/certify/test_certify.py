@@ -14,24 +14,35 @@ from care_sim.core.conditions import CameraFaults, LidarFaults
 from care_sim.core.types import Scan
 from care_sim.driving.braking import BrakingController
 from care_sim.envs import sensing
-from care_sim.measure.certify import design, needs, published, run
-from care_sim.measure.certify.config import EPISODES, CertifyConfig
+from care_sim.measure.certify import design, playing, published, run
 from care_sim.measure.certify.design import (
+    CERTIFIED_FAULTS,
+    CERTIFIED_POLICIES,
+    CERTIFIED_SETTINGS,
     CLOSED,
-    FAULTS,
     MODES,
-    POLICIES,
     REPLAY,
-    SETTINGS,
     STREET,
     drawn,
     modes,
 )
 from care_sim.measure.certify.drive import write_drive
-from care_sim.measure.certify.modes import in_turns, play
-from care_sim.measure.certify.needs import FARTHEST, playable_here
-from care_sim.measure.certify.playing import batches, trails_of
-from care_sim.measure.certify.trail import CONFIGURATION, DIGEST_BYTES, OUTCOME, STAGES, stage
+from care_sim.measure.certify.modes import in_turns, play_in_mode
+from care_sim.measure.certify.playing import (
+    FARTHEST,
+    attempt,
+    episode_batches,
+    playable_here,
+    trails_of,
+)
+from care_sim.measure.certify.run import CERTIFIED_EPISODES, CertifyConfig
+from care_sim.measure.certify.trail import (
+    CONFIGURATION,
+    DIGEST_BYTES,
+    OUTCOME,
+    TRAIL_STAGES,
+    first_difference,
+)
 from care_sim.measure.certify.verdict import verdict_of
 from care_sim.perception.tracker import TrackMemory
 from care_sim.policies import BUILT_IN
@@ -61,15 +72,23 @@ def alone(episode, source=""):
 
 def test_a_thousand_episodes_hold_every_pair_that_can_meet():
     met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
-    assert {(e, p) for e, p, _, _ in met} == set(product({*CLOSED, STREET, REPLAY}, POLICIES))
+    assert {(e, p) for e, p, _, _ in met} == set(
+        product({*CLOSED, STREET, REPLAY}, CERTIFIED_POLICIES)
+    )
     possible = {
-        (e, m) for e, p in product({*CLOSED, STREET, REPLAY}, POLICIES) for m in modes(e, p)
+        (e, m)
+        for e, p in product({*CLOSED, STREET, REPLAY}, CERTIFIED_POLICIES)
+        for m in modes(e, p)
     }
     assert {(e, m) for e, _, m, _ in met} == possible
-    names = {name for one in (*FAULTS.values(), *SETTINGS.values()) for name in one}
-    assert {(p, n) for _, p, _, given in met for n in given} >= set(product(POLICIES, names))
+    names = {
+        name for one in (*CERTIFIED_FAULTS.values(), *CERTIFIED_SETTINGS.values()) for name in one
+    }
+    assert {(p, n) for _, p, _, given in met for n in given} >= set(
+        product(CERTIFIED_POLICIES, names)
+    )
     assert {(m, n) for _, _, m, given in met for n in given} >= set(product(MODES, names))
-    faults = {name for one in FAULTS.values() for name in one}
+    faults = {name for one in CERTIFIED_FAULTS.values() for name in one}
     together = {pair for _, _, _, given in met for pair in combinations(sorted(given), 2)}
     assert together >= set(combinations(sorted(faults), 2))
 
@@ -78,12 +97,12 @@ def test_every_fault_of_the_conditions_is_in_the_list():
     faults = {field.name for kind in (CameraFaults, LidarFaults) for field in fields(kind)} | {
         "ego_speed_sigma"
     }
-    assert {name for one in FAULTS.values() for name in one} == faults
+    assert {name for one in CERTIFIED_FAULTS.values() for name in one} == faults
 
 
 def test_every_built_in_policy_is_in_the_list():
-    """One that is missing is added at the end of POLICIES, and the list is published anew."""
-    assert [name for name in BUILT_IN if name not in POLICIES] == []
+    """One that is missing is added at the end, and the list is published anew."""
+    assert [name for name in BUILT_IN if name not in CERTIFIED_POLICIES] == []
 
 
 def test_an_episode_of_the_list_does_not_move():
@@ -94,23 +113,27 @@ def test_an_episode_of_the_list_does_not_move():
 def test_no_mode_changes_a_trail(source):
     closed = of([e for e in LIST if e.environment in CLOSED and e.mode == "async"], 4)
     trails = [alone(episode) for episode in closed]
-    assert {mode: play(mode, closed, source) for mode in MODES} == dict.fromkeys(MODES, trails)
+    assert {mode: play_in_mode(mode, closed, source) for mode in MODES} == dict.fromkeys(
+        MODES, trails
+    )
 
 
 def test_recordings_and_privileged_policies_play_in_vectors_too(source):
     recorded = of([e for e in LIST if e.environment == REPLAY and e.mode == "subprocess"], 2)
     trails = [alone(episode, source) for episode in recorded]
-    assert play("async", recorded, source) == play("sync", recorded, source) == trails
+    assert (
+        play_in_mode("async", recorded, source) == play_in_mode("sync", recorded, source) == trails
+    )
     beyond = replace(recorded[0], policy="history-oracle", keyframes=40)
-    assert play("sync", [beyond], source) == [alone(beyond, source)]
+    assert play_in_mode("sync", [beyond], source) == [alone(beyond, source)]
     privileged = of(
         [e for e in LIST if e.policy == "history-oracle" and e.environment in CLOSED], 3
     )
-    assert play("sync", privileged, source) == [alone(episode) for episode in privileged]
+    assert play_in_mode("sync", privileged, source) == [alone(episode) for episode in privileged]
 
 
 def test_batches_hold_every_episode_once_and_a_street_together():
-    made = batches(LIST)
+    made = episode_batches(LIST)
     assert sorted(episode.number for batch in made for episode in batch) == list(range(1000))
     streets = [{e.seed for e in batch} for batch in made if batch[0].environment == STREET]
     assert all(len(seeds) == 1 for seeds in streets)
@@ -120,8 +143,6 @@ def test_batches_hold_every_episode_once_and_a_street_together():
 def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch):
     good, bad = of([e for e in LIST if e.environment in CLOSED], 2)
     broken = replace(bad, policy="nobody")
-    from care_sim.measure.certify.playing import attempt
-
     found = attempt([replace(good, mode="sync"), replace(broken, mode="sync")], source)
     assert found[good.number] == alone(good)
     assert "nobody" in found[bad.number]
@@ -137,7 +158,7 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     able, lines = playable_here(LIST)
     assert (able, lines) == (LIST, [])
     monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr(needs, "find_spec", lambda name: None if name == module else name)
+    monkeypatch.setattr(playing, "find_spec", lambda name: None if name == module else name)
     able, (line,) = playable_here(LIST)
     missing = len(LIST) - len(able)
     assert line.startswith(f"{missing} of 1,000 not played: ")
@@ -162,7 +183,7 @@ def test_what_is_said_to_need_no_extra_plays_without(monkeypatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
     closed = [episode for episode in playable_here(LIST)[0] if episode.environment in CLOSED]
     policies = {episode.policy: replace(episode, keyframes=2) for episode in closed}
-    assert set(POLICIES) - set(policies) == {FARTHEST}
+    assert set(CERTIFIED_POLICIES) - set(policies) == {FARTHEST}
     for episode in policies.values():
         alone(episode)
 
@@ -261,19 +282,19 @@ def another_outcome(monkeypatch):
 @pytest.mark.parametrize(
     ("broken", "where"),
     [
-        (moved_by_a_millimetre, (STAGES[0], 2)),
-        (one_box_a_pixel_wider, (STAGES[1], 2)),
-        (a_track_that_has_moved, (STAGES[2], 2)),
-        (another_cell, (STAGES[3], 2)),
-        (one_range_a_centimetre_longer, (STAGES[4], 2)),
-        (a_brake_that_is_said_to_be_on, (STAGES[5], 2)),
+        (moved_by_a_millimetre, (TRAIL_STAGES[0], 2)),
+        (one_box_a_pixel_wider, (TRAIL_STAGES[1], 2)),
+        (a_track_that_has_moved, (TRAIL_STAGES[2], 2)),
+        (another_cell, (TRAIL_STAGES[3], 2)),
+        (one_range_a_centimetre_longer, (TRAIL_STAGES[4], 2)),
+        (a_brake_that_is_said_to_be_on, (TRAIL_STAGES[5], 2)),
         (another_outcome, (OUTCOME, None)),
     ],
 )
 def test_what_is_broken_is_named(broken, where, monkeypatch):
     sound = alone(MADE)
     broken(monkeypatch)
-    assert stage(sound, alone(MADE)) == where
+    assert first_difference(sound, alone(MADE)) == where
 
 
 def test_what_is_broken_in_a_recording_is_named(source, monkeypatch):
@@ -287,11 +308,11 @@ def test_what_is_broken_in_a_recording_is_named(source, monkeypatch):
         return replace(returned, points=returned.points * (1 + 0.001 * (len(calls) == 3)))
 
     monkeypatch.setattr(RecordedLidar, "fire", longer)
-    assert stage(sound, alone(recorded, source)) == (STAGES[4], 2)
+    assert first_difference(sound, alone(recorded, source)) == (TRAIL_STAGES[4], 2)
 
 
 def test_another_configuration_is_named():
-    assert stage(alone(MADE), alone(replace(MADE, seed=4))) == (CONFIGURATION, None)
+    assert first_difference(alone(MADE), alone(replace(MADE, seed=4))) == (CONFIGURATION, None)
 
 
 def test_the_first_that_differs_is_told_with_a_command(capsys):
@@ -361,8 +382,6 @@ def test_an_episode_of_a_street_goes_as_published():
 
 
 def test_the_readme_tells_the_hash_of_the_list():
-    readme = ROOT / "README.md"
-    assert (
-        f"{EPISODES:,} episodes: {published.combined(published.read()[:EPISODES])}"
-        in readme.read_text()
-    )
+    readme = (ROOT / "README.md").read_text()
+    told = published.combined(published.read()[:CERTIFIED_EPISODES])
+    assert f"{CERTIFIED_EPISODES:,} episodes: {told}" in readme

@@ -10,7 +10,7 @@ import pytest
 from care_sim.measure.certify.design import STREET, drawn
 from care_sim.measure.certify.drive import write_drive
 from care_sim.measure.certify.modes import in_turns
-from care_sim.measure.certify.trail import stage
+from care_sim.measure.certify.trail import first_difference
 from tests.helpers.places import ROOT
 from tests.helpers.processor_features import reduced
 
@@ -49,6 +49,8 @@ def test_a_processor_of_fewer_features_plays_most_episodes_as_this_one(tmp_path)
     }
     ours = played(tmp_path / "here")
     apart = {
-        n: (drawn(n).text, *stage(ours[n], theirs[n])) for n in NUMBERS if ours[n] != theirs[n]
+        n: (drawn(n).text, *first_difference(ours[n], theirs[n]))
+        for n in NUMBERS
+        if ours[n] != theirs[n]
     }
     assert len(apart) <= (1 - ALIKE) * len(NUMBERS), apart

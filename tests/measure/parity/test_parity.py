@@ -10,12 +10,11 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.measure.parity import outcomes as parity_outcomes
 from care_sim.measure.parity.answers import Millimetres, aside
-from care_sim.measure.parity.keyframes import Compared, compare_episode
+from care_sim.measure.parity.keyframes import KeyframeAgreement, PictureAgreement, compare_episode
 from care_sim.measure.parity.outcomes import Outcomes
-from care_sim.measure.parity.pictures import Pictures
 from care_sim.measure.parity.run import agree, unexplained
-from care_sim.measure.parity.scenes import GRIDS, draw_bodies, draw_scene
-from care_sim.measure.parity.tally import GROUPS, AgreementCounts, groups
+from care_sim.measure.parity.scenes import SCENE_GRIDS, draw_bodies, draw_scene
+from care_sim.measure.parity.tally import GROUPS, AgreementCounts, ray_groups
 from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
 from care_sim.scenarios import SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
@@ -82,7 +81,7 @@ def test_a_ray_grazes_within_a_micrometre_of_an_edge(bullet, above, grazes):
 def test_rays_count_where_they_end(street):
     compared, tally = compare(street, SENSOR, CELLS), AgreementCounts()
     frames = [Frame(20.0, 0.0, 0.0, 0.0)]
-    tally.add(compared, groups([CATALOGUE["bus"]], frames), {"scene": 3})
+    tally.add(compared, ray_groups([CATALOGUE["bus"]], frames), {"scene": 3})
     counts = tally.figures()["references"]["Bullet in millimetres"]
     assert (
         counts["boxes, upright"]["rays"]
@@ -96,7 +95,7 @@ def test_rays_count_where_they_end(street):
 def test_a_difference_is_listed_with_its_scene(street):
     tally = AgreementCounts()
     askew = compare(replace(street, fast=Askew(street.fast)), SENSOR, np.array([6 * 180 + 90]))
-    tally.add(askew, groups([CATALOGUE["bus"]], [Frame(20.0, 0.0, 0.0, 0.0)]), {"scene": 3})
+    tally.add(askew, ray_groups([CATALOGUE["bus"]], [Frame(20.0, 0.0, 0.0, 0.0)]), {"scene": 3})
     (line,) = tally.listed
     assert (line["scene"], line["ray"], line["meets"], line["on_exact"]) == (
         3,
@@ -111,21 +110,21 @@ def test_a_difference_is_listed_with_its_scene(street):
 def test_bodies_are_grouped_by_shape_and_stance():
     kinds = [CATALOGUE["bus"], CATALOGUE["pedestrian"]]
     upright, tilted = Frame(0.0, 0.0, 0.0, 1.0), Frame(0.0, 0.0, 0.0, 1.0, 0.0, 0.1)
-    named = [GROUPS[place] for place in groups(kinds, [tilted, upright])]
+    named = [GROUPS[place] for place in ray_groups(kinds, [tilted, upright])]
     assert named == ["road or nothing", "road or nothing", "boxes, tilted", "both, upright"]
 
 
 def test_a_scene_is_drawn_again_from_its_number():
     kinds = draw_bodies(3, 0)
-    one, other = (draw_scene(3, 17, draw_bodies(3, 0), GRIDS[0]) for _ in range(2))
+    one, other = (draw_scene(3, 17, draw_bodies(3, 0), SCENE_GRIDS[0]) for _ in range(2))
     assert one.frames == other.frames
     assert one.sensor == other.sensor
     assert one.cells.tolist() == other.cells.tolist() == sorted(set(one.cells.tolist()))
-    assert one.frames != draw_scene(3, 18, kinds, GRIDS[0]).frames
+    assert one.frames != draw_scene(3, 18, kinds, SCENE_GRIDS[0]).frames
 
 
 def test_every_keyframe_of_an_episode_is_scanned_in_full():
-    compared = Compared()
+    compared = KeyframeAgreement()
     compare_episode(
         EpisodeConfig("dense", "care", 0.1, 0, scenario_parameters=(("duration_s", 0.2),)), compared
     )
@@ -171,7 +170,7 @@ class Shifted:
 def test_pictures_that_agree_and_that_do_not(bullet):
     body = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
     fast, reference = ENGINES["fast"](bullet, GRID), ENGINES["bullet"](bullet, GRID)
-    seen = Pictures()
+    seen = PictureAgreement()
     seen.compare(fast, reference, [FRONT_CAMERA, PinholeCamera(100, 80)], SENSOR)
     assert body == 1
     counts = {
@@ -203,7 +202,7 @@ def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
 
 
 def test_an_episode_that_goes_otherwise_is_named(monkeypatch):
-    monkeypatch.setattr(parity_outcomes, "COMPARED", ("fast", "nearsighted"))
+    monkeypatch.setattr(parity_outcomes, "_ENGINES", ("fast", "nearsighted"))
     monkeypatch.setitem(
         ENGINES, "nearsighted", lambda world, grid: Nearsighted(ENGINES["bullet"](world, grid))
     )
