@@ -19,7 +19,8 @@ SHIFT = (5**0.5 - 1) / 2
 made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
 """
 
-_INFINITE, _NONE = 2**62, 2**62 + 1
+_INFINITE = 2**62
+_NONE = 2**62 + 1
 _LARGEST = 2.0**61
 
 Content = str | ArrayLike

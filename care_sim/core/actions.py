@@ -18,6 +18,7 @@ NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN = range(len(SHARES))
 def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
     """The action (E, A) that makes `fired_cells` choose `cells` (n,); the earlier, the higher."""
     scores = np.zeros(shape[0] * shape[1], np.float32)
+    # From 1 down in equal steps, all above 0: the cells are fired in this order, and no others.
     scores[cells] = np.arange(len(cells), 0, -1, dtype=np.float32) / max(len(cells), 1)
     return scores.reshape(shape)
 
@@ -33,6 +34,7 @@ def fired_cells(
     flat = scores.ravel().astype(np.float32, copy=False)
     chosen = np.flatnonzero(flat > 0)
     if len(chosen) > budget:
+        # Negated, a stable ascending sort puts the highest first and leaves ties in their order.
         chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]
     elif floor is not None and len(chosen) < budget:
         # So much of the floor is enough: at most len(chosen) of these cells are taken.
@@ -42,7 +44,7 @@ def fired_cells(
 
 
 def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> NDArray[np.uint8]:
-    """(E, A) the share of the budget that each of the cells `fired` came from, an index into
+    """(E, A) the share of the budget that each of the `fired` cells came from, an index into
     `SHARES`.
 
     `demand` is what the policy asked for. If it is None, or not the one behind the `action`, what
@@ -50,8 +52,12 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
     """
     shares = np.zeros(rig.grid.size, np.uint8)
     shares[fired] = FLOOR
+
+    # A cell without a score of its own can only have come from the floor.
     scored = fired[np.asarray(action).ravel()[fired] > 0]
     shares[scored] = CHOSEN
+
+    # Played again, the demand gives the same cells only if it is the one behind the action.
     if demand is not None:
         taken = allocate(demand, rig.budget, rig.reserve_fraction)
         if np.array_equal(np.sort(taken), scored):

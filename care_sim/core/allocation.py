@@ -46,7 +46,7 @@ def allocate(
     reserve_fraction: float,
     floor: Sequence[int] | Cells | None = None,
 ) -> Cells:
-    """Choose at most `budget` cells, in order of selection (Algorithm 1).
+    """Choose at most `budget` cells (n,), in order of selection (Algorithm 1).
 
     Exploitation sets fill at most round((1 - rho) B) cells, round-robin. Then each reserve layer in
     order fills up to B, round-robin. Then `floor`, a permutation of all cells, fills up to B; None
@@ -78,6 +78,8 @@ class RandomFloor:
     """
 
     def __init__(self, seed: np.random.SeedSequence, number: int, cells: int):
+        # What `seed.spawn` would give its child `number - 1`, without spawning those before it and
+        # without moving the seed's own count of children.
         children = (number - 1,) if number else ()
         own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
         self._rng = np.random.default_rng(own)
@@ -98,10 +100,14 @@ def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
 
 def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     """Stage after stage, round-robin over its sets, up to its limit in all."""
+    # The sets of all stages lie in one array. Compiled code takes it at once, where a list of
+    # arrays would be converted one by one at every call.
     sets = [cell_indices(cells) for stage in stages for cells in stage]
     cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
     ends = np.array([*accumulate(map(len, sets))], np.int64)
     lowest, highest, ascending = _survey(cells, ends)
+
+    # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
@@ -119,6 +125,7 @@ def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
         if len(free) >= count:
             break
         if cell not in taken:
+            # Noted as well: a floor that names a cell twice fires it once.
             taken.add(cell)
             free.append(cell)
     return np.array(free, np.int64)
@@ -148,6 +155,7 @@ def _survey(cells: Cells, ends: Cells) -> tuple[int, int, bool]:
 
     Sets lie one after the other in `cells`; set s ends at `ends[s]`.
     """
+    # One pass over all cells. Policies hand in ascending sets; only others pay for a sort.
     lowest = highest = start = 0
     ascending = True
     for end in ends:
@@ -170,7 +178,8 @@ def _fill_stages(
     """
     # A set offers its cells from its own start, which is where the set before it ends.
     places = np.empty(len(ends), np.int64)
-    places[:1], places[1:] = 0, ends[:-1]
+    places[:1] = 0
+    places[1:] = ends[:-1]
     sets = _Sets(cells, places, ends)
 
     # Negative indices are refused later by whoever knows the grid. The table of what is taken must
@@ -179,6 +188,7 @@ def _fill_stages(
     chosen = np.empty(max(0, min(limits.max(), len(cells))), np.int64)
     selection = _Selection(chosen, taken, lowest)
 
+    # A stage goes on where the one before it stopped, with the same cells taken.
     count = first = 0
     for stage, last in enumerate(last_sets):
         count = _round_robin(sets, np.arange(first, last), selection, count, limits[stage])
@@ -193,6 +203,8 @@ def _round_robin(sets: _Sets, waiting: Cells, selection: _Selection, count: int,
     `waiting` are the numbers of the sets; `count` cells are chosen before. Returns how many are
     chosen afterwards.
     """
+    # The first `left` of `waiting` are the sets that still have cells. Each pass of the loop is one
+    # round: one cell of every such set, in their order.
     left = len(waiting)
     while left and count < limit:
         going = 0

@@ -123,8 +123,12 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
     rows: Floats = table[first >= 0].astype(np.float64)
     if len(rows) and not (rows.min() >= -HIGHEST and rows.max() <= HIGHEST):
         raise _beyond(key)
+
+    # A row is padding or begins with 0 or more. What begins otherwise, with another number below 0
+    # or with NaN, is counted as neither.
     padding = int(np.count_nonzero(first == -1))
-    leads, labels = rows[:, 0].tolist(), rows[:, columns.index("class")].tolist()
+    leads = rows[:, 0].tolist()
+    labels = rows[:, columns.index("class")].tolist()
     if (
         padding + len(rows) != len(table)
         or not _LABELS.issuperset(labels)

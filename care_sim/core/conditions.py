@@ -63,7 +63,8 @@ class CameraFaults:
     def black_at(self, time_s: float) -> bool:
         """Whether a picture taken at `time_s` is black."""
         # Times are sums of steps: a keyframe on the edge of the blackout may miss it by a last bit.
-        begin, end = self.blackout_start_s - 1e-9, self.blackout_start_s + self.blackout_s - 1e-9
+        begin = self.blackout_start_s - 1e-9
+        end = self.blackout_start_s + self.blackout_s - 1e-9
         return begin <= time_s < end
 
 
@@ -88,6 +89,7 @@ class LidarFaults:
             raise InvalidInput(f"lidar_dead_rows must be a list of rows, got {shown(rows)}")
         for row in rows:
             check_whole("lidar_dead_rows", row, 0, MOST_ROWS)
+        # Conditions that mean the same must be equal: they are part of what identifies an episode.
         object.__setattr__(self, "lidar_dead_rows", tuple(sorted({int(row) for row in rows})))
 
 

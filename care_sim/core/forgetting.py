@@ -73,6 +73,9 @@ class Forgetting:
             track: self._streaks.get(track, 0) + 1 if is_low else 0
             for track, is_low in zip(ids, low.tolist(), strict=True)
         }
+
+        # The margin shrinks with the streak, but never below what the uncertainty of the position
+        # needs (Eq. 4), and never beyond that of a full hull.
         streaks = np.array([self._streaks[track] for track in ids], dtype=float)
         margin = self._rig.azimuth_margin
         decayed = np.ceil(margin - self.rules.decay_per_keyframe * streaks)
@@ -93,5 +96,6 @@ class Forgetting:
 
     def _uncertainty(self, ranges: Floats) -> Floats:
         """m_unc of Eq. 4, in columns."""
+        # The angle of a short arc is its length over its range, which must not be 0.
         angle = self.rules.position_sigma_m / np.maximum(ranges, 1e-9)
         return np.ceil(angle / self._rig.grid.column_width)

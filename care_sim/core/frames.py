@@ -17,10 +17,12 @@ Pose = tuple[float, float, float]
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
     """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z: one angle, or one each."""
+    # Written out: a matrix product may round differently from one processor to the next.
     cos, sin = np.cos(yaw), np.sin(yaw)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
-    result[..., 0], result[..., 1] = cos * x - sin * y, sin * x + cos * y
+    result[..., 0] = cos * x - sin * y
+    result[..., 1] = sin * x + cos * y
     return result
 
 
@@ -67,12 +69,14 @@ class Frame:
     @classmethod
     def turned_by(cls, rotation: Rotation, origin: Floats) -> "Frame":
         """The frame at `origin` (3,) whose axes are those of the world after `rotation`."""
+        # The part of the frame's x axis that points down is the sine of its pitch.
         i, j, k, w = rotation.as_quat().tolist()
         lowers = 2 * (w * j - i * k)
         if abs(lowers) > _LOCKED:
             # The angles of such a rotation are not unique: with roll 0, yaw is where left points.
             left = rotation.as_matrix()[:, 1].tolist()
-            yaw, roll = math.atan2(-left[0], left[1]), 0.0
+            yaw = math.atan2(-left[0], left[1])
+            roll = 0.0
             pitch = math.copysign(math.pi / 2, lowers)
         else:
             yaw, pitch, roll = rotation.as_euler("ZYX").tolist()
@@ -137,6 +141,7 @@ def _centres_turned(boxes: Floats, yaw: float) -> Floats:
 
 def _boxes_turned(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:
     """Boxes of the same sizes at `centres` (n, 3), their headings turned by `turn`."""
+    # A box keeps one angle. Of its heading, turned in space, that is the direction in the plane.
     yaw = boxes[:, 6]
     heading = turn(np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))]))
     return np.column_stack([centres, boxes[:, 3:6], np.arctan2(heading[:, 1], heading[:, 0])])

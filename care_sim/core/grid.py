@@ -75,6 +75,8 @@ class AngularGrid:
         """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of
         every row (rows, 2).
         """
+        # A column is a sector, and its ray runs through the middle. A row is a ring: its elevation
+        # is that of the ray itself.
         azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
         elevations = np.linspace(self.top, self.bottom, self.rows)
         across, down = (
@@ -88,9 +90,10 @@ class AngularGrid:
         """(N, 3) unit vectors of the rays, one through the centre of every cell."""
         (cos_az, sin_az), (cos_el, sin_el) = (angles.T for angles in self.fan)
         level = np.broadcast_to(sin_el[:, None], self.shape)
-        forward, left = np.outer(cos_el, cos_az), np.outer(cos_el, sin_az)
+        forward = np.outer(cos_el, cos_az)
+        left = np.outer(cos_el, sin_az)
         directions = np.stack([forward, left, level], axis=-1).reshape(-1, 3)
-        # Whoever asks shares the table, and a write would change the grid of all.
+        # Whoever asks shares the table, and a write to it would change the grid for all.
         directions.flags.writeable = False
         return directions
 
@@ -100,9 +103,11 @@ class AngularGrid:
         Raises InvalidInput for a direction that holds NaN.
         """
         x, y, z = np.asarray(directions, dtype=float).reshape(-1, 3).T
-        azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        azimuth = np.arctan2(y, x)
+        elevation = np.arctan2(z, np.hypot(x, y))
         if np.isnan(azimuth).any() or np.isnan(elevation).any():
             raise InvalidInput("directions must be numbers, none of them NaN")
+        # The azimuth pi is -pi: it would fall in the column after the last, which is column 0.
         column = np.floor((azimuth + np.pi) / self.column_width).astype(np.int64)
         row = self._row(elevation)
         inside = (row >= 0) & (row < self.rows)
@@ -122,6 +127,8 @@ class AngularGrid:
         boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 7)
         if not len(boxes):
             return []
+        # Angles are taken by NumPy here and not in the kernel: its arctangent differs from that of
+        # compiled code in the last bits, and published cells were made with it.
         planar, upright, around = silhouettes(boxes)
         azimuths = np.arctan2(planar[..., 1], planar[..., 0])
         elevations = np.arctan2(upright[..., 0], upright[..., 1])
@@ -142,7 +149,8 @@ class AngularGrid:
         if not len(bundles):
             return []
         x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
-        azimuths, elevations = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        azimuths = np.arctan2(y, x)
+        elevations = np.arctan2(z, np.hypot(x, y))
         margins = np.full(len(bundles), azimuth_margin)
         return self._rectangles(azimuths, elevations, margins, elevation_margin)
 
@@ -160,7 +168,8 @@ class AngularGrid:
 
     @cached_property
     def _spacing(self) -> GridSpacing:
-        top, height = float(self.top), float(self.row_height)
+        top = float(self.top)
+        height = float(self.row_height)
         return GridSpacing(self.columns, self.rows, self.column_width, top, height)
 
 

@@ -32,16 +32,22 @@ def silhouettes(boxes: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     bottom and top, each with the distance in the x, y plane at which it appears lowest or highest.
     Then (n,) whether a box stands around the origin.
     """
-    planar, upright = np.empty((len(boxes), 5, 2)), np.empty((len(boxes), 2, 2))
+    planar = np.empty((len(boxes), 5, 2))
+    upright = np.empty((len(boxes), 2, 2))
     around = np.empty(len(boxes), np.bool_)
+
     for n, (x, y, z, length, width, height, yaw) in enumerate(boxes):
-        # How far the origin lies beyond the sides, in the axes of the box: the distance to the
-        # nearest point follows, 0 for an origin inside the footprint.
+        # How far the origin lies beyond the sides, in the axes of the box. Negative means between
+        # two sides and counts as 0. So the distance to the nearest point of the footprint follows,
+        # and it is 0 for an origin inside.
         cos, sin = math.cos(yaw), math.sin(yaw)
         beyond = abs(cos * x + sin * y) - length / 2, abs(sin * x - cos * y) - width / 2
-        near, far = math.hypot(max(beyond[0], 0.0), max(beyond[1], 0.0)), 0.0
+        near = math.hypot(max(beyond[0], 0.0), max(beyond[1], 0.0))
 
-        # Azimuths are extreme at corners; the farthest point is a corner, too.
+        # Seen from outside, a rectangle spans the directions between two of its corners. Its
+        # farthest point is a corner, too, since distance is a convex function. The centre goes
+        # first, as the direction that all are compared with.
+        far = 0.0
         planar[n, 0] = x, y
         for k, (front, left) in enumerate(((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))):
             along, across = front * length, left * width
@@ -72,8 +78,10 @@ def rectangle_cells(
     and the `elevations` (n, k), dilated by `azimuth_margins` (n,) columns and `elevation_margin`
     rows.
     """
-    # Bounds first, so that the table of cells is made once and of the right size.
-    bounds, ends = np.empty((len(azimuths), 4), np.int64), np.empty(len(azimuths), np.int64)
+    # Bounds first, so that the table of cells is made once and of the right size. A rectangle that
+    # misses the grid has no rows, and its cells end where they begin.
+    bounds = np.empty((len(azimuths), 4), np.int64)
+    ends = np.empty(len(azimuths), np.int64)
     size = 0
     for n in range(len(azimuths)):
         first, stop = bounds[n, 0], bounds[n, 1] = _columns(azimuths[n], azimuth_margins[n], grid)
@@ -81,6 +89,7 @@ def rectangle_cells(
         size += (stop - first) * (lower - upper)
         ends[n] = size
 
+    # Each rectangle is written where the one before it ended.
     cells = np.empty(size, np.int64)
     place = 0
     for bound in bounds:
@@ -92,10 +101,14 @@ def rectangle_cells(
 def _columns(azimuths: Floats, margin: int, grid: GridSpacing) -> tuple[int, int]:
     """First column, on the grid, and the one after the last, up to a turn beyond it."""
     # Offsets from the middle are within half a turn, so that the seam at -pi does not matter.
-    middle, right, left = azimuths[0], math.inf, -math.inf
+    middle = azimuths[0]
+    right, left = math.inf, -math.inf
     for azimuth in azimuths:
         offset = (azimuth - middle + math.pi) % (2 * math.pi) - math.pi
         right, left = min(right, offset), max(left, offset)
+
+    # Column c covers [-pi + c * width, -pi + (c + 1) * width), so both ends round down. With its
+    # margin a rectangle may be wider than a turn; no column counts twice.
     first = math.floor((middle + right + math.pi) / grid.column_width) - margin
     last = math.floor((middle + left + math.pi) / grid.column_width) + margin
     start = first % grid.columns
@@ -120,6 +133,7 @@ def _lay(cells: Integers, place: int, bounds: Integers, columns: int) -> int:
     """
     first, stop, upper, lower = bounds
     for row in range(upper, lower):
+        # What reaches beyond the last column goes on at column 0.
         for column in range(columns, stop):
             cells[place] = row * columns + column - columns
             place += 1

@@ -39,8 +39,13 @@ MAX_SIZE_M = 50.0
 MAX_TURN = 4 * np.pi
 
 _EGO = (MAX_SPEED_MPS, MAX_TURN, MAX_ACCELERATION_MPS2)
-_BOX, _YAW_CHANGE = slice(2, 6), 8
-_PLACE, _YAW, _VELOCITY = slice(2, 5), 8, slice(9, 11)
+_BOX = slice(2, 6)
+_YAW_CHANGE = 8
+"""Columns of `ImageDetections.COLUMNS`."""
+_PLACE = slice(2, 5)
+_YAW = 8
+_VELOCITY = slice(9, 11)
+"""Columns of `Tracks.COLUMNS`."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,8 @@ class Limits:
     @cached_property
     def tracks(self) -> Floats:
         """Of `Tracks.COLUMNS`; id -1 pads."""
-        far, classes = 2 * self.rig.grid.range_m, len(CLASSES) - 1
+        far = 2 * self.rig.grid.range_m
+        classes = len(CLASSES) - 1
         counts = [HIGHEST, HIGHEST]
         moving = [MAX_TURN, MAX_SPEED_MPS, MAX_SPEED_MPS]
         most = np.array([HIGHEST, classes, *[far] * 3, *[MAX_SIZE_M] * 3, *moving, *counts])
@@ -98,10 +104,14 @@ class Limits:
         return np.array([0, 0, *[0] * 4, 0, 0, -MAX_TURN]), most
 
     def _limited_detections(self, detections: ImageDetections) -> ImageDetections:
-        rows, (least, most) = detections.rows(), self._pictured
+        # Nearly always nothing lies beyond the limits: the detections are handed on as they are.
+        rows = detections.rows()
+        least, most = self._pictured
         most = most[detections.cameras]
         if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
             return detections
+
+        # Looked at before clipping, which would leave of a box wholly outside a line on the edge.
         rows = rows.copy()
         left, top, right, bottom = rows[:, _BOX].T
         width, height = most[:, _BOX][:, 2:].T
@@ -110,9 +120,12 @@ class Limits:
         return ImageDetections.from_rows(np.clip(rows, least, most)[shown][:MAX_DETECTIONS])
 
     def _limited_tracks(self, tracks: Tracks) -> Tracks:
-        rows, (least, most) = tracks.rows(), self.tracks
+        rows = tracks.rows()
+        least, most = self.tracks
         if _within(rows, least, most):
             return tracks
+
+        # Directions are kept first. Clipping alone would turn a bearing, a velocity and a heading.
         rows = rows.copy()
         rows[:, _YAW] = _without_turns(rows[:, _YAW])
         for columns in (_PLACE, _VELOCITY):
@@ -135,6 +148,7 @@ class Limits:
 
 
 def _within(rows: Floats, least: Floats, most: Floats) -> bool:
+    """Whether every number lies within its bounds, which NaN never does."""
     return bool((rows >= least).all() and (rows <= most).all())
 
 
@@ -147,5 +161,6 @@ def _shortened(vectors: Floats, most: float) -> Floats:
     """Vectors (n, k) whose components reach beyond `most`, in their direction; the others as they
     are.
     """
+    # At least `most`, so that the factor is 1 for whatever does not reach beyond it.
     longest = np.abs(vectors).max(axis=1, initial=most)
     return np.asarray(vectors * (most / longest)[:, None])

@@ -68,6 +68,7 @@ class PinholeCamera:
         upright = np.array([[cp * cy, cp * sy, sp], [-sy, cy, 0.0], [-sp * cy, -sp * sy, cp]])
         if not self.roll:
             return upright
+        # Roll turns left and up about the optical axis, which it leaves as it is.
         cr, sr = np.cos(self.roll), np.sin(self.roll)
         rolled: Floats = np.array([[1.0, 0.0, 0.0], [0.0, cr, sr], [0.0, -sr, cr]]) @ upright
         return rolled
@@ -84,6 +85,7 @@ class PinholeCamera:
 
         Points at or behind the image plane have depth <= 0 and NaN pixels.
         """
+        # Kernels are compiled for one layout, contiguous float64; anything else is copied to it.
         points = np.ascontiguousarray(points, dtype=float)
         pixels, depths = kernels.project(points.reshape(-1, 3), self._model)
         return pixels.reshape(*points.shape[:-1], 2), depths.reshape(points.shape[:-1])

@@ -45,7 +45,8 @@ which down."""
 @compiled()
 def project(points: Floats, camera: CameraModel) -> tuple[Floats, Floats]:
     """Pixels (n, 2) and depths (n,) of points (n, 3)."""
-    pixels, depths = np.empty((len(points), 2)), np.empty(len(points))
+    pixels = np.empty((len(points), 2))
+    depths = np.empty(len(points))
     for n, (x, y, z) in enumerate(points):
         pixels[n, 0], pixels[n, 1], depths[n] = pixel(x, y, z, camera)
     return pixels, depths
@@ -65,6 +66,7 @@ def box_rays(boxes: Floats, numbers: Cells, cameras: CameraModels) -> Floats:
     """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom) of the cameras `numbers`
     (n,); see `care_sim.core.pinhole.PinholeCamera.box_rays`.
     """
+    # One ray per entry of `_BOX_POINTS`: each picks one of four places across and one of four down.
     bundles = np.empty((len(boxes), len(_BOX_POINTS), 3))
     for n, (left, top, right, bottom) in enumerate(boxes):
         camera = model_of(cameras, numbers[n])
@@ -84,8 +86,11 @@ def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
     wholly behind the plane at the depth `nearest`; see
     `care_sim.core.pinhole.PinholeCamera.project_boxes`.
     """
-    spans, corners = np.empty((len(boxes), 4)), np.empty((8, 3))
+    spans = np.empty((len(boxes), 4))
+    corners = np.empty((8, 3))
     for n, box in enumerate(boxes):
+        # Beyond the near plane, the picture of a box is the convex hull of those of its corners,
+        # so these bound it.
         _lay_corners(box, camera, corners)
         span = math.inf, math.inf, -math.inf, -math.inf
         for one in range(8):
@@ -110,8 +115,11 @@ def window_around(spans: Floats, width: int, height: int) -> tuple[int, int, int
     """Left, top, right, bottom: the whole pixels of a picture that hold `spans` (n, 4), and one
     more on each side. Spans of NaN are left out, and all 0 is a window that holds nothing.
     """
-    left, top, right, bottom = width, height, 0, 0
+    # An empty window, the wrong way round: whatever is shown widens it.
+    left, top = width, height
+    right, bottom = 0, 0
     for span in spans:
+        # A span of NaN fails this comparison.
         if span[0] <= span[2]:
             low = max(math.floor(span[0]) - 1, 0), max(math.floor(span[1]) - 1, 0)
             high = min(math.ceil(span[2]) + 1, width), min(math.ceil(span[3]) + 1, height)
@@ -135,8 +143,14 @@ def model_of(cameras: CameraModels, number: int) -> CameraModel:
 @compiled()
 def pixel(x: float, y: float, z: float, camera: CameraModel) -> tuple[float, float, float]:
     """Pixel u, v and depth of a point. At or behind the image plane there is no pixel: NaN."""
-    position, axes, centre = camera.position, camera.axes, camera.centre
+    position = camera.position
+    axes = camera.axes
+    centre = camera.centre
     x, y, z = x - position[0], y - position[1], z - position[2]
+
+    # Depth is the part along the optical axis. A point appears as far from the principal point as
+    # it lies off that axis, times the focal length over its depth. Pixels count to the right and
+    # down, the axes of the camera to the left and up.
     depth = _along(axes[0], x, y, z)
     left, up = _along(axes[1], x, y, z), _along(axes[2], x, y, z)
     scale = camera.focal / depth if depth > 0 else math.nan
@@ -146,7 +160,9 @@ def pixel(x: float, y: float, z: float, camera: CameraModel) -> tuple[float, flo
 @compiled()
 def _ray(u: float, v: float, camera: CameraModel) -> tuple[float, float, float]:
     """The direction of a pixel, not normalised: its part along the optical axis is 1."""
-    axes, centre = camera.axes, camera.centre
+    axes = camera.axes
+    centre = camera.centre
+    # At depth 1 the pixel lies this far to the left of the optical axis, and this far above it.
     left, up = (centre[0] - u) / camera.focal, (centre[1] - v) / camera.focal
     return (
         axes[0, 0] + left * axes[1, 0] + up * axes[2, 0],
@@ -160,9 +176,11 @@ def _lay_corners(box: Floats, camera: CameraModel, corners: Floats) -> None:
     """Fill `corners` (8, 3: depth, left, up in the camera) of a box (7,). Bit i of a corner's
     number says on which side of the box's axis i it lies.
     """
-    position, axes = camera.position, camera.axes
+    position = camera.position
+    axes = camera.axes
     cos, sin = math.cos(box[6]), math.sin(box[6])
     for n in range(8):
+        # A bit less one half is the side: -0.5 or 0.5 of the length, the width and the height.
         along, across = box[3] * ((n & 1) - 0.5), box[4] * ((n >> 1 & 1) - 0.5)
         upward = box[5] * ((n >> 2) - 0.5)
         x = box[0] + cos * along - sin * across - position[0]

@@ -90,6 +90,7 @@ def _first_explaining(
     Detections are image `boxes` (n, 4) with their `classes`, `cameras` and `yaw_changes` since
     their pictures. Forecasts are `centres` (m, 3) with their classes, `labels`.
     """
+    # Forecasts come nearest first, so the first match is the nearest one.
     found = np.full(len(boxes), -1)
     for n, (left, top, right, bottom) in enumerate(boxes):
         camera = model_of(models, cameras[n])

@@ -52,6 +52,7 @@ class Rig:
             and all(isinstance(camera, PinholeCamera) for camera in cameras)
         ):
             raise InvalidInput(f"cameras must be a tuple of PinholeCamera, got {shown(cameras)}")
+        # A list could change later, unlike what has been computed from it and kept.
         object.__setattr__(self, "cameras", tuple(cameras))
 
     def read(self, observation: Observation) -> Belief:

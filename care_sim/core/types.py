@@ -90,7 +90,8 @@ class ImageDetections:
     @classmethod
     def from_table(cls, table: Floats) -> "ImageDetections":
         """The columns of rows (n, 9) without padding, whose numbers are known to be in order."""
-        classes, cameras = table[:, 0].astype(np.int64), table[:, 6].astype(np.int64)
+        classes = table[:, 0].astype(np.int64)
+        cameras = table[:, 6].astype(np.int64)
         return cls(classes, table[:, 1], table[:, 2:6], cameras, table[:, 7], table[:, 8])
 
     def rows(self) -> Floats:
@@ -167,12 +168,14 @@ class Tracks:
 
 def _check_whole_columns(what: str, numbers: Floats) -> None:
     """Raise InvalidInput for what no integer can be made of."""
+    # NaN fails both comparisons, and so is refused.
     if not (numbers.min(initial=0) >= -_EXACT and numbers.max(initial=0) <= _EXACT):
         raise InvalidInput(f"{what} must be numbers up to {_EXACT:g}, none of them NaN")
 
 
 def _table(*columns: NDArray[np.generic]) -> Floats:
     table: Floats = np.column_stack(columns)
+    # It is kept and handed to all who ask.
     table.flags.writeable = False
     return table
 

@@ -71,7 +71,8 @@ class BrakingController:
         if self._braking_s is None:
             gaps = tracks.boxes[:, 0] - halves[0] - self._front_m
             if np.any(counting & (gaps <= self._stopping_distances(tracks, ego.speed))):
-                self._braking_s, self._free_s = 0.0, 0.0
+                self._braking_s = 0.0
+                self._free_s = 0.0
         else:
             self._braking_s += self._keyframe_s
             blocked = bool(np.any(counting & (tracks.velocities[:, 0] <= ego.speed)))

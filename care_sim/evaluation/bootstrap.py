@@ -41,7 +41,8 @@ def paired_difference(
     Differences that are all equal have that value for both ends. Raises InvalidInput for samples
     that are empty, of unequal length, or not finite.
     """
-    a, b = np.atleast_1d(np.asarray(ours, float)), np.atleast_1d(np.asarray(theirs, float))
+    a = np.atleast_1d(np.asarray(ours, float))
+    b = np.atleast_1d(np.asarray(theirs, float))
     differences = _differences(a, b)
     if np.ptp(differences) <= 1e-12 * max(1.0, float(np.abs(a).max())):
         mean = float(differences.mean())
@@ -106,10 +107,8 @@ def _constant(numerators: Floats, denominators: Floats) -> bool:
 
 
 def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Floats]:
-    a, b = (
-        np.atleast_1d(np.asarray(numerators, float)),
-        np.atleast_1d(np.asarray(denominators, float)),
-    )
+    a = np.atleast_1d(np.asarray(numerators, float))
+    b = np.atleast_1d(np.asarray(denominators, float))
     _check_pairs(a, b)
     if np.any(b <= 0):
         raise InvalidInput(

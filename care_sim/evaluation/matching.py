@@ -69,7 +69,8 @@ def _by_score(distances: Floats, scores: Floats) -> list[int]:
 
 
 def _check(detections: Detections) -> None:
-    count, scores = len(detections), detections.scores
+    count = len(detections)
+    scores = detections.scores
     if detections.boxes.shape != (count, 7) or (scores is not None and scores.shape != (count,)):
         shapes = f"boxes {detections.boxes.shape}" + (
             "" if scores is None else f", scores {scores.shape}"

@@ -138,7 +138,8 @@ def _ages(sightings: Sightings, censored_at: int) -> Cells:
     """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of
     other objects.
     """
-    rows, events = sightings.frames, sightings.frames.take(sightings.events)
+    rows = sightings.frames
+    events = sightings.frames.take(sightings.events)
     late = rows.keyframes - events.keyframes[:, None]
     return np.where(rows.objects == events.objects[:, None], late, censored_at)
 

@@ -108,7 +108,8 @@ class Sightings:
             raise InvalidInput(f"scene {scene}: a scene must have at least one keyframe")
         check_number("range_m", range_m, 0)
         check_presence(presence)
-        rows, start = _table(keyframes), _table([_together(keyframes[0], hidden)])
+        rows = _table(keyframes)
+        start = _table([_together(keyframes[0], hidden)])
         for table in (rows, start):
             _check(scene, table)
         in_range = rows.ranges <= range_m

@@ -65,10 +65,13 @@ class ClosedLoop:
     def keyframe(self, fired: Cells) -> Keyframe:
         """Fire `fired`, act on what came back, and move on to the next keyframe."""
         # The record is of the time of the scan: it is taken before the world moves on.
-        world, sensor = self.world, self.sensor
+        world = self.world
+        sensor = self.sensor
         in_view = self._in_view()
         distance = self._distance_to_first_sighting(sensor)
-        index, time, speed = self.index, world.time, world.ego_motion.speed
+        index = self.index
+        time = world.time
+        speed = world.ego_motion.speed
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)

@@ -45,7 +45,8 @@ def pool_of_another_drive(
     with closing(world):
         loop = ClosedLoop(world, rig, replace(sensing, false_positive_rate=0.0), seeds)
         cells = np.arange(rig.grid.size)
-        seen, times_s = [], []
+        seen = []
+        times_s = []
         over = False
         while not over:
             seen.append(loop.seen.detections)

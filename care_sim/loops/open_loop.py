@@ -84,7 +84,8 @@ class OpenLoop:
 
     def keyframe(self, fired: Cells) -> OpenLoopKeyframe:
         """Fire `fired`, detect on what came back, and go on to the next keyframe."""
-        index, shot = self.index, self.shot
+        index = self.index
+        shot = self.shot
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
         detections, objects = self._detector.detect(cloud, shot.annotations)

@@ -81,7 +81,8 @@ class EpisodeWatcher:
 
     def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""
-        loop, world = self._loop, self._loop.world
+        loop = self._loop
+        world = self._loop.world
         shown = loop.belief.detections
         return TrueSituation(
             time_s=world.time,

@@ -101,7 +101,8 @@ def checked(name: str, found: Any, points: int) -> Detections:
             )
     for fault in _faults(points, **table):
         raise BrokenDetector(f"detector {name}: {fault}")
-    classes, returns = table["classes"].astype(np.int64), table["returns"].astype(np.int64)
+    classes = table["classes"].astype(np.int64)
+    returns = table["returns"].astype(np.int64)
     return Detections(classes, table["boxes"], returns, table.get("scores"))
 
 

@@ -106,13 +106,16 @@ class TrackMemory:
 
     def _correct(self, rows: Cells, seen: Floats) -> None:
         tracks = self._tracks
-        boxes, velocities = tracks.boxes.copy(), tracks.velocities.copy()
-        misses, hits = tracks.misses + 1, tracks.hits.copy()
+        boxes = tracks.boxes.copy()
+        velocities = tracks.velocities.copy()
+        misses = tracks.misses + 1
+        hits = tracks.hits.copy()
         elapsed = (misses[rows] * self._keyframe_s)[:, None]
         # A forecast moved at constant velocity; moved back, it is where the object was last seen.
         last_seen = boxes[rows, :2] - velocities[rows] * elapsed
         velocities[rows] = (seen[:, :2] - last_seen) / elapsed
-        boxes[rows], misses[rows] = seen, 0
+        boxes[rows] = seen
+        misses[rows] = 0
         hits[rows] += 1
         self._tracks = Tracks(tracks.ids, tracks.classes, boxes, velocities, misses, hits)
 

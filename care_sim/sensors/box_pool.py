@@ -13,11 +13,15 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.confidence import confidence_of, pixels_of
 
-NEARER, ASIDE, MORE_HIDDEN = 0.05, 0.005, 0.05
-"""How far a varied box departs at most from the true one: its distance along the camera's axis and
-its hidden share by these factors, sideways by this share of the picture's width. Enough that copies
-of a box are as rare as among true boxes, too little to change how true boxes are distributed.
+NEARER = 0.05
+"""How far a varied box departs at most from the true one: its distance along the camera's axis by
+this factor. Enough that copies of a box are as rare as among true boxes, too little to change how
+true boxes are distributed; the same holds for the two below.
 """
+ASIDE = 0.005
+"""Sideways, by this share of the picture's width."""
+MORE_HIDDEN = 0.05
+"""Its hidden share, by this factor."""
 
 _BOX = slice(2, 6)
 _CAMERA = 6
@@ -68,6 +72,7 @@ class BoxPool:
     def relative_density(self, time_s: float) -> float:
         """Boxes per picture among the usable ones, over boxes per picture of the whole pool."""
         pictures = np.count_nonzero(self._is_usable(self.picture_times_s, time_s))
+        # Relative to the pool as a whole: the stated rate of false boxes holds for its mean.
         usual = len(self.rows) / max(len(self.picture_times_s), 1)
         return len(self.usable(time_s)) / pictures / usual if pictures and usual else 0.0
 
@@ -86,8 +91,10 @@ class BoxPool:
         return np.where(is_possible[:, None], there, varied)
 
     def _is_usable(self, times_s: Floats, time_s: float) -> NDArray[np.bool_]:
+        # Before and after alike: the film or drive of other boxes is known as a whole.
         away = np.abs(times_s - time_s)
-        is_apart, is_near = away >= self.apart_s - _SAME_TIME_S, away <= self.near_s + _SAME_TIME_S
+        is_apart = away >= self.apart_s - _SAME_TIME_S
+        is_near = away <= self.near_s + _SAME_TIME_S
         usable: NDArray[np.bool_] = is_apart & is_near
         return usable
 
@@ -95,18 +102,25 @@ class BoxPool:
         """(k, 9) the boxes after departures (k, 3), and (k,) which of them are within the bounds of
         the pool.
         """
-        moved, middles, limits = self.rows[rows], self.middles[rows], self._limits[rows]
+        moved = self.rows[rows]
+        middles = self.middles[rows]
+        limits = self._limits[rows]
         boxes = moved[:, _BOX].copy()
         nearer, aside, hidden = departures.T
 
         # An object that comes nearer along the camera's axis grows about the middle of the picture,
-        # and its foot stays on the road.
+        # and its foot stays on the road: a point at the height h below the camera appears f h / d
+        # below the middle, so all of the box grows as 1 / d. The distance varies by exp(-nearer):
+        # a factor is as likely as its inverse.
         ways = np.expm1(nearer)[:, None] * (boxes - np.tile(middles, 2))
         ways[:, [0, 2]] += (aside * 2 * middles[:, 0])[:, None]
+        # An edge on the limit is where the picture cuts the object, which reaches beyond it.
         after = np.where(boxes == limits, boxes, boxes + _rounded(ways, self._edge_step))
         moved[:, _BOX] = after
         moved[:, 1] = self._confidences(rows, box_areas(after), np.exp(hidden))
 
+        # Within means inside the picture, the right way round, and no less sure than the least sure
+        # box of the pool.
         low, high = after[:, :2], after[:, 2:]
         within = (low >= limits[:, :2]) & (high <= limits[:, 2:]) & (low < high)
         return moved, within.all(axis=1) & (moved[:, 1] >= self.rows[:, 1].min())
@@ -176,6 +190,7 @@ def box_areas(boxes: Floats) -> Floats:
 def _decimal_step(values: Floats) -> float:
     """The coarsest of 1, 0.1, ... 0.0001 of which all values are multiples, 0 where none is."""
     for digits in range(5):
+        # Decimal fractions are not exact in binary, so a multiple is one within a tolerance.
         scaled = values * 10**digits
         if np.all(np.isfinite(scaled)) and np.all(np.abs(scaled - np.rint(scaled)) < 1e-6):
             return 10.0**-digits

@@ -50,6 +50,7 @@ class Picture:
         """Read the box of every body off a picture of ids (height, width), all of it or that of a
         window.
         """
+        # Pixels of a window are counted from its own corner, boxes from that of the picture.
         table = visible_boxes(ids)
         left, top = window[:2] if window is not None else (0, 0)
         return cls(
@@ -69,7 +70,8 @@ def faultless_detections(
 
     `pictures` are one per camera of the rig, in its order.
     """
-    rows, bodies = [], []
+    rows = []
+    bodies = []
     for camera, picture in enumerate(pictures):
         columns = picture.bodies.tolist(), picture.boxes.tolist(), picture.pixels.tolist()
         for body, box, pixels in zip(*columns, strict=True):
@@ -114,14 +116,20 @@ class CameraDetector:
         `seen` are the faultless ones of this keyframe, at `time_s` and with the car's `heading`;
         `ranges` (n,) are the distances of the objects in metres, in their order.
         """
-        rows, objects = seen.detections.rows(), seen.objects
+        # Both faults draw at every keyframe, whatever is there and whatever becomes of it, so that
+        # every policy meets the same ones.
+        rows = seen.detections.rows()
+        objects = seen.objects
         missed = self._misses.draw(ranges)
         false = self._false_boxes.draw(rows, time_s)
         if missed.any():
             left = ~np.isin(objects, self._objects[missed])
-            rows, objects = rows[left], objects[left]
+            rows = rows[left]
+            objects = objects[left]
         if len(false):
             rows, objects = _with_false_boxes(rows, objects, false)
+
+        # In the dark nothing is reported, false boxes included; delays go on.
         sure = rows[:, 1] >= self._sensing.camera_confidence
         reported = np.flatnonzero(sure & (not self._sensing.black_at(time_s)))
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.

@@ -40,6 +40,7 @@ class Misses:
             return np.zeros(len(ranges), bool)
         rates = faults.false_negative_rate + faults.false_negative_per_m * ranges
         rates = np.minimum(rates, 1.0)
+        # One draw per object decides all: whether it is missed, and at the start for how long.
         draws = self._rng.random(len(rates))
         if self._started:
             self._continue(rates, draws)
@@ -102,6 +103,7 @@ class Delay:
         """Take in this keyframe's detections; return the newest that are due, with age and yaw
         change.
         """
+        # Lateness is drawn for every picture in turn, whatever it shows.
         self._keyframe += 1
         late = self.latency + (int(self.rng.integers(self.jitter + 1)) if self.jitter else 0)
         self._sent.append(_SentPicture(seen, heading, self._keyframe, self._keyframe + late))
@@ -125,6 +127,7 @@ class Delay:
 
 def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:
     """The camera as it really stands: turned and moved by errors that the rig does not know."""
+    # Drawn even where both spreads are 0: switched on, one leaves the draws of the other.
     yaw, pitch = np.deg2rad(faults.camera_rotation_sigma_deg) * rng.standard_normal(2)
     shift = faults.camera_position_sigma_m * rng.standard_normal(3)
     x, y, z = (float(value) for value in camera.position + shift)

@@ -23,4 +23,5 @@ def confidence_of(pixels: Pixels) -> Pixels:
 
 def pixels_of(confidences: Floats) -> Floats:
     """(n,) the visible pixels that would give these confidences, very many for 1."""
+    # c = n / (n + F) solved for n; a confidence of 1 would need infinitely many.
     return FULL_CONFIDENCE * confidences / np.maximum(1 - confidences, 1e-12)

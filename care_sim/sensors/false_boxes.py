@@ -47,8 +47,11 @@ class FalseBoxes:
         draws = self._rng.random((number, MOST_DRAWS, 4))
         if not number:
             return NO_ROWS
+        # A draw from 0 to 1 picks each of the usable boxes with equal chance; three vary it.
         picks = usable[(draws[..., 0] * len(usable)).astype(np.int64)]
         varied = self._pool.varied(picks.ravel(), draws[..., 1:].reshape(-1, 3))
+
+        # One false box after another takes its first try that is free, beside those before it.
         shown = true
         for tries in varied.reshape(*picks.shape, -1):
             is_free = ~_lie_on(tries, shown)

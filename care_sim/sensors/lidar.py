@@ -59,11 +59,13 @@ class Lidar:
 
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
+        # Noise and dropout are drawn for every cell, and those of the fired ones taken.
         ranges, ids = self._engine.cast(sensor, cells)
         if self._faults.lidar_range_sigma > 0:
             errors = (
                 self._faults.lidar_range_sigma * self._noise.standard_normal(self.grid.size)[cells]
             )
+            # No return stays no return: noise is that of a measured range.
             (hit,) = np.isfinite(ranges).nonzero()
             ranges = ranges.copy()
             ranges[hit] = noisy(ranges[hit], errors[hit], self.grid.range_m)
@@ -84,6 +86,7 @@ def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
     # A triangle wave: the way from the near bound to the far one and back is 2 * span long.
     beyond = np.mod(erring - NEAREST_M, 2 * span)
     folded: Floats = NEAREST_M + np.minimum(beyond, 2 * span - beyond)
+    # What lies between the bounds is left to the last bit; folding would round it.
     return np.where(np.abs(erring - reach / 2) <= span / 2, erring, folded)
 
 

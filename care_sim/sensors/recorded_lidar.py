@@ -25,6 +25,7 @@ class RecordedLidar:
 
     def fire(self, cells: Cells, cloud: Cloud) -> Cloud:
         """The returns of `cells` (k,) in the recorded `cloud`, after the faults."""
+        # A cell is dropped with all its returns, of which a recorded sweep may have several.
         answering = np.zeros(self.grid.size, dtype=bool)
         answering[cells] = True
         answering &= self._live
@@ -48,6 +49,7 @@ class RecordedLidar:
         return nearest
 
     def _noisy(self, cloud: Cloud) -> Cloud:
+        # Noise is along the ray: a point moves with its range, and stays in its cell.
         errors = (
             self._faults.lidar_range_sigma
             * self._noise.standard_normal(self.grid.size)[cloud.cells]

@@ -69,9 +69,13 @@ def full_sweep(
     meet the road, a plane `height_m` below the sensor and parallel to its x, y plane. In a world
     without ground the road hides nothing.
     """
+    # Hulls hold every cell that can hit a body, and their margin is room for rounding.
     covered = np.zeros(grid.size, dtype=bool)
     for hull in grid.hulls(boxes):
         covered[hull] = True
+
+    # Everywhere else the road, which a formula tells; where a ray was cast at a body and missed it,
+    # the road as well.
     ranges = road_ranges(grid, height_m)
     bodies = np.full(grid.size, NO_BODY)
     directions = sensor.vectors_to_world(grid.directions[covered])
@@ -86,6 +90,7 @@ def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
     """(N,) the distance along every ray to a plane `height_m` below the sensor, inf beyond the
     reach of a ray.
     """
+    # A unit ray falls by this per metre; level or rising, it meets no road.
     fall = -grid.directions[:, 2]
     ranges = np.divide(height_m, fall, out=np.full(grid.size, np.inf), where=fall > 0)
     return np.where(ranges <= grid.range_m, ranges, np.inf)
@@ -93,5 +98,6 @@ def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
 
 def numbers_of(bodies: Integers, numbers: Mapping[int, int]) -> Cells:
     """(n,) the number of the annotated object behind each body, NOBODY where there is none."""
+    # Few bodies return many rays: each is looked up once.
     found, rows = np.unique(bodies, return_inverse=True)
     return np.array([numbers.get(body, NOBODY) for body in found.tolist()], dtype=np.int64)[rows]

@@ -34,7 +34,8 @@ class Footprints:
     def move_all(self, bodies: Integers, poses: Floats) -> None:
         """Put bodies (n,) at poses (n, 3): x, y, heading."""
         boxes = self.boxes[bodies]
-        boxes[:, :2], boxes[:, 6] = poses[:, :2], poses[:, 2]
+        boxes[:, :2] = poses[:, :2]
+        boxes[:, 6] = poses[:, 2]
         self.boxes[bodies] = boxes
         length, width = boxes[:, 3:5].T
         cos, sin = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
@@ -64,7 +65,8 @@ class Primitives:
     def __init__(self) -> None:
         self.shapes = np.empty(0, np.int64)
         self.owners = np.empty(0, np.int64)
-        self.halves, self.offsets = np.empty((0, 3)), np.empty((0, 3))
+        self.halves = np.empty((0, 3))
+        self.offsets = np.empty((0, 3))
         self.poses = np.empty((0, 7))
 
     def add(self, body: int, parts: Sequence[Part]) -> None:

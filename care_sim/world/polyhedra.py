@@ -68,7 +68,8 @@ def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
     # Qhull gives triangles. Those of one face have one equation, up to the last bits, and two
     # triangles that meet on an edge of the polyhedron have different ones.
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
-    mine, other = np.repeat(number, hull.neighbors.shape[1]), number[hull.neighbors].ravel()
+    mine = np.repeat(number, hull.neighbors.shape[1])
+    other = number[hull.neighbors].ravel()
     meets = np.stack([mine, other], axis=1)
     edges = np.unique(meets[meets[:, 0] < meets[:, 1]], axis=0)
     return corners, equations * (1, 1, 1, -1), edges

@@ -74,10 +74,8 @@ def _closeness(along: Floats) -> Floats:
     """(h,) the sum over the points of 1 / distance to the nearer of the two shown sides; `along` is
     (h, 2, n).
     """
-    to_low, to_high = (
-        along - along.min(axis=2, keepdims=True),
-        along.max(axis=2, keepdims=True) - along,
-    )
+    to_low = along - along.min(axis=2, keepdims=True)
+    to_high = along.max(axis=2, keepdims=True) - along
     to_lows, to_highs = (
         np.round(np.linalg.norm(one, axis=2), DECIMALS) for one in (to_low, to_high)
     )

@@ -64,7 +64,8 @@ class ClusterDetector:
         plane = road_plane(points, sensor_height_m)
         heights = heights_above(points, plane)
         above = heights > KERB_CLEARANCE_M
-        standing, heights = points[above], heights[above]
+        standing = points[above]
+        heights = heights[above]
         clusters = [
             rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS
         ]

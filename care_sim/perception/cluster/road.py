@@ -53,7 +53,8 @@ def _bounded(free: Floats) -> tuple[Floats, Floats]:
     """(3,) a departure from the level plane, slope below STEEPEST whatever its direction and offset
     below SETTLING_M, from three free numbers; and its derivatives (3, 3).
     """
-    departure, derivatives = np.empty(3), np.zeros((3, 3))
+    departure = np.empty(3)
+    derivatives = np.zeros((3, 3))
     # u / sqrt(1 + |u|^2) maps all vectors into the unit disc, alike in every direction.
     for part, most in ((slice(2), STEEPEST), (slice(2, 3), SETTLING_M)):
         u = free[part]

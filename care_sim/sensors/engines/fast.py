@@ -35,11 +35,14 @@ class Fast:
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""
+        # The kernel finds the cells of a window by bisection, so it needs them ascending. Most who
+        # ask have them so; for others they are sorted, and the answers put back in their order.
         if (cells[1:] < cells[:-1]).any():
             order = np.argsort(cells)
             ranges, ids = self.cast(sensor, cells[order])
             back = np.argsort(order)
             return ranges[back], ids[back]
+        # One layout of the array, so that compiled code is compiled once; it checks no bounds.
         cells = np.require(cells, np.int64, ("C", "W"))
         if len(cells) and not 0 <= cells[0] <= cells[-1] < self._cells:
             raise IndexError(
@@ -58,7 +61,8 @@ class Fast:
         )
 
     def _cast_ascending(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
-        world, parts = self._world, self._world.primitives
+        world = self._world
+        parts = world.primitives
         pose = (sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.roll, sensor.pitch)
         return cast_rays(
             cells,

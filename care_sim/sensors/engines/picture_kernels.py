@@ -73,12 +73,16 @@ def render_bodies(
     """
     # Fields get their names here: numba takes microseconds to type each named tuple of Python, and
     # next to none for plain ones.
-    eye, optics, table = PlacedCamera(*camera), Lens(*lens), Meshes(*meshes)
+    eye = PlacedCamera(*camera)
+    optics = Lens(*lens)
+    table = Meshes(*meshes)
     left, top, right, bottom = window
     nearest, farthest = depths
     ids = np.full((bottom - top, right - left), NO_BODY)
     inverse_depths = np.full(ids.shape, 1.0 / farthest)
 
+    # Part after part into one depth buffer. Its rows in the picture come first: a part above or
+    # below the window costs no more than its corners.
     for part, owner in enumerate(table.owners):
         begin, end = table.starts[part], table.starts[part + 1]
         body = _seen_from(eye, poses[owner])
@@ -106,6 +110,7 @@ def visible_boxes(ids: Integers) -> Integers:
     """(n, 6) the bodies in a picture of ids (height, width) in ascending order: id; left, top,
     right, bottom of the box that holds all its pixels; their number.
     """
+    # The highest id tells how large a table is needed.
     highest = -1
     for body in ids.flat:
         highest = max(highest, int(body))
@@ -119,7 +124,9 @@ def visible_boxes(ids: Integers) -> Integers:
                 if one[5] == 0:
                     one[:5] = body, column, row, column, row
                 # Rows come in order, so the top stays as it began, and the bottom is this row's.
-                one[1], one[3], one[4] = min(one[1], column), max(one[3], column + 1), row + 1
+                one[1] = min(one[1], column)
+                one[3] = max(one[3], column + 1)
+                one[4] = row + 1
                 one[5] += 1
     return found[found[:, 5] > 0]
 
@@ -127,9 +134,13 @@ def visible_boxes(ids: Integers) -> Integers:
 @compiled()
 def _seen_from(camera: PlacedCamera, pose: Floats) -> BodyInCamera:
     """A body at `pose` (7,) as the camera sees it."""
-    place, axes = camera.place, camera.axes
+    place = camera.place
+    axes = camera.axes
     body = body_axes(pose[3], pose[4], pose[5], pose[6])
-    turn, shift = np.empty((3, 3)), np.empty(3)
+    # A point p of the body lies at position + body . p in the world. Told along the axes of the
+    # camera, from its place, that is turn . p + shift.
+    turn = np.empty((3, 3))
+    shift = np.empty(3)
     for i in range(3):
         shift[i] = dot(axes[i], (pose[0] - place[0], pose[1] - place[1], pose[2] - place[2]))
         for j in range(3):
@@ -142,8 +153,11 @@ def _rows(corners: Floats, body: BodyInCamera, lens: Lens, nearest: float) -> tu
     """First row of a polyhedron and the one after its last; all rows when it reaches through the
     plane at the depth `nearest`.
     """
-    turn, shift = body.turn, body.shift
-    high, low, behind = math.inf, -math.inf, 0
+    # The picture of a convex body before the camera is bounded by those of its corners.
+    turn = body.turn
+    shift = body.shift
+    high, low = math.inf, -math.inf
+    behind = 0
     for corner in corners:
         depth = shift[0] + dot(turn[0], corner)
         if depth < nearest:
@@ -152,7 +166,9 @@ def _rows(corners: Floats, body: BodyInCamera, lens: Lens, nearest: float) -> tu
             v = lens.down - lens.focal * (shift[2] + dot(turn[2], corner)) / depth
             high, low = min(high, v), max(low, v)
 
-    # The picture is as high as twice the principal point is down. Row j is sampled at v = j + 1.
+    # The picture is as high as twice the principal point is down. Row j is sampled at v = j + 1, so
+    # the rows wanted are those from high - 1 to low - 1. One too many at either end does no harm:
+    # the outline leaves it empty.
     if behind == len(corners):
         return 0, 0
     if behind > 0:
@@ -167,12 +183,21 @@ def _planes(faces: Floats, body: BodyInCamera, lens: Lens) -> Floats:
     at pixel (0, 0), and the distance of the face before the camera, negative where it is turned
     towards it.
     """
-    turn, shift = body.turn, body.shift
+    turn = body.turn
+    shift = body.shift
     planes = np.empty((len(faces), 4))
     for n, face in enumerate(faces):
-        ahead, left, up = dot(turn[0], face), dot(turn[1], face), dot(turn[2], face)
+        # The plane n . p = d of the body is n' . q = d + n' . shift for q = turn . p + shift, with
+        # the normal n' = turn . n: the parts ahead, left and up.
+        ahead = dot(turn[0], face)
+        left = dot(turn[1], face)
+        up = dot(turn[2], face)
         offset = face[3] + ahead * shift[0] + left * shift[1] + up * shift[2]
-        planes[n, 0], planes[n, 1] = -left / lens.focal / offset, -up / lens.focal / offset
+
+        # The ray of pixel (u, v) is (1, (across - u) / focal, (down - v) / focal). It meets the
+        # plane at the inverse depth (n' . ray) / offset: so much per column, per row, and the rest.
+        planes[n, 0] = -left / lens.focal / offset
+        planes[n, 1] = -up / lens.focal / offset
         planes[n, 2] = (ahead + (left * lens.across + up * lens.down) / lens.focal) / offset
         planes[n, 3] = offset
     return planes
@@ -185,18 +210,23 @@ def _outline(planes: Floats, edges: Integers) -> tuple[Floats, Floats]:
     """
     # Along an edge its two faces have one inverse depth, so their difference is 0 there, and inside
     # the face towards the camera has the smaller one.
-    lines, count = np.empty((len(edges), 3)), 0
+    lines = np.empty((len(edges), 3))
+    count = 0
     for one, other in edges:
         if planes[one, 3] < 0.0 <= planes[other, 3]:
-            lines[count], count = planes[one, :3] - planes[other, :3], count + 1
+            lines[count] = planes[one, :3] - planes[other, :3]
+            count += 1
         elif planes[other, 3] < 0.0 <= planes[one, 3]:
-            lines[count], count = planes[other, :3] - planes[one, :3], count + 1
+            lines[count] = planes[other, :3] - planes[one, :3]
+            count += 1
     return planes[planes[:, 3] < 0.0], lines[:count]
 
 
 @compiled(error_model="numpy")
 def _span(outline: Floats, v: float, left: int, right: int) -> tuple[int, int]:
     """The first column inside an outline in the row at `v` and the one after the last."""
+    # In one row each line of the outline leaves a half of the columns, from -here / slope on or up
+    # to there, or all, or none. What is inside of every one is a stretch.
     first, last = float(left), right - 1.0
     for slope, rise, start in outline:
         here = start + rise * v
@@ -212,6 +242,8 @@ def _span(outline: Floats, v: float, left: int, right: int) -> tuple[int, int]:
 @compiled()
 def _surface(towards: Floats, u: float, v: float) -> float:
     """The inverse depth of a polyhedron at a pixel inside its outline."""
+    # A ray is inside a convex body once it has passed all planes that face the camera. The farthest
+    # of them has the least inverse depth.
     inverse = math.inf
     for n in range(len(towards)):
         inverse = min(inverse, towards[n, 2] + towards[n, 0] * u + towards[n, 1] * v)

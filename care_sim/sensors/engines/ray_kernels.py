@@ -75,10 +75,14 @@ def cast_rays(
     """
     # Fields get their names here: numba takes microseconds to type each named tuple of Python,
     # which is much of the time of a scan, and next to none for plain ones.
+    rays = Fan(*fan)
+    solids = Parts(*parts)
     x, y, z, yaw, roll, pitch = sensor
-    rays, solids = Fan(*fan), Parts(*parts)
     pose = SensorPose(x, y, z, yaw, roll, pitch)
     placed = place_parts(pose, solids, poses, GridSpacing(*spacing))
+
+    # The road first, then part after part: what is nearer takes the ray. So no list of hits is
+    # sorted, and the order of parts matters only where two are equally far.
     columns = len(rays.across)
     starts = _row_starts(cells, len(rays.down), columns)
     ranges, ids = _road_hits(cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
@@ -88,13 +92,16 @@ def cast_rays(
         for row in range(upper, lower + 1):
             # The fired cells of this row that lie in the window. A window that runs over the seam
             # has two stretches of columns: from the row's begin, and from its first column on.
-            begin, low, high = row * columns, starts[row], starts[row + 1]
+            begin = row * columns
+            low = starts[row]
+            high = starts[row + 1]
             ahead = _first_from(cells, begin + first, low, high)
             for place, end in ((low, begin + last - columns), (ahead, begin + last)):
                 while place < high and cells[place] <= end:
                     distance = _entry(solid, _ray(rays, row, cells[place] - begin))
                     if distance < ranges[place] and distance <= reach:
-                        ranges[place], ids[place] = distance, solids.owners[part]
+                        ranges[place] = distance
+                        ids[place] = solids.owners[part]
                     place += 1
     return ranges, ids
 
@@ -104,7 +111,8 @@ def _road_hits(
     cells: Cells, starts: Integers, fan: Fan, reach: float, road: RoadPlane
 ) -> tuple[Floats, Integers]:
     """Ranges and body ids in a world of road alone."""
-    ranges, ids = np.full(len(cells), math.inf), np.full(len(cells), NO_BODY)
+    ranges = np.full(len(cells), math.inf)
+    ids = np.full(len(cells), NO_BODY)
     if road.body != NO_BODY:
         for row in range(len(starts) - 1):
             for n in range(starts[row], starts[row + 1]):
@@ -113,13 +121,15 @@ def _road_hits(
                 ray = _ray(fan, row, cells[n] - row * len(fan.across))
                 distance = -road.height / dot(road.up, ray)
                 if 0.0 <= distance <= reach:
-                    ranges[n], ids[n] = distance, road.body
+                    ranges[n] = distance
+                    ids[n] = road.body
     return ranges, ids
 
 
 @compiled()
 def _row_starts(cells: Cells, rows: int, columns: int) -> Integers:
     """(rows + 1,) where each row begins among ascending `cells`."""
+    # Each search goes on from the row before, since cells ascend.
     starts = np.zeros(rows + 1, np.int64)
     for row in range(1, rows + 1):
         starts[row] = _first_from(cells, row * columns, starts[row - 1], len(cells))
@@ -131,6 +141,7 @@ def _first_from(cells: Cells, cell: int, low: int, high: int) -> int:
     """The first place in low..high of ascending `cells` that holds `cell` or a later one, else
     `high`.
     """
+    # Bisection: all before `low` are lower, all from `high` on are not.
     while low < high:
         middle = (low + high) // 2
         if cells[middle] < cell:
@@ -150,6 +161,7 @@ def _ray(fan: Fan, row: int, column: int) -> Vector:
 @compiled()
 def _solid(part: int, parts: Parts, centres: Floats, axes: Floats) -> Solid:
     """A part with its numbers at hand: views on arrays would count references, ray by ray."""
+    # The sensor is the origin of its own frame, so seen from the part it is at minus the centre.
     turn = _triple(axes[part, 0]), _triple(axes[part, 1]), _triple(axes[part, 2])
     centre = _triple(centres[part])
     start = -dot(turn[0], centre), -dot(turn[1], centre), -dot(turn[2], centre)
@@ -190,6 +202,7 @@ def _common(one: Stretch, other: Stretch) -> Stretch:
 @compiled(error_model="numpy")
 def _slab(start: float, along: float, half: float) -> Stretch:
     """The stretch of a ray between the planes at -half and half."""
+    # A ray along the planes is between them everywhere or nowhere; 0 / 0 must not decide it.
     if along == 0.0:
         return _all_or_nothing(abs(start) <= half)
     one, other = (-half - start) / along, (half - start) / along
@@ -203,11 +216,15 @@ def _tube(u: float, v: float, x: float, y: float, radius: float) -> Stretch:
     """
     # The distance t solves |(u, v) + t (x, y)|^2 = radius^2. Its discriminant is written with the
     # cross product, which keeps digits that u * u + v * v of a far start would lose.
-    speed, cross = x * x + y * y, u * y - v * x
+    speed = x * x + y * y
+    cross = u * y - v * x
     inside = radius * radius * speed - cross * cross
     if speed == 0.0 or inside < 0.0:
         return _all_or_nothing(speed == 0.0 and u * u + v * v <= radius * radius)
-    middle, half = -(u * x + v * y) / speed, math.sqrt(inside) / speed
+
+    # The middle is where the ray is nearest to the axis; it enters and leaves half a chord away.
+    middle = -(u * x + v * y) / speed
+    half = math.sqrt(inside) / speed
     return middle - half, middle + half
 
 

@@ -59,7 +59,9 @@ class PlacedParts(NamedTuple):
 @compiled()
 def place_parts(sensor: SensorPose, parts: Parts, poses: Floats, grid: GridSpacing) -> PlacedParts:
     """The parts of bodies at `poses` (m, 7: x, y, z, quaternion x, y, z, w), by body id."""
-    centres, axes = np.empty((len(parts.owners), 3)), np.empty((len(parts.owners), 3, 3))
+    # Told along the axes of the sensor, a vector is three scalar products with them.
+    centres = np.empty((len(parts.owners), 3))
+    axes = np.empty((len(parts.owners), 3, 3))
     sensor_axes = _sensor_axes(sensor.yaw, sensor.roll, sensor.pitch)
     for part, owner in enumerate(parts.owners):
         pose = poses[owner]
@@ -80,7 +82,8 @@ def place_parts(sensor: SensorPose, parts: Parts, poses: Floats, grid: GridSpaci
 @compiled()
 def _windows(centres: Floats, axes: Floats, halves: Floats, grid: GridSpacing) -> Integers:
     """(k, 4) see `PlacedParts.windows`."""
-    windows, corners = np.empty((len(centres), 4), np.int64), np.empty((8, 3))
+    windows = np.empty((len(centres), 4), np.int64)
+    corners = np.empty((8, 3))
     for part, centre in enumerate(centres):
         _lay_corners(centre, axes[part], halves[part], corners)
         heading, right, left = _spread(centre, corners)
@@ -89,7 +92,8 @@ def _windows(centres: Floats, axes: Floats, halves: Floats, grid: GridSpacing) -
         # around, above or below it, and may cover every column.
         surrounds = left - right >= math.pi or (centre[0] == 0.0 and centre[1] == 0.0)
         if surrounds:
-            heading, right, left = 0.0, -math.pi, math.pi
+            heading = 0.0
+            right, left = -math.pi, math.pi
         windows[part, 0], windows[part, 1] = _columns(heading + right, heading + left, grid)
         windows[part, 2], windows[part, 3] = _rows(corners, surrounds, grid)
     return windows
@@ -98,6 +102,7 @@ def _windows(centres: Floats, axes: Floats, halves: Floats, grid: GridSpacing) -
 @compiled()
 def _sensor_axes(yaw: float, roll: float, pitch: float) -> Axes:
     """Forward, left and up of a frame with these angles, in the world."""
+    # The columns of Rz(yaw) Ry(pitch) Rx(roll), as in `care_sim.core.frames.Frame`.
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)
     cr, sr = math.cos(roll), math.sin(roll)
@@ -123,7 +128,8 @@ def _spread(centre: Floats, corners: Floats) -> tuple[float, float, float]:
     """Azimuth of a centre, and how far its corners reach to the right (negative) and left of it,
     radians.
     """
-    rightmost, leftmost = (1.0, 0.0), (1.0, 0.0)
+    rightmost = (1.0, 0.0)
+    leftmost = (1.0, 0.0)
     least, most = 0.0, 0.0
     for x, y, _ in corners:
         # The corner in the plane turned so that the centre lies straight ahead. Angles are compared
@@ -131,9 +137,11 @@ def _spread(centre: Floats, corners: Floats) -> tuple[float, float, float]:
         along, across = centre[0] * x + centre[1] * y, centre[0] * y - centre[1] * x
         order = _angle_order(along, across)
         if order < least:
-            rightmost, least = (along, across), order
+            rightmost = (along, across)
+            least = order
         if order > most:
-            leftmost, most = (along, across), order
+            leftmost = (along, across)
+            most = order
     right, left = math.atan2(rightmost[1], rightmost[0]), math.atan2(leftmost[1], leftmost[0])
     return math.atan2(centre[1], centre[0]), right, left
 
@@ -143,6 +151,9 @@ def _angle_order(along: float, across: float) -> float:
     """Grows from -2 to 2 as the direction of (along, across) turns from -pi to pi, at less cost
     than the angle.
     """
+    # The direction as a point of the square |along| + |across| = 1. Ahead, its part across grows
+    # with the angle from -1 to 1. Behind, it falls, and is turned over to go on from 1 to 2 on the
+    # left and from -1 to -2 on the right.
     size = abs(along) + abs(across)
     share = across / size if size > 0.0 else 0.0
     return share if along >= 0.0 else math.copysign(2.0, across) - share
@@ -151,6 +162,7 @@ def _angle_order(along: float, across: float) -> float:
 @compiled()
 def _columns(right: float, left: float, grid: GridSpacing) -> tuple[int, int]:
     """First column, on the grid, and last, up to a turn beyond it, between two azimuths."""
+    # The columns that the two azimuths lie in. Some of their rays may pass by, none is left out.
     first = math.floor((right + math.pi) / grid.column_width) - WINDOW_MARGIN
     last = math.floor((left + math.pi) / grid.column_width) + WINDOW_MARGIN
     return first % grid.columns, first % grid.columns + min(last - first, grid.columns - 1)
@@ -159,6 +171,7 @@ def _columns(right: float, left: float, grid: GridSpacing) -> tuple[int, int]:
 @compiled()
 def _rows(corners: Floats, surrounds: bool, grid: GridSpacing) -> tuple[int, int]:
     """First and last row of the box with these corners."""
+    # How near, how far, how low and how high the box is; distances in the x, y plane.
     near = 0.0 if surrounds else _nearest(corners)
     far = 0.0
     lowest, highest = math.inf, -math.inf
@@ -168,7 +181,8 @@ def _rows(corners: Floats, surrounds: bool, grid: GridSpacing) -> tuple[int, int
     far = math.sqrt(far)
 
     # A top above the sensor appears highest where it is nearest, one below it where it is farthest;
-    # a bottom the other way round.
+    # a bottom the other way round. Row i holds one elevation, that of its rays, so only the rows
+    # between the two count.
     upper = (grid.top - math.atan2(highest, near if highest > 0.0 else far)) / grid.row_height
     lower = (grid.top - math.atan2(lowest, near if lowest < 0.0 else far)) / grid.row_height
     first = max(0, math.ceil(upper) - WINDOW_MARGIN)
@@ -192,6 +206,8 @@ def _nearest(corners: Floats) -> float:
 @compiled()
 def _to_edge(one: Floats, other: Floats) -> float:
     """Squared distance in the x, y plane from the origin to the stretch between two corners."""
+    # The nearest point of the line, at the share of the way where the connection to the origin is
+    # at a right angle, and held between the ends.
     x, y = one[0], one[1]
     along, across = other[0] - x, other[1] - y
     length = along * along + across * across
