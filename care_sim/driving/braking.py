@@ -112,5 +112,6 @@ class BrakingController:
 def _half_extents(tracks: Tracks) -> tuple[Floats, Floats]:
     """Half the extent of every box along x and along y."""
     length, width, yaw = tracks.boxes[:, 3], tracks.boxes[:, 4], tracks.boxes[:, 6]
+    # A turned rectangle reaches so far along each axis: its sides, each projected on the axis.
     cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
     return (length * cos + width * sin) / 2, (length * sin + width * cos) / 2

@@ -47,9 +47,12 @@ def allocation_difference(ours: Sequence[Cells], theirs: Sequence[Cells]) -> All
         raise InvalidInput(
             f"allocations must be of the same keyframes, got {len(ours)} and {len(theirs)}"
         )
+    # Sums and not means are kept, so that scenes add up to what one pass over all of them gives.
     moved = [_moved(a, b) for a, b in zip(ours, theirs, strict=True)]
     return AllocationDifference(len(moved), sum(cells > 0 for cells in moved), sum(moved))
 
 
 def _moved(ours: Cells, theirs: Cells) -> int:
+    # Of equal sizes both sides have as many cells of their own. Of unequal ones the larger side has
+    # more: what it fired beyond the other counts, too.
     return max(len(ours), len(theirs)) - int(np.isin(ours, theirs).sum())

@@ -1,4 +1,8 @@
-"""Paired bootstrap: how sure a difference is between two policies that met the same episodes."""
+"""Paired bootstrap: how sure a difference is between two policies that met the same episodes.
+
+Episodes differ far more among each other than two policies do in one of them. In the difference of
+a pair that drops out. So pairs are resampled, never each policy by itself.
+"""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -44,6 +48,9 @@ def paired_difference(
     a = np.atleast_1d(np.asarray(ours, float))
     b = np.atleast_1d(np.asarray(theirs, float))
     differences = _differences(a, b)
+
+    # Equal differences have equal resamples, and nothing is to be drawn. Subtraction leaves an
+    # error of the last bits of the samples, hence a tolerance relative to their size.
     if np.ptp(differences) <= 1e-12 * max(1.0, float(np.abs(a).max())):
         mean = float(differences.mean())
         return Interval(mean, mean, mean)
@@ -68,13 +75,19 @@ def ratio_of_sums(
     length or not finite, for a denominator that is not positive, and for one scene beside a second
     group.
     """
+    # A ratio of sums, not a mean of ratios: every event weighs alike, whether its scene has many or
+    # few. A scene is drawn as a whole, with its numerator and its denominator, since what happens
+    # within one is not independent.
     groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
     value = _difference_of_ratios(groups, [np.arange(len(numerators)) for numerators, _ in groups])
-    # Whatever is resampled, it has this value.
+
+    # Where all scenes of a group have one ratio, every resample of it has that ratio, too.
     if all(_constant(*sums) for sums in groups):
         return Interval(float(value), float(value), float(value))
     if any(len(numerators) < 2 for numerators, _ in groups):
         raise InvalidInput("a group of scenes to be drawn from must have at least two")
+
+    # SciPy draws rows, and both columns of the drawn scenes follow from them.
     result = stats.bootstrap(
         [np.arange(len(numerators)) for numerators, _ in groups],
         lambda *drawn, axis=-1: _difference_of_ratios(groups, drawn, axis),
@@ -107,6 +120,7 @@ def _constant(numerators: Floats, denominators: Floats) -> bool:
 
 
 def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Floats]:
+    """The two columns of a group as arrays. Raises InvalidInput as `ratio_of_sums` does."""
     a = np.atleast_1d(np.asarray(numerators, float))
     b = np.atleast_1d(np.asarray(denominators, float))
     _check_pairs(a, b)
@@ -121,6 +135,9 @@ def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Float
 def _resampled(
     differences: tuple[float, ...], confidence: float, resamples: int, seed: int
 ) -> Interval:
+    """The interval of a mean; remembered, since tables and pages ask for the same ones again."""
+    # The percentile interval is that of the mean's own distribution over resamples: it needs no
+    # symmetry, and never leaves the range of the samples.
     result = stats.bootstrap(
         (np.array(differences),),
         np.mean,

@@ -18,7 +18,7 @@ from care_sim.evaluation.bootstrap import Interval, paired_difference
 
 FEWEST_PAIRS = 5
 """Fewer pairs carry no claim: by chance alone, one set of four pairs in eight has differences of
-one sign.
+one sign (2 / 2^4), and then every resample has that sign.
 """
 
 
@@ -68,6 +68,7 @@ class Difference:
         """Whether the interval excludes zero, whatever the censored values were; never of fewer
         than 5 pairs.
         """
+        # On the side of the mean alone: where the cautious reading turns its sign, nothing is said.
         away = self.cautious.low > 0 if self.interval.mean > 0 else self.cautious.high < 0
         return away and self.pairs >= FEWEST_PAIRS
 

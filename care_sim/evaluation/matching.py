@@ -48,9 +48,13 @@ def _distances(annotations: Annotations, detections: Detections) -> Floats:
 
 def _optimal(distances: Floats) -> NDArray[np.intp]:
     near = np.isfinite(distances)
+    # Objects and detections without any match are left out first: the assignment grows with the
+    # third power of their number.
     rows = np.flatnonzero(near.any(axis=1))
     distances = distances[rows][:, near.any(axis=0)]
-    # A pair that is no match costs more than all matches together: most are served, then nearest.
+
+    # A pair that is no match costs more than all matches together. So an assignment of the least
+    # cost serves as many objects as possible, and among such it has the least sum of distances.
     worse_than_all = MATCH_M * (min(distances.shape) + 1)
     served, by = linear_sum_assignment(np.minimum(distances, worse_than_all))
     return rows[served[np.isfinite(distances[served, by])]]
@@ -63,6 +67,7 @@ def _by_score(distances: Floats, scores: Floats) -> list[int]:
     for detection in np.argsort(-scores, kind="stable") if len(distances) else ():
         nearest = int(free[:, detection].argmin())
         if np.isfinite(free[nearest, detection]):
+            # An object that is served is as far as can be from every later detection.
             served.append(nearest)
             free[nearest] = np.inf
     return served

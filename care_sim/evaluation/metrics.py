@@ -19,8 +19,13 @@ def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
     keyframe the camera has it in view, None if it never comes into view. `impact_speed_mps`: the
     ego's speed at its first contact with any body, None without `collision`.
     """
+    # The first detection counts from the first keyframe on, in view or not: LiDAR may find what the
+    # camera does not show.
     first = next((frame.distance_m for frame in keyframes if frame.detected), None)
     appeared = next((n for n, frame in enumerate(keyframes) if frame.in_view), len(keyframes))
+
+    # What a policy lets come near is counted from when it could have been seen, not while it was
+    # hidden behind something.
     seen = keyframes[appeared:]
     missed = [frame.distance_m for frame in seen or keyframes]
     impact = next((f.impact_speed_mps for f in keyframes if f.impact_speed_mps is not None), None)

@@ -78,8 +78,11 @@ class SceneScore:
         _check_keyframes(sightings, len(masks), "masks")
         for index, (shown, mask) in enumerate(zip(sightings.keyframes, masks, strict=True)):
             _check_mask(sightings.scene, index, len(shown), mask)
+        # Rows of the table are the scored annotations, keyframe after keyframe, as the masks are.
         found = np.concatenate(masks)[sightings.in_range]
-        # Found at no row of its object that is younger than K, an event keeps K, the initial value.
+
+        # An event is found first at the youngest of its object's rows that was found. Found at none
+        # that is younger than K, it keeps K, the initial value.
         ages = _ages(sightings, censored_at)
         delays = np.where(found, ages, censored_at).min(axis=1, initial=censored_at)
         return cls(sightings, found, delays, np.sum(ages < censored_at, axis=1))
@@ -90,6 +93,7 @@ class SceneScore:
         An event belongs to the stratum of its first sighting, wherever the object is when it is
         found.
         """
+        # Two denominators: events for first sightings and delays, object frames for overall recall.
         events = self.sightings.events
         rows = np.ones(len(self.found), bool) if within is None else within
         counted = rows[events]
@@ -138,8 +142,9 @@ def _ages(sightings: Sightings, censored_at: int) -> Cells:
     """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of
     other objects.
     """
+    # An event is the first row of its object, so no age is below 0.
     rows = sightings.frames
-    events = sightings.frames.take(sightings.events)
+    events = rows.take(sightings.events)
     late = rows.keyframes - events.keyframes[:, None]
     return np.where(rows.objects == events.objects[:, None], late, censored_at)
 

@@ -82,6 +82,8 @@ def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
 
     Raises InvalidInput where the seeds do not count the same events and object frames of a scene.
     """
+    # The mean comes before the pairing: floor seeds of a scene are no scenes of their own, and as
+    # samples they would make an interval look surer than it is.
     scenes = sorted(set.intersection(*(set(seed) for seed in seeds))) if seeds else []
     return {scene: _mean(scene, [seed[scene] for seed in seeds]) for scene in scenes}
 
@@ -105,7 +107,8 @@ def scene_contrast(
     if not pairs:
         return None
     a, b, weights = _columns(ratio, pairs)
-    # The sum of differences over the sum of events is the difference of the pooled measures.
+    # Both policies have the same events, so the sum of differences over the sum of events is the
+    # difference of the pooled measures.
     by_event = ratio_of_sums((a - b, weights), seed=seed)
     by_scene = paired_difference(a / weights, b / weights, seed=seed)
     return SceneContrast(ratio, by_event, by_scene, len(pairs), float(weights.sum()))
@@ -136,6 +139,8 @@ def contrast_gap(
     ]
     if min(len(group.T) for group in groups) < 2:
         return None
+    # Each group is paired by scene within itself; scenes of the two have nothing in common, so the
+    # groups are resampled apart.
     (a, b, weights), (c, d, others) = groups
     return ratio_of_sums((a - b, weights), less=(c - d, others), seed=seed)
 
@@ -146,6 +151,7 @@ def _among(tallies: Tallies, scenes: Collection[str]) -> Tallies:
 
 def _pairs(ratio: Ratio, ours: Tallies, theirs: Tallies) -> list[tuple[Tally, Tally]]:
     """The tallies of shared scenes in which there is something to find."""
+    # In order of name: the resampling draws rows, so their order is a part of its result.
     pairs = [(scene, ours[scene], theirs[scene]) for scene in sorted(set(ours) & set(theirs))]
     for scene, a, b in pairs:
         _check_same(scene, [a, b])

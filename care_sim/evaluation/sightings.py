@@ -112,6 +112,9 @@ class Sightings:
         start = _table([_together(keyframes[0], hidden)])
         for table in (rows, start):
             _check(scene, table)
+
+        # What is beyond the range is in no scene that is scored, so it counts neither as present
+        # nor as appearing there.
         in_range = rows.ranges <= range_m
         frames = rows.take(in_range)
         appearing = _appearing(frames)
@@ -121,11 +124,13 @@ class Sightings:
 
     def scored(self, keyframe: int) -> NDArray[np.bool_]:
         """(n,) which annotations of a keyframe are in range."""
+        # The mask runs through all keyframes, one after the other.
         start = sum(map(len, self.keyframes[:keyframe]))
         return self.in_range[start : start + len(self.keyframes[keyframe])]
 
     def appearing(self, keyframe: int) -> NDArray[np.bool_]:
         """(n,) which annotations of a keyframe are first sightings."""
+        # Events are rows of the scored objects: their marks go to the scored ones, in their order.
         appears = self.scored(keyframe).copy()
         appears[appears] = np.isin(np.flatnonzero(self.frames.keyframes == keyframe), self.events)
         return appears

@@ -25,6 +25,8 @@ def strata(frames: ObjectFrames) -> dict[str, dict[str, Mask]]:
     The strata of one kind share no row and leave none out. A bound belongs to the farther stratum,
     and to the one farther from straight ahead.
     """
+    # Two bounds make three strata; what is neither near nor far is the one between, so that no row
+    # is in two of them or in none.
     near, far = frames.ranges < NEAR_M, frames.ranges >= FAR_M
     off = np.abs(frames.azimuths)
     front, rear = off < FRONT, off >= REAR
@@ -45,6 +47,7 @@ def thirds(counts: Mapping[str, float]) -> dict[str, list[str]]:
 
     The parts differ by a scene at most; scenes of equal number stand in the order of their names.
     """
+    # The name decides between equal numbers: the thirds must not depend on the order of the scenes.
     ranked = sorted(counts, key=lambda scene: (counts[scene], scene))
     # Rounded bounds spread the remainder, so that no third is larger than another by two.
     bounds = [

@@ -40,6 +40,7 @@ class ClosedLoop:
         self.rig = rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
         self._reported = np.array(list(labels), np.int64)
+        # Each sensor has a stream of its own: a fault of one leaves the draws of the others.
         camera_seed, lidar_seed, odometry_seed = seeds
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
@@ -144,6 +145,9 @@ class ClosedLoop:
         """What the camera as it is mounted shows, before misses, false boxes and delay. Truth: for
         people and scoring.
         """
+
+        # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
+        # next cells are chosen.
         arrived = self._camera.detect(
             self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time
         )
@@ -161,6 +165,7 @@ class ClosedLoop:
         return Picture.of(self._engine.body_ids(camera, sensor, window), window)
 
     def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
+        # 0 means not fired, the reach no return: a scan says inf, which no observation holds.
         ranges = np.zeros(self.rig.grid.size, np.float32)
         ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)

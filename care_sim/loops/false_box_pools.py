@@ -48,6 +48,8 @@ def pool_of_another_drive(
         seen = []
         times_s = []
         over = False
+
+        # What the camera shows is taken before each keyframe, as the episode takes it.
         while not over:
             seen.append(loop.seen.detections)
             times_s.append(world.time)
@@ -62,6 +64,7 @@ def pool_of_film(film: Film) -> BoxPool:
     """All boxes of a film. In a short one those are usable that are half of it away, so that every
     keyframe has some.
     """
+    # From every time of a film of the length T, one of its ends is at least T / 2 away.
     times_s = [shot.time_s for shot in film.shots]
     apart_s = min(APART_S, (times_s[-1] - times_s[0]) / 2)
     seen = [shot.seen.detections for shot in film.shots]

@@ -58,6 +58,7 @@ class OpenLoop:
         objects = sorted(
             {number for shot in film.shots for number in shot.annotations.objects.tolist()}
         )
+        # The camera errs object by object, so it is told of all that the film will ever show.
         self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, lidar_seed)
         pool = pool_of_film(film) if sensing.false_positive_rate else EMPTY_POOL
@@ -86,12 +87,15 @@ class OpenLoop:
         """Fire `fired`, detect on what came back, and go on to the next keyframe."""
         index = self.index
         shot = self.shot
+
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
         self._track_objects.note(tracks, objects)
         velocities = self._memory.velocities(tracks, shot.sensor)
+
+        # After the last keyframe there is nothing to look at, and no cells are to be chosen.
         self.index += 1
         self._memory.predict()
         if not self.over:

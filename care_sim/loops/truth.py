@@ -70,6 +70,7 @@ class TrackObjects:
 
     def note(self, tracks: Cells, objects: Cells) -> None:
         """The tracks with the ids `tracks` (n,) were detected on `objects` (n,)."""
+        # The last one counts: where the tracker changed its object, the truth changes with it.
         self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
 
     def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
@@ -78,6 +79,7 @@ class TrackObjects:
         `boxes_of` gives the present sensor-frame boxes of objects, and leaves out those that are
         nowhere.
         """
+        # All objects are asked for at once: the closed loop reads their boxes off one table.
         boxes = tracks.boxes.copy()
         known = [
             (row, self._objects[track])

@@ -61,6 +61,7 @@ class WatchedKeyframe:
     def returned(self, grid: AngularGrid) -> tuple[Cells, Floats]:
         """The cells (n,) that returned, ascending, and the points (n, 3), sensor frame."""
         ranges = self.ranges.ravel()
+        # Neither not fired (0) nor without return (the reach).
         cells = np.flatnonzero((ranges > 0) & (ranges < grid.range_m))
         return cells, grid.directions[cells] * ranges[cells, None]
 
@@ -82,7 +83,7 @@ class EpisodeWatcher:
     def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""
         loop = self._loop
-        world = self._loop.world
+        world = loop.world
         shown = loop.belief.detections
         return TrueSituation(
             time_s=world.time,
@@ -109,6 +110,7 @@ class EpisodeWatcher:
 
     def _missed(self, given: Cells) -> ImageDetections:
         """What a camera without faults would report now, less the bodies that were `given`."""
+        # Through the camera as designed: what an error of its mount takes out of view is missed, too.
         clear = faultless_detections([self._loop.picture], self._labels)
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence

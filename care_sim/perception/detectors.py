@@ -103,6 +103,7 @@ def _check_parameters(
         signature = inspect.signature(make)
     except (TypeError, ValueError) as error:
         raise BrokenDetector(f"detector {name} tells no parameters") from error
+    # A detector that takes any name checks them by itself.
     accepted = signature.parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return

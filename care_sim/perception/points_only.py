@@ -54,6 +54,7 @@ class PointsOnly:
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
         """See `Detector`. Raises BrokenDetector where it fails or returns what is no detections."""
+        # A copy: what the detector does to its points must not reach the film, which is shared.
         points = np.array(cloud.points, dtype=np.float64)
         try:
             found = self._detector.detect(points, self._sensor_height_m)
@@ -73,6 +74,7 @@ def inside(points: Floats, boxes: Floats) -> NDArray[np.bool_]:
     """
     if boxes.ndim != 2 or boxes.shape[1] != 7:
         raise InvalidInput(f"boxes must have the shape (n, 7), got {boxes.shape}")
+    # In the axes of a box, what lies within half its size along each of them lies in it.
     rows = [
         np.all(np.abs(turned(points - box[:3], -box[6])) <= box[3:6] / 2, axis=1) for box in boxes
     ]
@@ -108,6 +110,7 @@ def checked(name: str, found: Any, points: int) -> Detections:
 
 def _objects_behind(boxes: Floats, cloud: Cloud) -> Cells:
     """(n,) the object that most of the returns within each box lie on, or NOBODY."""
+    # Returns on nobody have no vote: a box that stands on the road holds some of it.
     named = cloud.objects != NOBODY
     objects = cloud.objects[named]
     counts = [
@@ -125,6 +128,7 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
         raise BrokenDetector(
             f"detector {name}: {column} must be an array of numbers, got {values!r:.80}"
         ) from error
+    # What is detected ends in observations, which are float32. NaN fails this comparison, too.
     if not (np.abs(numbers) <= np.finfo(np.float32).max).all():
         raise BrokenDetector(f"detector {name}: {column} must be finite, in single precision")
     return numbers if numbers.size else numbers.reshape((0, 7) if column == "boxes" else 0)
@@ -133,6 +137,7 @@ def _numbers(name: str, column: str, values: Any) -> Floats:
 def _faults(
     points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None
 ) -> list[str]:
+    # What must hold, each beside the sentence for whoever breaks it.
     rules: dict[str, NDArray[np.bool_] | bool] = {
         f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes)
         <= MOST_DETECTIONS,

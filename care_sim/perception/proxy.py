@@ -36,6 +36,7 @@ class ReturnsDetector:
     """
 
     def __init__(self, labels: Mapping[int, int], min_returns: int = MIN_RETURNS):
+        # Ascending, for bisection. A last entry that no body has catches whatever is beyond them.
         self._bodies = np.array([*sorted(labels), np.iinfo(np.int64).max])
         self._labels = np.array([labels[body] for body in sorted(labels)], np.int64)
         self._min_returns = min_returns
@@ -47,6 +48,7 @@ class ReturnsDetector:
 
         `boxes_of` gives the (n, 7) sensor-frame boxes of bodies (n,).
         """
+        # Returns of bodies that are not reported, and of none, fall on a row of another number.
         rows = np.searchsorted(self._bodies, hits)
         counts = np.bincount(rows[self._bodies[rows] == hits], minlength=len(self._bodies))
         kept = np.flatnonzero(counts[:-1] >= self._min_returns)

@@ -53,6 +53,7 @@ class TorchScriptDetector:
 
     def detect(self, points: Floats, sensor_height_m: float) -> Detections:
         """See `care_sim.perception.points_only.PointDetector`."""
+        # Nothing is learned here, so no gradients are kept.
         with self._torch.inference_mode():
             outputs = self._module(
                 self._torch.from_numpy(points.astype(np.float32)), float(sensor_height_m)

@@ -45,6 +45,7 @@ class TrackMemory:
         After `predict` they are the forecasts for the coming keyframe, after `update` its
         estimates.
         """
+        # A stable sort: tracks of one distance stay in the order in which they were begun.
         tracks = self._tracks
         boxes = sensor.boxes_to_local(tracks.boxes)
         nearest = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
@@ -71,6 +72,8 @@ class TrackMemory:
 
         Returns (n,) the id of the track of every detection.
         """
+        # Every detection is of a track, an old one or a new one. New numbers go up without end, so
+        # that no number ever means two objects.
         seen = sensor.boxes_to_world(detections.boxes)
         matched, found = self._assign(detections.classes, seen)
         new = np.ones(len(detections), bool)
@@ -78,7 +81,9 @@ class TrackMemory:
         ids = np.empty(len(detections), np.int64)
         ids[found] = self._tracks.ids[matched]
         ids[new] = np.arange(self._next_id, self._next_id + len(ids) - len(found))
-        # Rows of matched tracks hold only until old tracks are dropped.
+
+        # In this order: rows hold only until old tracks are dropped, and `_correct` counts a miss
+        # for every track that it finds.
         self._correct(matched, seen[found])
         self._forget()
         self._start(ids[new], detections.classes[new], seen[new])
@@ -88,30 +93,41 @@ class TrackMemory:
         """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0
         of a new one.
         """
+        # New tracks come last with higher numbers, and dropping keeps the order: ids ascend.
         rows = np.searchsorted(self._tracks.ids, ids)
         return turned(self._tracks.velocities[rows], -sensor.yaw)
 
     def _assign(self, classes: Cells, seen: Floats) -> tuple[Cells, Cells]:
+        """The rows of the forecasts and of the detections that belong together, pair by pair."""
         tracks = self._tracks
         offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
         distance = np.hypot(offset[..., 0], offset[..., 1])
+
+        # A track with a velocity is forecast where it should be, and its gate is that of the match.
+        # One seen once is forecast where it was, and may have gone any way since.
         elapsed = (tracks.misses + 1) * self._keyframe_s
         slack = np.where(tracks.hits > 1, 0.0, self._rules.first_speed_mps * elapsed)
         gate = self._rules.gate_m + slack
         possible = (distance <= gate[:, None]) & (tracks.classes[:, None] == classes[None, :])
-        # Impossible pairs cost more than any sum of possible ones, so the most pairs are matched.
+
+        # Impossible pairs cost more than any sum of possible ones, so the most pairs are matched,
+        # and of all such matchings the one with the least sum of distances is taken.
         rows, columns = linear_sum_assignment(np.where(possible, distance, 1e6))
         kept = possible[rows, columns]
         return rows[kept], columns[kept]
 
     def _correct(self, rows: Cells, seen: Floats) -> None:
+        """Give the tracks at `rows` (n,) the boxes (n, 7) on which they were detected."""
+        # All tracks miss this keyframe, until those that were detected are set back to 0.
         tracks = self._tracks
         boxes = tracks.boxes.copy()
         velocities = tracks.velocities.copy()
         misses = tracks.misses + 1
         hits = tracks.hits.copy()
         elapsed = (misses[rows] * self._keyframe_s)[:, None]
+
         # A forecast moved at constant velocity; moved back, it is where the object was last seen.
+        # The velocity is the way from there over the time since, however many keyframes that is.
         last_seen = boxes[rows, :2] - velocities[rows] * elapsed
         velocities[rows] = (seen[:, :2] - last_seen) / elapsed
         boxes[rows] = seen
@@ -120,6 +136,7 @@ class TrackMemory:
         self._tracks = Tracks(tracks.ids, tracks.classes, boxes, velocities, misses, hits)
 
     def _forget(self) -> None:
+        """Drop the tracks that nobody has seen for too long."""
         # Keyframes add up to the time with an error of last bits.
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
         if not alive.all():

@@ -83,6 +83,7 @@ def _person(name: str, size: Triple, colour: Triple) -> BodyKind:
     """Two legs one stride apart up to 0.47 of the height (an inseam), torso, and head above the
     chin at 0.87 of it (Drillis and Contini 1966, body segment parameters).
     """
+    # One leg forward on the right, the other back on the left: seen from the side they are apart.
     length, width, height = size
     hip, chin = 0.47 * height, 0.87 * height
     leg = 0.16
@@ -161,6 +162,7 @@ def sized(name: str, label: str | None, size: Triple) -> BodyKind:
         return _block(name, None, size, (0.5, 0.5, 0.5))
     kind = CATALOGUE[label]
     x, y, z = (new / old for new, old in zip(size, kind.size, strict=True))
+    # A round part has one factor across its axis, the smaller of the two, and so stays within.
     turn = min(x, y)
     scales = {"box": (x, y, z), "cylinder": (turn, turn, z), "sphere": (min(turn, z),) * 3}
     parts = tuple(

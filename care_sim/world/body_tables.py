@@ -25,6 +25,7 @@ class Footprints:
 
     def add(self, body: int, size: Triple, pose: Pose) -> None:
         """Take in a body of a size on the ground plane."""
+        # PyBullet numbers bodies upwards, the ground among them: rows between stay NaN.
         missing = body + 1 - len(self.boxes)
         self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
         self._halves = np.vstack([self._halves, np.full((missing, 2), np.nan)])
@@ -38,6 +39,8 @@ class Footprints:
         boxes[:, 6] = poses[:, 2]
         self.boxes[bodies] = boxes
         length, width = boxes[:, 3:5].T
+
+        # A turned rectangle reaches so far along x and y: its sides, each projected on the axis.
         cos, sin = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
         extents = [length * cos + width * sin, length * sin + width * cos]
         self._halves[bodies] = np.stack(extents, axis=1) / 2
@@ -49,6 +52,7 @@ class Footprints:
         gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (
             self._halves + self._halves[body]
         )
+        # NaN, where there is no body, is close to nothing.
         close = (gaps[:, 0] <= within) & (gaps[:, 1] <= within)
         close[body] = False
         return np.flatnonzero(close)

@@ -48,6 +48,8 @@ class BulletWorld:
     """
 
     def __init__(self, ground: bool = True) -> None:
+        # A world that nobody closes leaves its client to others when it is collected. At the end of
+        # the process there are none.
         self._client = borrow()
         self._abandoned = finalize(self, leave, self._client)
         self._abandoned.atexit = False
@@ -83,6 +85,7 @@ class BulletWorld:
         it.
         """
         seen = () if transparent or backdrop else kind.parts
+        # Mass 0: bodies stand where they are put, and nothing ever falls or is pushed.
         body = pybullet.createMultiBody(
             0,
             self._collision_shape(kind.parts),
@@ -103,6 +106,7 @@ class BulletWorld:
 
     def move_all(self, bodies: Integers, poses: Floats) -> None:
         """Put bodies (n,) at poses (n, 3) on the ground plane: x, y, heading."""
+        # A turn by the angle yaw about z is the quaternion (0, 0, sin(yaw / 2), cos(yaw / 2)).
         half = poses[:, 2] / 2
         rows = np.zeros((len(poses), 7))
         rows[:, :2] = poses[:, :2]
@@ -116,6 +120,7 @@ class BulletWorld:
         Returns ranges (n,), inf where nothing was hit within `reach`, and body ids (n,), NO_BODY
         there.
         """
+        # Bullet tests stretches, from a source to a target, and answers with the share of the way.
         self._tell(self._moved)
         targets = origin + directions * reach
         hits: list[tuple[Any, ...]] = []
@@ -125,6 +130,7 @@ class BulletWorld:
             hits += pybullet.rayTestBatch(
                 sources, batch, collisionFilterMask=_OPAQUE, physicsClientId=self._client
             )
+        # It fails by answering too little, not by an error.
         if len(hits) != len(targets):
             raise RuntimeError(f"PyBullet answered {len(hits)} of {len(targets)} rays")
         ids = np.fromiter((hit[0] for hit in hits), np.int64, len(hits))
@@ -161,6 +167,7 @@ class BulletWorld:
 
     def _tell(self, moved: Iterable[int]) -> None:
         """Let PyBullet know where bodies are by now."""
+        # A copy: `moved` may be the very set that shrinks here.
         for body in tuple(moved):
             pose = self.primitives.poses[body].tolist()
             pybullet.resetBasePositionAndOrientation(

@@ -18,6 +18,7 @@ _free: list[int] = []
 
 def borrow() -> int:
     """An empty client. One that somebody else has closed or filled meanwhile is no trouble."""
+    # Whatever finalisers have left is looked at only here, where PyBullet may be called.
     _end_surplus()
     while _free:
         client = _free.pop()

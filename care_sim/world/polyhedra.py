@@ -45,6 +45,7 @@ class Polyhedra:
         and (k,) the body ids.
         """
         if self._tables is None:
+            # An empty mesh first: then there is always one to join, and sums begin at 0.
             meshes = [_NOTHING, *map(_mesh, self._parts)]
             starts = np.cumsum([[len(column) for column in mesh] for mesh in meshes], axis=0)
             corners, faces, edges = (np.concatenate(column) for column in zip(*meshes, strict=True))
@@ -54,6 +55,7 @@ class Polyhedra:
 
 def _mesh(part: Part) -> Mesh:
     """A part's polyhedron in the frame of its body."""
+    # A plane n . p = d about the centre c is n . p = d + n . c about the body's origin.
     corners, faces, edges = polyhedron(part.shape, part.size)
     centre = np.array(part.centre)
     distances = faces[:, 3] + faces[:, :3] @ centre
@@ -70,6 +72,9 @@ def polyhedron(shape: str, size: tuple[float, float, float]) -> Mesh:
     equations, number = np.unique(np.round(hull.equations, SAME_FACE), axis=0, return_inverse=True)
     mine = np.repeat(number, hull.neighbors.shape[1])
     other = number[hull.neighbors].ravel()
+
+    # Each edge is met from both sides: the one with the lower number first is kept. Triangles of
+    # one face have one number, and no edge between them.
     meets = np.stack([mine, other], axis=1)
     edges = np.unique(meets[meets[:, 0] < meets[:, 1]], axis=0)
     return corners, equations * (1, 1, 1, -1), edges

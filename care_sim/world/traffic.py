@@ -34,6 +34,7 @@ class LaneAlongX(StraightLane):  # type: ignore[misc]
         """Metres along the lane and to its side: those of `StraightLane`, to the last bit, without
         its dot products of axes that are 0 and 1 or -1.
         """
+        # The 0.0 stands for the product with the other axis: without it the side could be -0.0.
         x, y = position
         start_x, start_y, sign = self._origin
         return (float(x) - start_x) * sign, (float(y) - start_y) * sign + 0.0
@@ -50,6 +51,7 @@ class LaneDriver(IDMVehicle):  # type: ignore[misc]
 
     def steering_control(self, target_lane_index: tuple[str, str, int]) -> float:
         """Angle of the front wheels, radians."""
+        # In the middle of a straight lane and along it, the steering that IDM computes is 0.
         follows = self._follows(self.road.network.get_lane(target_lane_index))
         return 0.0 if follows else float(super().steering_control(target_lane_index))
 
@@ -74,6 +76,8 @@ class Traffic:
     def __init__(
         self, directions: Sequence[int], ego_lane: int, lane_width: float, speed_limit: float
     ):
+        # highway-env numbers the lanes of each direction apart, in the order in which they are
+        # added; here all lanes have one numbering, from right to left.
         network = RoadNetwork()
         self._lanes: list[tuple[str, str, int]] = []
         counts = {1: 0, -1: 0}
@@ -88,6 +92,7 @@ class Traffic:
             self._lanes.append((*nodes, counts[direction]))
             counts[direction] += 1
         self._ego_lane = ego_lane
+        # A fixed generator: without one, highway-env takes the system's entropy.
         self._road = Road(network, np_random=np.random.RandomState(0))
 
     def add_ego(self, x: float, speed: float, kind: BodyKind) -> "RoadVehicle":
@@ -121,6 +126,8 @@ class Traffic:
         key = self.lane_key(lane)
         road_lane = self._road.network.get_lane(key)
         ahead = STANDING_GAP_M * (1 if road_lane.end[0] > road_lane.start[0] else -1)
+        # Drivers stop this gap before what stands ahead, so the obstacle stands beyond the line. It
+        # is there for them alone: nothing can hit it.
         obstacle = Obstacle(self._road, (x + ahead, road_lane.start[1]))
         obstacle.check_collisions = obstacle.collidable = False
         self._road.objects.append(obstacle)
@@ -145,6 +152,8 @@ class Traffic:
         road_lane = self._road.network.get_lane(key)
         along = float(road_lane.local_coordinates(np.array([x, road_lane.start[1]]))[0])
         vehicle = model.make_on_lane(self._road, key, along, speed)
+
+        # PyBullet tells of collisions. highway-env would stop a vehicle that it thinks has crashed.
         vehicle.LENGTH, vehicle.WIDTH = kind.size[:2]
         vehicle.check_collisions = vehicle.collidable = False
         vehicle.enable_lane_change = False
@@ -186,6 +195,7 @@ class RoadVehicle:
         """Hold an acceleration (m/s^2) for the next step of `dt` seconds; a car at rest does not
         reverse.
         """
+        # No more than what brings it to rest within the step: braking further would be reversing.
         held = max(acceleration, -self.speed / dt)
         self._vehicle.act({"acceleration": held, "steering": 0.0})
 

@@ -27,6 +27,7 @@ class Walk:
 
     def covered(self, time: float) -> float:
         """Metres covered at `time`."""
+        # a t^2 / 2 while speed is gained, then evenly; nothing before the start or past the end.
         moving = max(time - self.starts_s, 0.0)
         gaining = min(moving, self.speed / self.acceleration)
         distance = self.acceleration * gaining**2 / 2 + self.speed * (moving - gaining)

@@ -91,6 +91,7 @@ class World:
         behind all that perception reports, so that the camera need not render it. Raises
         InvalidInput for an unknown kind.
         """
+        # Only what may move is asked for its pose at every step.
         pose_at = _motion(pose)
         place = pose_at(self.time)
         check_known("kind of body", kind, CATALOGUE)
@@ -123,6 +124,8 @@ class World:
         """Move everything by `duration` seconds, a whole number of world steps. The ego holds
         `acceleration` (m/s^2) meanwhile.
         """
+        # Looked at after every step: between two keyframes the car may hit something and be past
+        # it, or come closest to it.
         steps = [self._step(acceleration) for _ in range(whole_steps(duration))]
         impacts = (step.impact_speed_mps for step in steps if step.impact_speed_mps is not None)
         return ClosestApproach(
@@ -136,16 +139,21 @@ class World:
         self.bullet.close()
 
     def _step(self, acceleration: float) -> ClosestApproach:
+        # The traffic moves first, the ego in it, then the clock; events are of the new time.
         before = self.ego.speed
         self.ego.accelerate(acceleration, WORLD_STEP_S)
         self.traffic.step(WORLD_STEP_S)
         # Counted and rounded, so that no sum of steps drifts away from the times of events.
         self._steps += 1
         self.time = round(self._steps * WORLD_STEP_S, 9)
+
+        # An event may start others, so those that are due are listed before any is called.
         for event in [event for due, event in self._events if due <= self.time]:
             event()
         self._events = [(due, event) for due, event in self._events if due > self.time]
         self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / WORLD_STEP_S)
+
+        # Poses are read after events, which may change who moves.
         bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
         self.bullet.move_all(bodies, poses)

@@ -65,6 +65,7 @@ def fit_sides(plan: Floats) -> Sides:
     cos, sin = np.cos(headings), np.sin(headings)
     axes = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], axis=1)
     along = axes @ plan.T
+
     # Rounded, so that of headings equal but for the last bits the first is taken.
     best = axes[np.argmax(np.round(_closeness(along), DECIMALS))]
     return Sides(best, (best @ plan.T).min(axis=1), (best @ plan.T).max(axis=1))
@@ -79,7 +80,9 @@ def _closeness(along: Floats) -> Floats:
     to_lows, to_highs = (
         np.round(np.linalg.norm(one, axis=2), DECIMALS) for one in (to_low, to_high)
     )
-    # Along each axis the shown side is the one that the points lie nearer to, all together.
+
+    # Along each axis the shown side is the one that the points lie nearer to, all together. A point
+    # counts by its distance to the nearer of the two shown sides: it lies on one of them.
     low_is_shown = to_lows <= to_highs
     distance = np.where(low_is_shown[..., None], to_low, to_high).min(axis=1)
     return np.asarray((1.0 / np.maximum(distance, ON_THE_SIDE_M)).sum(axis=1))

@@ -66,6 +66,9 @@ class ClusterDetector:
         above = heights > KERB_CLEARANCE_M
         standing = points[above]
         heights = heights[above]
+
+        # Fewer points than the proxy asks for are no object; what fits no class is dropped; of two
+        # candidates at one place the one with more points stays.
         clusters = [
             rows for rows in clusters_of(standing[:, :2], self._grid) if len(rows) >= MIN_RETURNS
         ]
@@ -98,6 +101,8 @@ def _one_a_place(found: list[_Candidate]) -> list[_Candidate]:
 
     Such are a windscreen behind a bonnet, and a side seen too obliquely to hang together.
     """
+    # Those with the most points come first, then the nearest. The distance is rounded, so that the
+    # order of equal ones is not that of their last bits.
     kept: list[_Candidate] = []
     for candidate in sorted(
         found, key=lambda one: (-one.points, np.round(np.hypot(*one.place), DECIMALS))

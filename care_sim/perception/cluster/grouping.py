@@ -39,6 +39,9 @@ def clusters_of(plan: Floats, grid: AngularGrid) -> list[Cells]:
     points = _even(plan, grid)
     # The tree finds pairs up to its radius; neighbours are nearer than 1, and not at it.
     pairs = cKDTree(points).query_pairs(np.nextafter(1.0, 0.0), output_type="ndarray")
+
+    # Clusters are the parts of the graph of neighbours that hang together. A stable sort by label
+    # keeps their points in order, and labels are given in the order of first points.
     near = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(points), len(points)))
     _, labels = connected_components(near, directed=False)
     order = np.argsort(labels, kind="stable")
@@ -52,6 +55,8 @@ def _even(plan: Floats, grid: AngularGrid) -> Floats:
     on as a tube around its rim, with the logarithm of the range along it: lengths r dphi and dr are
     divided alike.
     """
+    # At the rim both rules for the radius give the same. Within it `beyond` is 1 and its logarithm
+    # 0: a flat disc in units of the constant radius.
     share = COLUMNS_APART * grid.column_width
     rim = NEAR_RADIUS_M / share
     ranges = np.hypot(plan[:, 0], plan[:, 1])

@@ -37,6 +37,8 @@ def road_plane(points: Floats, sensor_height_m: float) -> Floats:
     low = points[_could_be_road(points, level)]
     if len(low) < len(level):
         return level
+
+    # The free numbers are those of the bounded departure, so the fit needs no bounds of its own.
     design = np.column_stack([low[:, :2], np.ones(len(low))])
 
     def misses(free: Floats) -> Floats:
@@ -65,5 +67,6 @@ def _bounded(free: Floats) -> tuple[Floats, Floats]:
 
 
 def _could_be_road(points: Floats, level: Floats) -> NDArray[np.bool_]:
+    # As far off the level plane as the road may be at most at this range, and its roughness.
     reach = SETTLING_M + ROUGHNESS_M + STEEPEST * np.hypot(points[:, 0], points[:, 1])
     return np.asarray(np.abs(heights_above(points, level)) <= reach)

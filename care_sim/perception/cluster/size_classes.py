@@ -75,13 +75,21 @@ def _misfits(sides: Sides, seen: Floats, sensor_height_m: float, grid: AngularGr
     No side should look longer than the body is, nor shorter than the part of it that hangs
     together.
     """
+    # Either end of a side lies anywhere within half a step of its last point: a variance of
+    # step^2 / 12 each, and step^2 / 6 for both. Of the height only the top is uncertain, so its
+    # step is taken smaller by sqrt(2).
     range_m = sides.range_m
     steps = np.array([grid.column_width, grid.column_width, grid.row_height / np.sqrt(2)]) * range_m
+
+    # A side that the scan does not show in one piece may look as short as the piece, and shorter by
+    # what a gap between clusters takes. The same holds for a top above the highest row.
     shown = np.minimum(
         _ALONG, np.append(_hanging(sides, grid), sensor_height_m + range_m * np.tan(grid.top))
     )
     blurred = np.where(shown < _ALONG, cluster_radius(grid, range_m), 0.0)
     variance = (SIZE_SPREAD * _ALONG) ** 2 + FIT_M**2 + steps**2 / 6 + blurred**2
+
+    # Between the piece and the whole, any length fits. One of the two terms is 0.
     deviation = np.maximum(seen - _ALONG, 0.0) + np.minimum(seen - shown, 0.0)
     return np.asarray((deviation**2 / variance).sum(axis=1))
 
