@@ -39,6 +39,8 @@ def check_fields(thing: Any, of: str = "") -> None:
 
 
 def _settled(name: str, value: Any, default: Any, bounds: tuple[float, float]) -> Any:
+    """A value as the type of its field's default. Raises InvalidInput for what it cannot be."""
+    # Flags come before whole numbers: in Python a bool is an int.
     if isinstance(default, bool):
         check_flag(name, value)
     elif isinstance(default, str):

@@ -16,7 +16,8 @@ LARGEST_INTEGER = 2**31 - 1
 """What a whole number may be where nothing else is said."""
 LARGEST_SEED = 2**63 - 1
 """What a column of a results file holds."""
-LONGEST_PATH, LONGEST_NAME = 4095, 255
+LONGEST_PATH = 4095
+LONGEST_NAME = 255
 """Bytes of a path and of a name in it (Linux)."""
 
 
@@ -57,6 +58,7 @@ def check_number(
 
 def _finite(value: Any) -> float:
     """The number as a float; NaN, which lies in no range, for what none is near."""
+    # A whole number of Python may be larger than any float.
     try:
         number = float(value)
     except OverflowError:
@@ -99,6 +101,7 @@ def check_seed(seed: object, name: str = "seed") -> None:
 
 def check_path(name: str, value: object) -> None:
     """Raise InvalidInput for what no file or folder can be called."""
+    # As bytes, for a file system counts those. A path in bytes is refused: tables hold text.
     try:
         path = b"" if isinstance(value, bytes) else os.fsencode(value)  # type: ignore[arg-type]
     except (TypeError, UnicodeError) as error:

@@ -45,6 +45,7 @@ def _sources_digest(name: str) -> str:
     """Hash of all that is compiled into the functions of a module: its source, the constants that
     it holds or imports, and the same of the modules whose functions and named tuples it uses.
     """
+    # Numba writes constants of the module into the machine code; imported ones are among them.
     module = sys.modules[name]
     constants = [
         (name, value)

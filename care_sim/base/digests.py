@@ -13,7 +13,7 @@ MOST_FILES = 10_000
 _OF_THE_SYSTEM = tuple(
     map(Path, ("/proc", "/sys", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"))
 )
-"""No files of anybody: they change from one moment to the next."""
+"""Views of the system and of this process, nobody's files: they change from moment to moment."""
 
 
 def file_digest(path: Path) -> str | None:

@@ -71,6 +71,7 @@ def check_page() -> None:
 
 
 def _import(module: str, name: str, extra: str) -> ModuleType:
+    """A module of an `extra`, which a user knows as `name`."""
     try:
         return import_module(module)
     except ImportError as error:

@@ -1,5 +1,9 @@
 """Files that are there whole or not at all. Every file that CARE-Sim writes goes through here, but
 for journals.
+
+A program may be ended at any time, and a disk may be full. A file that is written in its own place
+is then cut short, and the old one is gone. So content goes to a file beside it, on the same file
+system, where a move is one step that cannot be half done.
 """
 
 import errno
@@ -50,6 +54,8 @@ def check_output(path: Path, kind: bytes = b"") -> None:
     already, or that holds a file which does not begin like one of `kind`. Raise OSError where
     writing is not allowed. The folder is made.
     """
+    # What stands there decides first. Then a file is made beside it and removed again, which tells
+    # at once what the system would not allow at the end.
     _resolved(path)
     if _is_stream(path):
         return
@@ -71,6 +77,8 @@ def write_text(path: Path, text: str) -> None:
 
 
 def _check_old(path: Path, kind: bytes) -> None:
+    """Raise for a file that must not be replaced."""
+    # A move asks for rights to the folder alone. A file that may not be written is meant to stay.
     if not os.access(path, os.W_OK):
         raise PermissionError(errno.EACCES, "it is there and may not be written", str(path))
     with path.open("rb") as old:
@@ -87,6 +95,7 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
     """A file beside what `path` is or links to, with its rights, which is moved there or, if not
     kept, removed.
     """
+    # Two writers of one file would each lose what the other wrote, and share the name beside it.
     place = _resolved(path)
     if place in _being_written:
         raise InvalidInput(
@@ -98,6 +107,8 @@ def _moved_to(path: Path, keep: bool = True) -> Iterator[Path]:
         place.parent.mkdir(parents=True, exist_ok=True)
         unfinished.touch()
         yield unfinished
+
+        # An error before this line leaves the old file as it is.
         if keep:
             if place.exists():
                 shutil.copymode(place, unfinished)
@@ -128,6 +139,8 @@ def _written_into(path: Path) -> Iterator[Path]:
         unfinished = Path(folder) / path.name
         unfinished.touch()
         yield unfinished
+
+        # What was printed before must come before, where the stream is the output of this process.
         sys.stdout.flush()
         try:
             with unfinished.open("rb") as content, path.open("ab") as target:
@@ -138,6 +151,7 @@ def _written_into(path: Path) -> Iterator[Path]:
 
 def _clear_away_before(path: Path) -> None:
     """Remove what writers of the file have left beside it that were killed on this host."""
+    # The name tells host and process: on a shared file system another host's may still be at work.
     place = _resolved(path)
     ours = re.compile(rf"\.{_host()}\.(\d{{1,9}})\.{re.escape(_end_of_name(place))}")
     for name in os.listdir(place.parent):
@@ -148,6 +162,7 @@ def _clear_away_before(path: Path) -> None:
 
 
 def _runs(pid: int) -> bool:
+    """Whether there is a process of this number: signal 0 asks without sending anything."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -162,7 +177,7 @@ def _host() -> str:
 
 
 def _end_of_name(place: Path) -> str:
-    """Of the 255 bytes that a name may have."""
+    """As much of the file's name as fits beside the rest into the 255 bytes of a name."""
     return os.fsencode(place.name)[-200:].decode(errors="ignore")
 
 

@@ -24,7 +24,7 @@ SIGNALS = tuple(
 """All end a command in the same way."""
 _HEARD = (*SIGNALS, signal.SIGALRM)
 SOON_S = 0.02
-"""After which an interrupt that came at a bad moment comes again."""
+"""Seconds after which an interrupt that came at a bad moment is raised again."""
 
 
 def end_at_once() -> None:
@@ -56,6 +56,7 @@ def held_back() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    # Only handlers of Python can wait in a list. What is ignored, or the system's, stays so.
     waiting: list[int] = []
     with _deaf():
         handlers = {number: signal.getsignal(number) for number in _HEARD}
@@ -68,6 +69,7 @@ def held_back() -> Iterator[None]:
         with _deaf():
             for number, handler in before.items():
                 signal.signal(number, handler)
+        # One is enough: all end a command in the same way. It is raised when the handlers are back.
         for number in waiting[:1]:
             signal.raise_signal(number)
 
@@ -91,11 +93,14 @@ def _listen(handler: Callable[[int, Any], Any] | signal.Handlers) -> None:
 
 
 def _end(*_: object) -> None:
+    # Written to the descriptor itself: in a handler, what prints may be in the middle of printing.
     os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, b"care-sim: interrupted\n")
     os._exit(INTERRUPTED)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
+    # An import may catch what is raised within it and raise an error of its own. So an interrupt
+    # waits for its end, asking by the alarm; a second one typed meanwhile is not put off.
     again = number != signal.SIGALRM and signal.getitimer(signal.ITIMER_REAL)[0] > 0
     if _imports(frame) and not again:
         signal.setitimer(signal.ITIMER_REAL, SOON_S)
@@ -104,6 +109,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
+    """Whether an import is going on: its machinery is among the callers."""
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
             return True
@@ -112,6 +118,7 @@ def _imports(frame: FrameType | None) -> bool:
 
 
 def _come_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Have an interrupt that nobody could catch raised once more, a moment later."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         signal.setitimer(signal.ITIMER_REAL, SOON_S)
     else:

@@ -1,4 +1,4 @@
-"""JSON of the user's: whatever is wrong with it is a ValueError."""
+"""JSON from a user's files: whatever is wrong with it is a ValueError."""
 
 import json
 import stat
@@ -22,12 +22,14 @@ def json_content(
     """The content of a file of at most `most` bytes, every map in it replaced by what is `taken` of
     it.
 
-    Raises OSError for a file that cannot be read, ValueError as `check_file_size` and `parsed` do,
-    and for one that the memory does not hold.
+    Raises OSError for a file that cannot be read, ValueError as `check_file_size` and `parsed_json`
+    do, and for one that the memory does not hold.
     """
+    # The size is looked at first, so that a file of another kind is refused before it fills the
+    # memory.
     check_file_size(path, most)
     try:
-        return parsed(path.read_text(encoding="utf-8"), taken)
+        return parsed_json(path.read_text(encoding="utf-8"), taken)
     except MemoryError as error:
         raise ValueError("it is larger than the memory that is free") from error
 
@@ -43,7 +45,7 @@ def check_file_size(path: Path, most: int = MOST_BYTES) -> None:
         raise ValueError(f"it holds {there.st_size} bytes and may hold {most}")
 
 
-def parsed(text: str | bytes, taken: Callable[[dict[str, Any]], object] | None = None) -> Any:
+def parsed_json(text: str | bytes, taken: Callable[[dict[str, Any]], object] | None = None) -> Any:
     """The content of a text, every map in it replaced by what is `taken` of it.
 
     Raises ValueError for what is no JSON, and for what is nested deeper than `MOST_LEVELS`, or so
@@ -60,6 +62,7 @@ def parsed(text: str | bytes, taken: Callable[[dict[str, Any]], object] | None =
 
 def _is_deep(content: object) -> bool:
     """Whether it is; level by level, without recursion."""
+    # One pass per level keeps only the lists and maps that lie one level deeper.
     level = [content]
     for _ in range(MOST_LEVELS):
         level = [

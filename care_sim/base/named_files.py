@@ -54,6 +54,8 @@ def files_named_by(entry: EntryPoint) -> dict[str, Path]:
         entry.load()
     except (Exception, SystemExit):
         return {}
+    # A file counts wherever a name of it is found. A folder counts as all files below it, so only
+    # one that is meant as such.
     here = Path.cwd()
     found = (
         path

@@ -65,6 +65,7 @@ def source_names(source: Path) -> SourceNames:
         nodes = [*ast.walk(ast.parse(source.read_bytes()))]
     except (OSError, ValueError, SyntaxError, RecursionError):
         return SourceNames()
+    # Documentation is text as well; what names no file does no harm.
     texts = {
         node.value
         for node in nodes
@@ -109,6 +110,7 @@ def _roots(top: str) -> list[Path]:
         spec = find_spec(top)
     except (ImportError, ValueError):
         return []
+    # A namespace package has several places, a module one. In a zip archive none of them is a file.
     places = (spec.submodule_search_locations or [spec.origin or ""]) if spec else []
     roots = [Path(place) for place in places]
     return roots if all(root.name and root.exists() for root in roots) else []

@@ -58,6 +58,7 @@ class Plugins(Generic[Made]):
 
     def entries(self) -> dict[str, EntryPoint]:
         """The entry that counts, by name."""
+        # Of one name the last that is put in stays, and reversed that is the first on the path.
         return {entry.name: entry for entry in reversed(self.all_entries())}
 
     def hidden_entries(self) -> Iterator[tuple[EntryPoint, EntryPoint | None]]:
@@ -79,6 +80,7 @@ class Plugins(Generic[Made]):
         # Foreign code may fail in any way; some leaves by `sys.exit`.
         except (Exception, SystemExit) as error:
             raise InvalidInput(error_line(error)) from error
+        # The first fault is told; the others may follow from it.
         for fault in self.faults(made):
             raise InvalidInput(f"{entry.value} {fault}")
         maker: Callable[..., Made] = made

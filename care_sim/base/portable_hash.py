@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 STEP = 1e-4
-"""Metres, radians, metres a second: what measured numbers are rounded to. A whole episode computed
-with other features of the processor moves poses by less than 1e-13, and the float32 ranges of an
-observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of rays)
-is centimetres."""
+"""Metres, radians, metres per second: what measured numbers are rounded to. A whole episode
+computed with other features of the processor moves poses by less than 1e-13, and the float32 ranges
+of an observation by their last bit, 4e-6; what an outcome rests on (sizes, margins, the spacing of
+rays) is centimetres."""
 SHIFT = (5**0.5 - 1) / 2
 """Shares of a step by which the borders between steps lie beside the round numbers that scenes are
 made of (0, 0.05, 1.5, a half of anything): a number on a border would be rounded by its last bit.
@@ -36,6 +36,8 @@ def portable_bytes(*parts: Content | tuple[Content, ...]) -> bytes:
 
 
 def _bytes_of(part: object) -> bytes:
+    # Each part begins with its kind and size, so that no two different sequences of parts are the
+    # same bytes: ("ab", "c") is not ("a", "bc").
     if isinstance(part, str):
         text = part.encode(errors="surrogatepass")
         return b"text %d " % len(text) + text
@@ -48,6 +50,8 @@ def _bytes_of(part: object) -> bytes:
 
 def _rounded(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
     """The step that each number lies in."""
+    # Floor, not round: a border lies SHIFT beside each multiple of the step. Clipped, so that every
+    # step is a 64-bit integer, and those beyond are left for infinity and NaN.
     steps = np.floor(np.clip(numbers.astype(np.float64) / STEP + SHIFT, -_LARGEST, _LARGEST))
     counted = np.where(np.isfinite(numbers), steps, 0.0).astype(np.int64)
     infinite = np.where(np.isinf(numbers), np.where(numbers > 0, _INFINITE, -_INFINITE), counted)

@@ -17,7 +17,7 @@ from care_sim.base.interrupts import SIGNALS, held_back
 _T = TypeVar("_T")
 
 LOOK_S = 1.0
-"""Between two looks whether the starter is there."""
+"""Seconds between two looks at whether the starter is there."""
 
 UNHEARD = {number for number in SIGNALS if number != signal.SIGTERM}
 """What a terminal sends to all processes in it. SIGTERM is how a pool ends a worker."""
@@ -46,6 +46,8 @@ def end_with_parent() -> None:
     gone, however that ended. Of a fork server's workers that is not the fork server, which goes
     when the last of them has gone.
     """
+    # A thread waits for the parent, and as a daemon it keeps nobody: no signal tells a child that
+    # its parent was killed.
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(
@@ -67,6 +69,8 @@ def end_with_starter(starter: int) -> None:
 
 
 def _end_without(starter: int) -> None:
+    # A process whose starter is gone gets another parent. That is no signal either, so it is looked
+    # at from time to time.
     while os.getppid() == starter:
         time.sleep(LOOK_S)
     os._exit(1)

@@ -29,6 +29,7 @@ def secret_entropy(what: str, entropy: tuple[int, ...], secret: str) -> int:
     """256 bits of what is drawn, its seed and a secret (HMAC-SHA-256), of which neither can be
     told. An episode and a street of one seed have nothing in common.
     """
+    # As plain decimal numbers, so that an integer of NumPy gives what one of Python does.
     message = " ".join([what, *(str(int(number)) for number in entropy)])
     return int.from_bytes(hmac.digest(secret.encode(), message.encode(), "sha256"))
 

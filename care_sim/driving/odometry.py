@@ -21,8 +21,8 @@ class Odometry:
         """What is read of the car's true `motion` now."""
         if not self._speed_sigma:
             return motion
-        # Noise is folded back at 0. Were it cut there, half the readings of a standing car would be
-        # exact.
+        # Noise is folded back at 0. If it were cut there, half the readings of a standing car would
+        # be exact.
         way = -1.0 if motion.speed < 0 else 1.0
         pace = abs(abs(motion.speed) + self._speed_sigma * self._rng.standard_normal())
         return replace(motion, speed=way * pace)

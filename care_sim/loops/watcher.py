@@ -110,7 +110,7 @@ class EpisodeWatcher:
 
     def _missed(self, given: Cells) -> ImageDetections:
         """What a camera without faults would report now, less the bodies that were `given`."""
-        # Through the camera as designed: what an error of its mount takes out of view is missed, too.
+        # Through the camera as designed: what an error of its mount hides is missed, too.
         clear = faultless_detections([self._loop.picture], self._labels)
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import check_file_size, parsed
+from care_sim.base.json_text import check_file_size, parsed_json
 from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.run_config import Row
 
@@ -118,7 +118,7 @@ def _read(line: str) -> Row | None:
     if whole is None or _checksum(whole[1]) != whole[2]:
         return None
     try:
-        row = parsed(whole[1] + "}")
+        row = parsed_json(whole[1] + "}")
     except ValueError:
         return None
     named = all(isinstance(row.get(name), str) for name in ("digest", _STUDY))

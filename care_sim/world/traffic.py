@@ -69,7 +69,7 @@ class LaneDriver(IDMVehicle):  # type: ignore[misc]
 class Traffic:
     """A straight road and the vehicles that drive on it.
 
-    `directions` gives one entry a lane from right to left: +1 along the ego, -1 oncoming;
+    `directions` gives one entry per lane from right to left: +1 along the ego, -1 oncoming;
     `ego_lane` is the index of the ego's lane in it.
     """
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import MOST_BYTES, MOST_LEVELS, json_content, parsed
+from care_sim.base.json_text import MOST_BYTES, MOST_LEVELS, json_content, parsed_json
 from care_sim.policies.learned.weights import load_weights
 from care_sim.reports.page.provenance import CONFIG, _description
 from care_sim.sources.nuscenes.tables import LARGEST_TABLE, read_json
@@ -20,10 +20,10 @@ DEEP = {n: "[" * n + "]" * n for n in (MOST_LEVELS, MOST_LEVELS + 1, 980, 100_00
 
 def test_what_is_not_too_deep_comes_back():
     for text in ('{"a": [1, {"b": null}]}', DEEP[MOST_LEVELS], "3", '"\\ud800"'):
-        assert parsed(text) == json.loads(text)
-    assert parsed('{"a": {"b": 1}}', len) == 1
+        assert parsed_json(text) == json.loads(text)
+    assert parsed_json('{"a": {"b": 1}}', len) == 1
     wide = json.dumps([[[n]] for n in range(1000)])
-    assert parsed(wide) == json.loads(wide)
+    assert parsed_json(wide) == json.loads(wide)
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_what_is_not_too_deep_comes_back():
 )
 def test_what_is_too_deep_is_a_value_error(text):
     with pytest.raises(ValueError, match="deep"):
-        parsed(text)
+        parsed_json(text)
 
 
 @pytest.mark.parametrize("levels", [980, 100_000])

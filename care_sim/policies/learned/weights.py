@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_path, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import ZIP, replacing
-from care_sim.base.json_text import parsed
+from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.wrapping import Wrapping, wrapping_of_line
@@ -65,7 +65,7 @@ class Card:
     @classmethod
     def from_json(cls, text: str) -> "Card":
         """Read text back. Raises ValueError for anything but a card."""
-        plain = parsed(text)
+        plain = parsed_json(text)
         if not isinstance(plain, dict) or plain.pop("format", None) != FORMAT:
             raise ValueError(f"its card is not of the format {FORMAT!r}")
         if wrong := set(plain) ^ {column.name for column in fields(cls)}:

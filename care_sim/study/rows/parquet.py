@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing
-from care_sim.base.json_text import parsed
+from care_sim.base.json_text import parsed_json
 from care_sim.study.rows.schema import Schema
 from care_sim.study.run_config import Row
 
@@ -106,7 +106,7 @@ def read_notes(path: Path) -> tuple[str | None, list[str]]:
     notes = _read(path).schema.metadata or {}
     try:
         study = notes[STUDY_NOTE].decode() if STUDY_NOTE in notes else None
-        left_out = parsed(notes.get(LEFT_OUT_NOTE, b"[]"))
+        left_out = parsed_json(notes.get(LEFT_OUT_NOTE, b"[]"))
     except ValueError as error:
         raise InvalidInput(f"{path} has notes that cannot be read: {_first_line(error)}") from error
     if not isinstance(left_out, list) or not all(isinstance(each, str) for each in left_out):
