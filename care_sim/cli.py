@@ -1,4 +1,4 @@
-"""The command line `care-sim`: finds the command, runs it, and says in one line what was wrong."""
+"""The command line `care-sim`: finds the command, runs it, and says in one line what went wrong."""
 
 import contextlib
 import importlib
@@ -13,18 +13,20 @@ from care_sim.base import interrupts
 from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
 from care_sim.commands.shared.parsing import chosen_command
 
-BAD_INPUT, UNEXPECTED, UNREAD = 2, 70, 141
-"""Exit codes: that of a fault in the software is `EX_SOFTWARE` of BSD, the last that of a shell for
-the signal.
-"""
-DEBUG = "--debug"
+_BAD_INPUT = 2
+_UNEXPECTED = 70
+"""The exit code of a fault in the software: `EX_SOFTWARE` of BSD."""
+_UNREAD = 141
+"""The exit code where nobody reads the output: what a shell gives for SIGPIPE, 128 + 13."""
+_DEBUG = "--debug"
 
-
-ABOUT = (
+_ABOUT = (
     "Benchmark for adaptive LiDAR sensing: the closed loop, and first sightings in the open loop."
 )
-LONGEST, NARROWEST = 2000, 20
-"""Characters of a complaint, and of a line of help at the least."""
+_LONGEST = 2000
+"""Characters of a complaint, at the most."""
+_NARROWEST = 20
+"""Columns of a terminal for which help is laid out, at the least."""
 
 
 class CommandEntry(NamedTuple):
@@ -37,8 +39,8 @@ class CommandEntry(NamedTuple):
     def loaded(self) -> Any:
         """The dataclass of its options, whose call runs it; or a table of several by name.
 
-        Only the command that is asked for is imported, and here alone: what plays, draws or learns
-        takes seconds to import, which `care-sim --help` and a mistyped name need not wait for.
+        Only the command that is asked for is imported: what plays, draws or learns takes seconds to
+        import, for which `care-sim --help` and a mistyped name need not wait.
         """
         return getattr(importlib.import_module(f"care_sim.commands.{self.module}"), self.name)
 
@@ -97,7 +99,7 @@ COMMANDS = {
     ),
     "report": CommandEntry(
         "report",
-        "Report",
+        "PrintReport",
         "Print the tables of a folder of results and draw its figures again, or make one web "
         "page of it all.",
     ),
@@ -146,25 +148,28 @@ COMMANDS = {
     ),
 }
 
-STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
-KEPT = dict.fromkeys(STUDIES, "; what is finished is kept, the same command goes on from there")
-AGENTS = ("ppo", "sac", "recurrent-ppo")
-KEPT |= dict.fromkeys(
-    (f"train {name}" for name in AGENTS),
-    "; what is learned is kept, the same command with --resume goes on from there",
-)
-"""What commands that keep what they have finished say when they are interrupted."""
+_STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
+_AGENTS = ("train ppo", "train sac", "train recurrent-ppo")
+_KEPT = {
+    **dict.fromkeys(_STUDIES, "; what is finished is kept, the same command goes on from there"),
+    **dict.fromkeys(
+        _AGENTS, "; what is learned is kept, the same command with --resume goes on from there"
+    ),
+}
+"""What is added to "interrupted" for commands that keep what they have finished."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit.
 
-    0 done, 1 something failed or a policy was left out, 2 bad input, 70 a fault of the software
-    itself, whose trace `--debug` shows, 130 interrupted, 141 nobody reads the output any more.
+    Exit codes: 0 done, 1 something failed or a policy was left out, 2 bad input, 70 a fault of the
+    software itself, whose trace `--debug` shows, 130 interrupted, 141 nobody reads the output any
+    more.
     """
+    # A host that calls this with arguments keeps its handlers of signals and its process.
     alone = arguments is None
     given = list(sys.argv[1:] if arguments is None else arguments)
-    arguments = [argument for argument in given if argument != DEBUG]
+    arguments = [argument for argument in given if argument != _DEBUG]
     try:
         if alone:
             interrupts.raise_them()
@@ -172,18 +177,20 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         sys.exit(_finished(arguments))
     except (KeyboardInterrupt, Exception) as error:
         if not _is_interrupt(error):
-            _end_with(error, trace=DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
+            _end_with(error, trace=_DEBUG in given or bool(os.environ.get("CARE_SIM_DEBUG")))
         if alone:
             interrupts.end_in_silence()
-        words = 2 if arguments[:1] == ["train"] else 1
-        _complain(f"interrupted{KEPT.get(' '.join(arguments[:words]), '')}", interrupts.INTERRUPTED)
+        command = " ".join(arguments[: 2 if arguments[:1] == ["train"] else 1])
+        _complain(f"interrupted{_KEPT.get(command, '')}", interrupts.INTERRUPTED)
     finally:
         if alone:
             interrupts.end_in_silence()
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Whether it is one, or what an import has made of one."""
+    """Whether an error is an interrupt, or what an import has made of one."""
+    # A compiled module that is interrupted while it is imported raises ImportError or SystemError,
+    # and keeps the interrupt as the cause.
     link: BaseException | None = error
     while link is not None and not isinstance(link, KeyboardInterrupt):
         link = (
@@ -202,7 +209,7 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         _complain(str(error))
     if isinstance(error, BrokenPipeError):
         _leave_output()
-        sys.exit(UNREAD)
+        sys.exit(_UNREAD)
     if isinstance(error, OSError):
         _leave_output()
         _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
@@ -210,27 +217,29 @@ def _end_with(error: BaseException, trace: bool) -> NoReturn:
         raise error
     told = f"unexpected {type(error).__name__}: {error}"
     _complain(
-        f"{told}; please report it, with the trace that {DEBUG} (or CARE_SIM_DEBUG=1) shows",
-        UNEXPECTED,
+        f"{told}; please report it, with the trace that {_DEBUG} (or CARE_SIM_DEBUG=1) shows",
+        _UNEXPECTED,
     )
 
 
 def _settle_output() -> None:
-    """Let output go nowhere where there is none. Write what an encoding lacks as an escape. Take a
-    terminal of few columns, for which tyro never ends its help, for one of NARROWEST.
-    """
+    """Prepare standard output and error for whatever is printed."""
+    # A process without a terminal may have no streams at all. What an encoding lacks is written as
+    # an escape.
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 (as long as the process)
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    if shutil.get_terminal_size().columns < NARROWEST:
-        os.environ["COLUMNS"] = str(NARROWEST)
+    # For a terminal of very few columns tyro never comes to the end of its help.
+    if shutil.get_terminal_size().columns < _NARROWEST:
+        os.environ["COLUMNS"] = str(_NARROWEST)
 
 
 def _leave_output() -> None:
-    """Let what cannot be written any more go nowhere, or Python would complain of it at its end."""
+    """Drop what cannot be written any more."""
+    # Python flushes at its end, and would complain of it then.
     try:
         sys.stdout.flush()
     except OSError:
@@ -238,16 +247,16 @@ def _leave_output() -> None:
 
 
 def _finished(arguments: list[str]) -> int:
-    """Run the command, and write all that it has printed."""
+    """The exit code of the command, which is run; all that it printed is written."""
     _check_texts(arguments)
     try:
-        return int(parsed(arguments)())
+        return int(parsed_command(arguments)())
     finally:
         sys.stdout.flush()
 
 
 def _check_texts(arguments: list[str]) -> None:
-    """Raise InvalidInput for an argument that says nothing, or that no shell can give."""
+    """Raise InvalidInput for an argument that is empty, or that no shell can give."""
     for argument in arguments:
         if not argument or (
             argument.startswith("--") and argument.endswith("=") and argument.count("=") == 1
@@ -261,20 +270,22 @@ def _check_texts(arguments: list[str]) -> None:
             raise InvalidInput(f"no text: {shown(argument)}")
 
 
-def parsed(arguments: Sequence[str]) -> Callable[[], int]:
+def parsed_command(arguments: Sequence[str]) -> Callable[[], int]:
     """The command that the arguments name, with its options. Raises InvalidInput, in one line."""
     named = arguments[0] if arguments else ""
+    # The learners are commands of their own; their help lists them alone.
     if named == "train":
         train = COMMANDS[named]
         return chosen_command(train.loaded(), "care-sim train", train.about, arguments[1:])
+    # For help, and for names that are mistyped, what the list says of each command is enough.
     commands = {name: _described(command.about) for name, command in COMMANDS.items()}
     if named in COMMANDS:
         commands[named] = COMMANDS[named].loaded()
-    return chosen_command(commands, "care-sim", ABOUT, arguments)
+    return chosen_command(commands, "care-sim", _ABOUT, arguments)
 
 
 def _described(about: str) -> Callable[..., Any]:
-    """What stands in the list of commands for one that is not asked for."""
+    """A command that does nothing, with the line that help shows of it."""
 
     def command() -> None: ...
 
@@ -282,7 +293,7 @@ def _described(about: str) -> Callable[..., Any]:
     return command
 
 
-def _complain(message: str, code: int = BAD_INPUT) -> NoReturn:
+def _complain(message: str, code: int = _BAD_INPUT) -> NoReturn:
     with contextlib.suppress(OSError):  # the terminal may be what is gone
-        print(f"care-sim: {shortened(one_line(message), LONGEST)}", file=sys.stderr)
+        print(f"care-sim: {shortened(one_line(message), _LONGEST)}", file=sys.stderr)
     sys.exit(code)

@@ -10,7 +10,8 @@ from care_sim.measure.bench.run import run_bench
 class Bench(BenchConfig):
     """Measure speed: keyframe, scans, steps and memory, beside other engines and environments.
 
-    All of it runs on one core, and the others are measured in the same run.
+    Known engines and environments are measured in the same run. All but what takes several
+    processes runs on one core.
     """
 
     def __call__(self) -> int:

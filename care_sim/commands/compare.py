@@ -1,5 +1,5 @@
-"""The same seed under several policies: a table, and a recording or a film with one beside the
-other.
+"""`care-sim compare`: the same seed under several policies, as a table, and side by side in a
+recording or a film.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from care_sim.base.errors import InvalidInput, printable, report_problems
-from care_sim.commands.shared.options import USUAL, Options
+from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.running import DONE, FAILED, console, playable
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.reports.episodes.clips import Clip
@@ -24,7 +24,7 @@ from care_sim.study.episode_play import GymEnv, answer, trace
 from care_sim.study.run_config import Row
 from care_sim.viewer.pictures.comparison import draw_panel
 
-COLUMNS = {
+_COLUMNS = {
     "detection_distance_m": "detected at\n(sensor to actor) m",
     "braked": "braked",
     "min_distance_m": "nearest\n(centres) m",
@@ -42,21 +42,21 @@ class Compare:
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """dartout, dense or cutin; `care-sim scenarios` lists them."""
     policies: tuple[str, ...] = ("history", "care")
-    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget
-    1.0."""
+    """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
+    budget 1.0."""
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     seed: int = 0
-    """Draws scenario, camera faults, noise and floor: the same for every policy."""
+    """Seed of scenario, camera faults, noise and floor, the same for every policy."""
     record: Path | None = None
-    """File (.rrd) for a recording of all, side by side; `care-sim view FILE` plays it (extra
-    'viewer').
+    """File (.rrd) for a recording of all episodes, side by side; `care-sim view FILE` plays it
+    (extra 'viewer').
     """
     video: Path | None = None
-    """File for a film of all, side by side: MP4 (extra 'video'), or animated GIF, WebP or PNG, by
-    its ending.
+    """File for a film of all episodes, side by side: MP4 (extra 'video'), or animated GIF, WebP or
+    PNG, by its ending.
     """
-    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
 
     def __call__(self) -> int:
@@ -77,9 +77,8 @@ class Compare:
 def play_side_by_side(
     configs: Sequence[EpisodeConfig], record: Path | None = None, video: Path | None = None
 ) -> list[str]:
-    """Play one after the other, into one recording and one film if there are to be any, and print
-    their outcomes. What was played is printed whatever happens to the others; a line for each that
-    failed is printed too, and returned.
+    """Play episodes one after the other, into one recording and one film where files are given, and
+    print their outcomes. A line for each that failed is printed too, and returned.
     """
     film = Clip(video, draw_panel)
     answers: list[Row | str] = []
@@ -92,9 +91,10 @@ def play_side_by_side(
                 )[0]
 
             for config in configs:
-                # One by one: what is there stays where one is interrupted.
+                # One by one, so that an interrupt leaves those that were played.
                 answers.append(answer(played, config))  # noqa: PERF401
     finally:
+        # What was played is printed whatever happens to the others.
         failures = _report(configs, answers)
     if record is not None:
         print(f"Recorded in {record}: care-sim view {record}")
@@ -104,6 +104,7 @@ def play_side_by_side(
 
 
 def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> list[str]:
+    # Answers are fewer than configurations where an interrupt came between.
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
@@ -119,8 +120,8 @@ def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> l
 def _recorded(
     configs: Sequence[EpisodeConfig], record: Path | None
 ) -> Iterator[Callable[..., GymEnv]]:
-    """What puts an environment, with its policy and the policy's name, under the recording; or
-    leaves it as it is.
+    """A function of the policy's name, an environment and its policy, which returns the environment
+    under the recording; the environment as it is where there is no recording.
     """
     if record is None:
         yield lambda _name, env, _policy: env
@@ -133,12 +134,12 @@ def outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
     table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)
-    for column in ("policy", "budget", *COLUMNS.values()):
+    for column in ("policy", "budget", *_COLUMNS.values()):
         table.add_column(column, justify="left" if column == "policy" else "right", no_wrap=True)
     for config, row in played:
         table.add_row(
             Text(printable(config.policy)),
             f"{config.budget:.4g}",
-            *(text(row[name]) for name in COLUMNS),
+            *(text(row[name]) for name in _COLUMNS),
         )
     return table

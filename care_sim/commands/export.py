@@ -1,6 +1,4 @@
-"""The command `care-sim export`: a policy's detections on nuScenes scenes, for the official devkit
-to score.
-"""
+"""`care-sim export`: a policy's detections on nuScenes scenes, for the official devkit to score."""
 
 import json
 import sys
@@ -40,12 +38,15 @@ class Export(PlayOptions):
 
     def __call__(self) -> int:
         """Run it."""
+        # All that is asked for is checked before the file is begun.
         configs = self._configs()
         with replacing(self.out, JSON) as unfinished:
             shown = track(
                 configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty()
             )
-            results = {token: boxes for config in shown for token, boxes in found(config).items()}
+            results = {
+                token: boxes for config in shown for token, boxes in scene_results(config).items()
+            }
             unfinished.write_text(
                 json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
             )
@@ -56,7 +57,7 @@ class Export(PlayOptions):
         return 0
 
     def _configs(self) -> list[PlayConfig]:
-        """A play for every scene of the split: the devkit asks for each of its samples."""
+        """One play per scene of the split: the devkit wants results for each of its samples."""
         if self.source.partition(":")[0] != NuScenes.kind:
             raise InvalidInput(
                 "source must be nuscenes:FOLDER, whose samples the official form names, got "
@@ -72,12 +73,13 @@ class Export(PlayOptions):
 
     def _meta(self, config: PlayConfig) -> dict[str, Any]:
         """What the form asks about the origin of results, and under `care_sim` what made them."""
+        # The scene is left out: this is said once of all scenes.
         own = {"version": care_sim.__version__, "split": self.split or "val", **config.row()}
         del own["scene"]
         return MODALITIES | {"care_sim": own}
 
 
-def found(config: PlayConfig) -> dict[str, list[JsonRow]]:
+def scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
     film = config.source.film(config.scene)
     shots = zip(film.shots, play_through_film(config, film).keyframes, strict=True)

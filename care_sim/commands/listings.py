@@ -1,4 +1,4 @@
-"""`care-sim policies`, `care-sim detectors` and `care-sim scenarios`: what there is, by name."""
+"""`care-sim policies`, `care-sim detectors` and `care-sim scenarios`: what can be named."""
 
 import inspect
 from dataclasses import Field, dataclass, fields
@@ -46,20 +46,20 @@ class Scenarios:
 
 
 def _choices(field: Field[Any]) -> str:
-    """What a parameter may be, in brackets; empty where there is nothing to tell."""
+    """The values that a parameter may have, in brackets; empty where nothing bounds them."""
     if field.name == "occluder":
         return f" (of {', '.join(OCCLUDERS)})"
     return f" ({allowed(field)})" if allowed(field) else ""
 
 
 def _summary(thing: object) -> str:
-    """The line that the module of a scenario begins with."""
+    """The first line of the docstring of a scenario's module."""
     module = inspect.getmodule(thing)
     return (inspect.getdoc(module) or "").partition("\n")[0]
 
 
 def _rounded(value: object) -> str:
-    """A default as a shell takes it; numbers to two decimals."""
+    """A default as it is given on a command line; numbers to two decimals."""
     if isinstance(value, tuple):
         return ",".join(map(_rounded, value))
     return str(round(value, 2)) if isinstance(value, float) else repr(value)

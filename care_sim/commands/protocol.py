@@ -1,4 +1,4 @@
-"""The command of the paper's first-sighting protocol (Secs. 3 and 5)."""
+"""`care-sim protocol`: the paper's first-sighting protocol (Secs. 3 and 5)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +10,7 @@ from care_sim.commands.shared.running import Running, in_turn, playable
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.play_config import play_grid
 
-PAPERS = (
+_PAPER_POLICIES = (
     "history",
     "history-uniform",
     "all-camera",
@@ -21,7 +21,7 @@ PAPERS = (
     "care-sbf",
     "learned-scorer",
 )
-"""Those of the paper's Sec. 5.1, and the floor alone."""
+"""The policies of the paper's Sec. 5.1, and `random`, the floor alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,21 +31,22 @@ class Protocol(Running, PlayOptions):
     """
 
     scenes: tuple[str, ...] = ()
-    """One number: that many scenes, from the first. Else scenes by name. All of them, unless
-    given."""
-    policies: tuple[str, ...] = (*PAPERS, "full")
-    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget 1.0.
-    Allocations are compared with those of `care`, which is played for that in any case."""
+    """One number: that many scenes, from the first. Otherwise names of scenes. Without it, all
+    scenes."""
+    policies: tuple[str, ...] = (*_PAPER_POLICIES, "full")
+    """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
+    budget 1.0. Allocations are compared with those of `care`, which is played for that in any case.
+    """
     budgets: tuple[float, ...] = (0.1, 0.2, 0.35)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     floor_seeds: int = bounded(3, 1, 1000)
-    """So many random floors, over which the tallies of a scene are averaged."""
+    """Number of random floors, over which the counts of a scene are averaged."""
     camera_latencies: tuple[int, ...] = ()
-    """Several of --camera-latency, in turn; 1 is the paper's strict-causal variant."""
+    """Several values of --camera-latency, in turn; 1 is the paper's strict-causal variant."""
     presence: str = "annotated"
-    """Who is present at scene start, and so never a first sighting: whoever is `annotated` there
-    (the paper's rule), or only who is `visible`, so that somebody who then stands hidden counts
-    when it shows itself."""
+    """Objects that are present at scene start are never first sightings. `annotated`: all that are
+    annotated there are present (the paper's rule). `visible`: only those that are visible there
+    are, so that one that stands hidden then counts when it comes into view."""
     out: Path = Path("runs/protocol")
     """Folder of the results; an interrupted run goes on there."""
 
@@ -58,6 +59,7 @@ class Protocol(Running, PlayOptions):
         common = self.common() | {"presence": self.presence}
         scenes = chosen_scenes(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)
+        # The floors of a scene have consecutive seeds, from --floor-seed on.
         first = common.pop("floor_seed")
         policies, left_out = playable(
             self.policies,

@@ -16,7 +16,7 @@ from care_sim.study.executors import CORES, MOST_WORKERS
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class PrintReport:
     """Print the tables of a folder of results and draw its figures again, or make one web page of
     it all.
     """
@@ -24,12 +24,12 @@ class Report:
     folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """The --out of an earlier study."""
     page: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """HTML file for the page, which needs nothing else to be read; the folder is left as it is
-    (extra 'page').
+    """HTML file for the page, which needs no other file; the folder is left as it is (extra
+    'page').
     """
     episodes: int = bounded(400, 0, LARGEST_INTEGER)
-    """The most episodes that are played again to be watched in the page, seed by seed; 0 for
-    none."""
+    """Number of episodes that are played again, to be watched in the page, at the most; seed by
+    seed, 0 for none."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play them."""
 
@@ -48,7 +48,8 @@ class Report:
 
     def _write(self, path: Path) -> int:
         check_page()
-        # Pages are written with Jinja, which the extra 'page' brings.
+        # Imported here because it imports Jinja and Altair, which the extra 'page' brings: tables
+        # and figures need neither.
         from care_sim.reports.page.build import write_page
 
         page = write_page(self.folder, path, self.episodes, self.workers)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from care_sim.commands.shared.options import USUAL, Options
+from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
 from care_sim.commands.shared.running import console
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
@@ -29,9 +29,9 @@ class Run:
     budget: float = 0.1
     """Share of the cells that may fire at a keyframe, above 0 and at most 1."""
     seed: int = 0
-    """Draws scenario, camera faults, noise and floor."""
+    """Seed of scenario, camera faults, noise and floor."""
     picture: Path | None = None
-    """PNG file for a picture of the first keyframe at which the brake is on."""
+    """PNG file for a picture of the first keyframe at which the car brakes."""
     video: Path | None = None
     """File for a clip of the episode: MP4 (extra 'video'), or animated GIF, WebP or PNG, by its
     ending.
@@ -41,11 +41,12 @@ class Run:
     export: Path | None = None
     """Folder for every scan as a point cloud (PCD), with poses and boxes as JSON (extra
     'open3d')."""
-    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
 
     def __call__(self) -> int:
         """Run it."""
+        # The grid of one is a study's way to a configuration: it knows what `full` needs.
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:
@@ -62,7 +63,7 @@ class Run:
         return 0
 
     def _watched(self, env: GymEnv, policy: Policy) -> GymEnv:
-        """`env`, recorded and its scans written where that is wanted."""
+        """`env`, which is recorded and whose scans are written where files are given."""
         if self.record is not None:
             env = RecordRerun(env, self.record, policy)
         if self.export is not None:

@@ -8,7 +8,7 @@ import tyro
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.episode_studies import EpisodeStudy
-from care_sim.commands.shared.options import USUAL, Options, seeds_of
+from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options, seeds_of
 from care_sim.commands.shared.running import in_turn, playable
 from care_sim.commands.shared.selection import expanded
 from care_sim.scenarios import SCENARIOS
@@ -20,19 +20,19 @@ class Sweep(EpisodeStudy):
     """Play every combination of scenarios, policies, budgets, faults and seeds."""
 
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
-    """`care-sim scenarios` lists them; `all`."""
+    """Names of `care-sim scenarios`; `all` stands for all of them."""
     policies: tuple[str, ...] = ("history", "all-camera", "care", "full")
-    """`care-sim policies` lists them; `all`, but for controls. `full` always runs with budget
-    1.0."""
+    """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
+    budget 1.0."""
     budgets: tuple[float, ...] = (0.1,)
     """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
     false_negative_rates: tuple[float, ...] = ()
-    """Several of --false-negative-rate, in turn."""
+    """Several values of --false-negative-rate, in turn."""
     camera_latencies: tuple[int, ...] = ()
-    """Several of --camera-latency, in turn."""
+    """Several values of --camera-latency, in turn."""
     out: Path = Path("runs/sweep")
     """Folder of the results; an interrupted sweep goes on there."""
-    conditions: Annotated[Options, tyro.conf.arg(name="")] = USUAL
+    conditions: Annotated[Options, tyro.conf.arg(name="")] = DEFAULT_OPTIONS
     """Further conditions."""
 
     def __call__(self) -> int:
@@ -42,6 +42,7 @@ class Sweep(EpisodeStudy):
                 raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
         scenarios = expanded(self.scenarios, SCENARIOS)
         common = self.conditions.arguments()
+        # A policy that cannot be made for one seed and budget is left out, and the others play.
         policies, left_out = playable(
             self.policies, lambda name: grid(scenarios, [name], self.budgets[:1], [0], **common)
         )

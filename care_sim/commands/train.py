@@ -1,4 +1,4 @@
-"""`care-sim train`: what can be trained, each a command of its own, and the figure of what was."""
+"""`care-sim train`: the learners, each a command of its own, and the figure of learning curves."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class TrainRecurrentPpo(RecurrentPpoConfig):
 
 
 @dataclass(frozen=True)
-class Curves:
+class DrawCurves:
     """Draw the learning curves of training runs, one panel per task and one line per training seed;
     PNG and SVG.
     """
@@ -72,6 +72,6 @@ LEARNERS: dict[str, Callable[..., Any]] = {
     "sac": TrainSac,
     "recurrent-ppo": TrainRecurrentPpo,
     "learned-scorer": TrainScorer,
-    "curves": Curves,
+    "curves": DrawCurves,
 }
-"""What can be trained, by name; and the figure of what was."""
+"""Commands of `care-sim train`, by name."""

@@ -18,8 +18,8 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_rerun
 from care_sim.base.files import RERUN
 
-HERE = "127.0.0.1"
-VIEWER = """
+_HERE = "127.0.0.1"
+_VIEWER = """
 import os, signal, sys, threading
 
 def follow():
@@ -30,10 +30,11 @@ threading.Thread(target=follow, daemon=True).start()
 from rerun_cli.__main__ import main
 sys.exit(main())
 """
-"""Rerun's own launcher, which as a module would not tell whether the viewer failed. Its input ends
-with this process, however that ends: then it and its children end too.
+"""The viewer's process: Rerun's own launcher, which as a module would not return whether the viewer
+failed. Its input is a pipe of this process and ends with it, however that happens: then the viewer
+and its children end too.
 """
-FAILED = 1
+_FAILED = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,14 +42,14 @@ class View:
     """Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra
     'viewer').
 
-    It needs no network. Where there is one, the viewer looks for its updates and counts its use,
-    which `rerun analytics disable` ends; its page in a browser fetches a font too.
+    The viewer needs no network. Where there is one, it looks for updates and counts its use, which
+    `rerun analytics disable` ends, and its page in a browser fetches a font.
     """
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """The recording (.rrd)."""
     web: bool = False
-    """Serve it to browsers of this machine instead. Ctrl-C ends it."""
+    """Serve the recording to browsers of this machine instead. Ctrl-C ends it."""
 
     def __call__(self) -> int:
         """Run it."""
@@ -65,15 +66,15 @@ class View:
                 "care-sim: the viewer failed; with --web a browser shows the recording",
                 file=sys.stderr,
             )
-            return FAILED
+            return _FAILED
         data, pages = _free_ports(2)
-        source = quote(f"rerun+http://{HERE}:{data}/proxy", safe="")
+        source = quote(f"rerun+http://{_HERE}:{data}/proxy", safe="")
         print(
-            f"Open http://{HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a "
+            f"Open http://{_HERE}:{pages}/?hide_welcome_screen&theme=dark&url={source} in a "
             "browser; Ctrl-C ends it.",
             flush=True,
         )
-        ports = ("--bind", HERE, "--port", str(data), "--web-viewer-port", str(pages))
+        ports = ("--bind", _HERE, "--port", str(data), "--web-viewer-port", str(pages))
         return _rerun(str(self.file), "--serve-web", *ports)
 
 
@@ -82,7 +83,7 @@ def _rerun(*options: str) -> int:
     outlives this one.
     """
     quiet = {"RUST_LOG": "warn"} | os.environ
-    command = [sys.executable, "-c", VIEWER, *options]
+    command = [sys.executable, "-c", _VIEWER, *options]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=quiet)
     try:
         return process.wait()
@@ -102,10 +103,11 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 def _free_ports(count: int) -> list[int]:
     """Ports of this machine that nobody listens on."""
+    # All are held open together: the system would give one port twice.
     sockets = [socket.socket() for _ in range(count)]
     try:
         for one in sockets:
-            one.bind((HERE, 0))
+            one.bind((_HERE, 0))
         return [one.getsockname()[1] for one in sockets]
     finally:
         for one in sockets:

@@ -44,7 +44,9 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
     ("arguments", "names"),
     [
         ([], ["reproduce", "sweep"]),
-        (["walk"], ["walk", "reproduce"]),
+        (["walk"], ["unknown command 'walk'", "reproduce"]),
+        (["train"], ["no command", "ppo"]),
+        (["train", "walk"], ["unknown command 'walk'", "curves"]),
         (["run"], ["SCENARIO"]),
         (["run", "dance"], ["'dance'", "dartout"]),
         (["run", "dense", "--policy", "best"], ["'best'", "care"]),
@@ -262,6 +264,8 @@ def test_the_list_of_commands_says_what_each_command_says_of_itself():
         ("run dense --camera-latency 1.5", "--camera-latency: must be a whole number, got '1.5'"),
         ("certify --episode abc", "--episode: must be a whole number, got 'abc'"),
         ("bench --seconds x", "--seconds: must be a number, got 'x'"),
+        ("sweep --seeds 1 a", "--seeds: must be a whole number, got 'a'"),
+        ("sweep --budgets 0.1 x", "--budgets: must be a number, got 'x'"),
     ],
 )
 def test_what_is_no_number_is_told_in_plain_words(arguments, message, capsys):

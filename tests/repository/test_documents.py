@@ -72,7 +72,7 @@ def test_a_block_runs_on_its_own(block, tmp_path, drive):
 
 def understood(line):
     try:
-        cli.parsed(shlex.split(line)[1:])
+        cli.parsed_command(shlex.split(line)[1:])
     except InvalidInput:
         return False
     except SystemExit as end:

@@ -1,4 +1,4 @@
-"""A study from configurations to a folder of results."""
+"""A study, from its configurations to a folder of results."""
 
 import json
 import sys
@@ -31,13 +31,15 @@ def conduct(
     """Run a study into `folder`, going on where an earlier run stopped; returns the tasks that
     failed.
 
-    Writes `journal.jsonl` as they finish; then, if there are any, `config.json` with the
-    configurations and what failed, the Parquet files of the study's kind with the rows of `configs`
-    in their order, `tables.md`, `tables.tex` and the figures of `study`; the folder is this study's
-    until all that is written. Where tasks failed and the folder holds rows that were therefore not
-    obtained, these files stay, unless `force`. Raises InvalidInput for no task or no worker, when
-    the folder cannot be written, and unless `force` when it holds another study, finished or not,
-    or rows of this one that are none of `configs`.
+    Writes `journal.jsonl` as tasks finish. When all have ended and some did not fail, writes
+    `config.json` with the configurations and what failed, the Parquet files of the study's kind
+    with the rows of `configs` in their order, `tables.md`, `tables.tex` and the figures of `study`.
+    No other study can take the folder until all of that is written. Where the folder holds rows
+    that were not obtained again because tasks failed, its files stay, unless `force`.
+
+    Raises InvalidInput for no task or no worker, and when the folder cannot be written. Unless
+    `force`, also when the folder holds another study, finished or not, or rows of this one that are
+    none of `configs`.
     """
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
@@ -45,6 +47,8 @@ def conduct(
     configs = [config.changed() for config in configs]
     kind = study.results
     check_columns(config.row() for config in configs)
+    # The folder is checked before it is locked, which would leave a file in it, and again after, in
+    # case that another process has written meanwhile.
     _check(folder, configs, study, force)
     with _journal(folder, study) as journal:
         _check(folder, configs, study, force, journal)
@@ -87,8 +91,8 @@ def _check(
     force: bool,
     journal: Journal | None = None,
 ) -> None:
-    """Raise InvalidInput where the study may not take the folder; before it is locked, which leaves
-    a file there, and after.
+    """Raise InvalidInput where the study may not take the folder; with its journal once that is
+    locked.
     """
     check_kind(folder, study)
     if not force:
@@ -109,15 +113,14 @@ def _journal(folder: Path, study: Study) -> Journal:
 def _say_what_is_found(
     configs: Sequence[RunConfig], journal: Journal, folder: Path, unit: str
 ) -> None:
-    """One line when tasks will not be played again, or others share the journal; one for what is
-    damaged there.
+    """Print one line when the journal holds tasks of this study or of others, and one for lines of
+    it that are damaged.
     """
     if journal.damaged:
         lines = counted(journal.damaged, "line")
         print(
             f"{lines} of {folder / JOURNAL} passed over, damaged or of a version that wrote no "
-            "checksums; what they "
-            "held is played again where it is asked for",
+            "checksums; what they held is played again where it is asked for",
             file=sys.stderr,
         )
     found = sum(config.key in journal for config in configs)
@@ -136,7 +139,9 @@ def _write(
 ) -> None:
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.results
-    left_out, finished, aside = summary(failures, kind.unit), kind.finish(rows), kind.aside(rows)
+    left_out = summary(failures, kind.unit)
+    finished = kind.finish(rows)
+    aside = kind.aside(rows)
     report = StudyReport.of(finished, study, left_out)
     write_text(folder / "config.json", _description(configs, study, failures))
     for name, columns in aside.items():

@@ -1,4 +1,4 @@
-"""What commands have in common that play a study of the closed loop."""
+"""What is common to the commands that play a study of the closed loop."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from care_sim.commands.shared.running import Running, playable
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 
-Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
+_Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
 """The episodes of a study, from the seeds and the further policies."""
 
 
@@ -18,18 +18,19 @@ class EpisodeStudy(Running):
     """A study of the closed loop."""
 
     seeds: tuple[int, ...] = (5,)
-    """One number: that many seeds, from 0. Several: these seeds."""
+    """One number: that many seeds, from 0. Several numbers: these seeds."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixedStudy(EpisodeStudy):
-    """A study whose episodes are fixed, but for the seeds and for policies that join in."""
+    """A study whose episodes are fixed, except for the seeds and for further policies."""
 
     also: tuple[str, ...] = ()
     """Further policies, installed ones too, that are played and shown beside those of the study."""
 
-    def play(self, study: str, configurations: Configurations, out: Path) -> int:
-        """Play the configurations of the seeds, with the policies that join in."""
+    def play(self, study: str, configurations: _Configurations, out: Path) -> int:
+        """Play the configurations of the seeds, with the further policies."""
+        # Which of them can be played is tried on one task in every scenario.
         seeds = seeds_of(self.seeds)
         also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
         return self.conduct(study, of_seeds(configurations(seeds[:1], also), seeds), out, left_out)

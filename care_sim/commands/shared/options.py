@@ -1,6 +1,4 @@
-"""What several commands take: conditions that all episodes share, parameters as NAME=VALUE,
-seeds.
-"""
+"""Options of several commands: conditions of all episodes, parameters as NAME=VALUE, seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -32,18 +30,17 @@ class Options(Conditions):
         return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
 
 
-USUAL = Options()
+DEFAULT_OPTIONS = Options()
 """The defaults."""
 
 
 def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
-    """The seeds that one number, or several, stand for. Raises InvalidInput for less than one, and
-    for more than a study can hold.
+    """The seeds that are meant by one number (that many, from 0) or by several (these). Raises
+    InvalidInput for a number below one, and for more seeds than a study can hold.
     """
     if len(numbers) == 1 and not 1 <= numbers[0] <= MOST_TASKS:
         raise InvalidInput(
             f"seeds must be a number of seeds from 1 to {MOST_TASKS:,}, whose rows a study holds "
-            "in memory, "
-            f"or a list of seeds, got {shown(numbers[0])}"
+            f"in memory, or a list of seeds, got {shown(numbers[0])}"
         )
     return range(numbers[0]) if len(numbers) == 1 else numbers

@@ -4,54 +4,22 @@ import contextlib
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import tyro
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
-from care_sim.base.errors import InvalidInput, shown
-
-NUMBERS = ConstructorRegistry()
-"""How numbers are read: as tyro reads them, with complaints in plain words."""
+from care_sim.base.errors import InvalidInput, shown, unknown
 
 
-@NUMBERS.primitive_rule
-def _whole_number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[int] | None:
-    if asked.type is not int:
-        return None
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="INT",
-        instance_from_str=lambda given: _whole(given[0]),
-        is_instance=lambda value: isinstance(value, int),
-        str_from_instance=lambda value: [str(value)],
-    )
+class _Reading(NamedTuple):
+    """How the words after an option become a value: the words as help shows them, how many there
+    are, and what makes the value of them.
+    """
 
-
-@NUMBERS.primitive_rule
-def _any_number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[float] | None:
-    if asked.type is not float:
-        return None
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="FLOAT",
-        instance_from_str=lambda given: _real(given[0]),
-        is_instance=lambda value: isinstance(value, int | float),
-        str_from_instance=lambda value: [str(value)],
-    )
-
-
-@NUMBERS.primitive_rule
-def _whole_number_or_none(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[int | None] | None:
-    if asked.type != int | None:
-        return None
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="{None}|INT",
-        instance_from_str=lambda given: None if given[0] == "None" else _whole(given[0]),
-        is_instance=lambda value: value is None or isinstance(value, int),
-        str_from_instance=lambda value: [str(value)],
-    )
+    metavar: str
+    nargs: int | Literal["*"]
+    value_of: Callable[[list[str]], Any]
 
 
 def _whole(text: str) -> int:
@@ -68,6 +36,38 @@ def _real(text: str) -> float:
         raise ValueError(f"must be a number, got {shown(text)}") from None
 
 
+def _whole_or_none(text: str) -> int | None:
+    return None if text == "None" else _whole(text)
+
+
+_READINGS: dict[Any, _Reading] = {
+    int: _Reading("INT", 1, lambda words: _whole(words[0])),
+    float: _Reading("FLOAT", 1, lambda words: _real(words[0])),
+    int | None: _Reading("{None}|INT", 1, lambda words: _whole_or_none(words[0])),
+    tuple[int, ...]: _Reading("[INT [INT ...]]", "*", lambda words: tuple(map(_whole, words))),
+    tuple[float, ...]: _Reading("[FLOAT [FLOAT ...]]", "*", lambda words: tuple(map(_real, words))),
+}
+"""Types of options that hold numbers: tyro reads them the same, but complains in its own words."""
+
+_NUMBERS = ConstructorRegistry()
+
+
+@_NUMBERS.primitive_rule
+def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    reading = _READINGS.get(asked.type)
+    if reading is None:
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=reading.nargs,
+        metavar=reading.metavar,
+        instance_from_str=reading.value_of,
+        is_instance=lambda value: value is None or isinstance(value, int | float | tuple),
+        str_from_instance=lambda value: list(
+            map(str, value if isinstance(value, tuple) else [value])
+        ),
+    )
+
+
 def chosen_command(
     commands: Mapping[str, Callable[..., Any]],
     prog: str,
@@ -75,14 +75,20 @@ def chosen_command(
     arguments: Sequence[str],
 ) -> Callable[[], int]:
     """The command that the arguments name, with its options. Raises InvalidInput, in one line."""
+    if not arguments:
+        raise InvalidInput(f"no command is given; those of {prog}: {', '.join(commands)}")
+    named = arguments[0]
+    if not named.startswith("-") and named.replace("_", "-") not in commands:
+        raise unknown("command", named, commands)
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
             command: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
-                dict(commands), prog=prog, description=about, args=arguments, registry=NUMBERS
+                dict(commands), prog=prog, description=about, args=arguments, registry=_NUMBERS
             )
             return command
     except SystemExit as end:
+        # Help ends with 0, and is what was asked for.
         if end.code in (0, None):
             raise
         if refusal := _refusal(end):
@@ -91,21 +97,23 @@ def chosen_command(
 
 
 def _refusal(end: BaseException | None) -> InvalidInput | None:
-    """What an options' class refused, of which tyro makes a mistake of its own."""
+    """The InvalidInput of an options' class, which tyro takes for a mistake of its own kind."""
     while end is not None and not isinstance(end, InvalidInput):
         end = end.__cause__ or end.__context__
     return end
 
 
 def _one_line(box: str) -> str:
-    """The message that tyro draws as a box: sections between rules, without title, second guesses
-    and help.
+    """The message that tyro draws as a box: its sections, without title, frame and hint at help.
 
-    tyro has no public way to its messages: `tyro._errors`, with an event per mistake, is private
-    and may change in any release. What cannot be read here still ends as one line.
+    An option that is missing, unknown or without its value has no public event in tyro. The events
+    of `tyro._errors` are private and may change in any release, as its first lines say. What cannot
+    be read here still ends as one line.
     """
     lines = [line.strip(" │╭╮╰╯|+") for line in box.splitlines()][1:]
+    # Rules of drawn lines, or of hyphens where the encoding has none, part the sections.
     sections = re.sub("─+|-{5,}", "\n", " ".join(lines)).splitlines()
+    # An unknown option may be known to another command, which "in care-sim NAME" would tell.
     texts = [" ".join(section.split()).partition(" in care-sim ")[0] for section in sections]
     return "; ".join(
         text.rstrip(".") for text in texts if text and not text.startswith("For full helptext")

@@ -1,6 +1,4 @@
-"""What the commands of the open loop take: where the scenes come from, who detects, under which
-conditions.
-"""
+"""Options of the commands of the open loop: source of the scenes, detector, conditions."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,7 +10,7 @@ from care_sim.core.conditions import Conditions
 from care_sim.sources.scenes import Source, source_of
 from care_sim.study.parameters import parameters
 
-USUAL_CONDITIONS = Conditions()
+_DEFAULT_CONDITIONS = Conditions()
 """The defaults."""
 
 
@@ -23,13 +21,13 @@ class PlayOptions:
     source: str = "streets"
     """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
     split: str | None = None
-    """Of streets: evaluation (150 scenes) or calibration (20). Of nuScenes: val, all, or one of
+    """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: val, all, or one of
     splits.json.
     """
     version: str | None = None
-    """Of nuScenes: the version, where the folder holds several."""
+    """For nuScenes: the version, where the folder holds several."""
     camera_detections: Path | None = None
-    """Of nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
+    """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
     detector: str = "returns"
     """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
     package.
@@ -39,11 +37,11 @@ class PlayOptions:
     policy_parameters: tuple[str, ...] = ()
     """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among
     several as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
-    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = USUAL_CONDITIONS
+    conditions: Annotated[Conditions, tyro.conf.arg(name="")] = _DEFAULT_CONDITIONS
     """Further conditions."""
 
     def scene_source(self) -> Source:
-        """The source of the scenes. Raises InvalidInput where there is none."""
+        """The source that the options name. Raises InvalidInput where there is none."""
         return source_of(
             self.source,
             split=self.split,
@@ -52,7 +50,9 @@ class PlayOptions:
         )
 
     def common(self) -> dict[str, Any]:
-        """What all plays share, as fields of `care_sim.study.play_config.PlayConfig`."""
+        """Conditions and parameters that all plays share, as fields of
+        `care_sim.study.play_config.PlayConfig`.
+        """
         return asdict(self.conditions) | {
             "detector": self.detector,
             "detector_parameters": parameters(self.detector_parameters),

@@ -1,4 +1,4 @@
-"""How a command plays a study: over workers, into a folder, with what is left out named."""
+"""How a command plays a study: over workers, into a folder, and naming what is left out."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -11,8 +11,8 @@ from rich.console import Console
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, report_problems
 from care_sim.commands.shared.conduct import conduct, summary
-from care_sim.commands.shared.options import USUAL
-from care_sim.commands.shared.selection import ALL, expanded, made
+from care_sim.commands.shared.options import DEFAULT_OPTIONS
+from care_sim.commands.shared.selection import ALL_NAMES, expanded, made
 from care_sim.policies import contenders
 from care_sim.reports.report import print_report, reported
 from care_sim.reports.studies import STUDIES
@@ -20,21 +20,22 @@ from care_sim.study import executors
 from care_sim.study.executors import CORES, MOST_WORKERS
 from care_sim.study.run_config import RunConfig
 
-DONE, FAILED = 0, 1
-PIPE_WIDTH = 180
+DONE = 0
+FAILED = 1
+_PIPE_WIDTH = 180
 """Columns of a table that is not printed on a terminal."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Running:
-    """What commands have in common that play a study."""
+    """Options of every command that plays a study."""
 
     workers: int = bounded(CORES, 1, MOST_WORKERS)
-    """Processes that play at the same time on this machine; a cluster plays as many as it has
+    """Processes that play at the same time on this machine; a cluster plays as many tasks as it has
     threads.
     """
     cluster: str | None = None
-    """Address of a dask scheduler whose workers play them, for example tcp://HOST:8786 (extra
+    """Address of a dask scheduler whose workers play instead, for example tcp://HOST:8786 (extra
     'cluster').
     """
     force: bool = False
@@ -48,7 +49,7 @@ class Running:
     def conduct(
         self, study: str, configs: Sequence[RunConfig], out: Path, left_out: Sequence[str] = ()
     ) -> int:
-        """Play the tasks, print their tables, name those that failed and the policies that were
+        """Play the tasks and print their tables, the tasks that failed and the policies that were
         left out.
         """
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
@@ -72,24 +73,23 @@ def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[
 
     Raises InvalidInput where something else is wrong.
     """
-    policies, broken = made(expanded(names, contenders() if ALL in names else ()), make)
+    policies, broken = made(expanded(names, contenders() if ALL_NAMES in names else ()), make)
     left_out = [f"left out: {reason}" for reason in broken.values()]
     report_problems(left_out)
     return policies, left_out
 
 
 def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
-    """The values of a condition that a sweep plays in turn; takes the one value out of `common`."""
+    """The values of a condition that a sweep plays in turn: `several`, or else the one in `common`,
+    which loses it.
+    """
     one = common.pop(name)
-    if several and one != getattr(USUAL, name):
+    if several and one != getattr(DEFAULT_OPTIONS, name):
         raise InvalidInput(f"give {name} one value or several, not both")
     return several or (one,)
 
 
 def console() -> Console:
-    """Where tables are printed: a terminal as wide as it is, a pipe as wide as a table needs."""
-    return (
-        Console(highlight=False)
-        if sys.stdout.isatty()
-        else Console(highlight=False, width=PIPE_WIDTH)
-    )
+    """Where tables are printed: a terminal, or a pipe of a width at which tables need no breaks."""
+    width = None if sys.stdout.isatty() else _PIPE_WIDTH
+    return Console(highlight=False, width=width)

@@ -4,14 +4,14 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 
 from care_sim.base.errors import BrokenPolicy, MissingExtra
 
-ALL = "all"
-"""Stands for every known name."""
+ALL_NAMES = "all"
+"""The name that stands for every known one."""
 
 
 def expanded(names: Sequence[str], known: Collection[str]) -> list[str]:
     """The names, each once; `all` stands for those that are known."""
     return list(
-        dict.fromkeys(each for name in names for each in (known if name == ALL else [name]))
+        dict.fromkeys(each for name in names for each in (known if name == ALL_NAMES else [name]))
     )
 
 
@@ -23,7 +23,8 @@ def made(
 
     Raises what `make` raises where the policy is not to blame.
     """
-    sound, broken = [], {}
+    sound = []
+    broken = {}
     for policy in policies:
         try:
             make(policy)

@@ -14,31 +14,31 @@ from care_sim.study.results_formats import RESULTS_FORMATS, is_parameter
 from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row, RunConfig
 
-WAYS_OUT = "give another --out, or --force to replace it"
+_WAYS_OUT = "give another --out, or --force to replace it"
 _USUAL = DEFAULTS | {"presence": ANNOTATED}
-"""What a row was asked with that does not say."""
-_NAMES = ("scene", "scenario", "policy", "budget")
+"""Parameters of a row that does not name them: rows of older versions lack what was added since."""
+_LABEL_NAMES = ("scene", "scenario", "policy", "budget")
 _SEEDS = ("seed", "floor_seed")
 _MOST_TOLD = 3
-"""Differing parameters that a refusal tells."""
+"""Differing parameters that a refusal names, at the most."""
 
 
 def check_kind(folder: Path, study: Study) -> None:
-    """Raise InvalidInput where the other kind of results lies, which have files of their own."""
+    """Raise InvalidInput where the folder holds results of the other kind, episodes or plays."""
+    # Each kind has files of its own, so that --force would leave both in one folder.
     kind = study.results
     for other in RESULTS_FORMATS:
         if other is not kind and (folder / other.file).exists():
             raise InvalidInput(
                 f"{folder} holds {other.unit} of another study; the {kind.unit} of the study "
-                f"{study.name} need another "
-                "--out, with --force too"
+                f"{study.name} need another --out, with --force too"
             )
 
 
 def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> None:
-    """Raise InvalidInput where the results of another study lie, or rows of this one that were
-    asked with parameters that nobody asks for now: they would be gone. Damaged results are told as
-    they are read.
+    """Raise InvalidInput where the folder holds results that would be lost: those of another study,
+    or rows of this one with parameters that are not asked for now. Raises as `read_rows` does where
+    results are damaged.
     """
     path = folder / study.results.file
     if not path.is_file():
@@ -46,25 +46,24 @@ def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> N
     there = read_notes(path)[0] or SWEEP.name
     rows, gone = _rows_and_gone(path, configs, study)
     unit = study.results.unit.removesuffix("s")
-    here, wanted = counted(len(rows), unit), counted(len(configs), unit)
+    here = counted(len(rows), unit)
+    wanted = counted(len(configs), unit)
     if there != study.name:
         raise InvalidInput(
             f"{folder} holds the study {there}, {here}, which the study {study.name}, {wanted}, "
-            "would replace: "
-            f"{WAYS_OUT}"
+            f"would replace: {_WAYS_OUT}"
         )
     if gone:
         raise InvalidInput(
             f"{folder} holds {here} of the study {there}; {len(gone)} of them, the first "
             f"{_label(gone[0])}{_differing(gone[0], configs)}, would be gone from the study "
-            f"{study.name} that is asked "
-            f"for, {wanted}: {WAYS_OUT}"
+            f"{study.name} that is asked for, {wanted}: {_WAYS_OUT}"
         )
 
 
 def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
-    """In one line, which rows of the folder are not among those played, where others failed; empty
-    for none.
+    """One line that tells which rows of the folder would be lost because tasks failed; empty for
+    none.
     """
     path = folder / study.results.file
     rows, gone = _rows_and_gone(path, played, study) if path.is_file() else ([], [])
@@ -73,19 +72,21 @@ def lost(folder: Path, played: Sequence[RunConfig], study: Study) -> str:
         return ""
     return (
         f"the results in {folder} stay as they were: {len(gone)} of their "
-        f"{counted(len(rows), unit)}, the first "
-        f"{_label(gone[0])}, would be gone, since this time only {counted(len(played), unit)} did "
-        "not fail; the "
-        "journal keeps what was played: mend what failed, or --force to replace them"
+        f"{counted(len(rows), unit)}, the first {_label(gone[0])}, would be gone, since this time "
+        f"only {counted(len(played), unit)} did not fail; the journal keeps what was played: mend "
+        "what failed, or --force to replace them"
     )
 
 
 def check_journal(
     folder: Path, configs: Sequence[RunConfig], journal: Journal, study: Study
 ) -> None:
-    """Raise InvalidInput where an interrupted study is to go on that has another name, or rows that
-    nobody asks for now: once other results lie there, its own command is refused. A row counts by
-    its parameters, whatever code played it, so that a command goes on after a change of the code.
+    """Raise InvalidInput where the folder holds an interrupted study that has another name, or rows
+    that are not asked for now.
+
+    Otherwise that study's own command would be refused as soon as these results lie there. A row
+    counts by its parameters, whatever code played it, so that a command goes on after a change of
+    the code.
     """
     if not len(journal) or (folder / study.results.file).is_file():
         return
@@ -93,15 +94,13 @@ def check_journal(
     if study.name not in journal.studies:
         raise InvalidInput(
             f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}, beside "
-            f"which the study {study.name} would be played: {WAYS_OUT}"
+            f"which the study {study.name} would be played: {_WAYS_OUT}"
         )
     if gone := _gone(journal.rows, configs):
         raise InvalidInput(
             f"{folder} holds the unfinished study {_joined(journal.studies)}, {rows}; {len(gone)} "
-            "of them, the first "
-            f"{_label(gone[0])}{_differing(gone[0], configs)}, are not asked for now: give the "
-            "command that began it, "
-            "another --out, or --force to play beside them"
+            f"of them, the first {_label(gone[0])}{_differing(gone[0], configs)}, are not asked "
+            "for now: give the command that began it, another --out, or --force to play beside them"
         )
 
 
@@ -123,9 +122,9 @@ def _identity(row: Row) -> frozenset[tuple[str, object]]:
 
 
 def _asked(row: Row) -> Row:
-    """What a row was asked with, but for what is usual. A file that was given counts as given,
-    whatever it held.
-    """
+    """The parameters of a row that differ from the defaults."""
+    # A row holds the digest of a file of camera detections. It counts only whether one was given,
+    # so that the same command may replace its own rows after the file has changed.
     given = {name: value for name, value in row.items() if is_parameter(name) and value is not None}
     if "camera_detections" in given:
         given["camera_detections"] = True
@@ -133,15 +132,17 @@ def _asked(row: Row) -> Row:
 
 
 def _label(row: Row) -> str:
-    main = [str(row[name]) for name in _NAMES if row.get(name) is not None]
+    main = [str(row[name]) for name in _LABEL_NAMES if row.get(name) is not None]
     return " ".join([*main, *(f"{name} {row[name]}" for name in _SEEDS if row.get(name))])
 
 
 def _differing(row: Row, configs: Sequence[RunConfig]) -> str:
-    """In brackets, what tells a row from the task nearest to it, where their labels are the
-    same.
+    """In brackets, the parameters in which a row differs from the nearest task with the same label;
+    empty where no task has that label.
     """
-    label, there, found = _label(row), _asked(row), []
+    label = _label(row)
+    there = _asked(row)
+    found = []
     for asked in (config.row() for config in configs):
         if _label(asked) == label:
             now = _asked(asked)

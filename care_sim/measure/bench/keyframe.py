@@ -34,7 +34,7 @@ KEYFRAME_STAGES = (
 Answer = TypeVar("Answer")
 
 
-class Stopwatch:
+class StageTimer:
     """Calls functions and adds their durations up, in `seconds` by stage."""
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ def stages(config: EpisodeConfig) -> dict[str, float]:
     of that keyframe are called one by one in a second world of the same seed. So both are measured
     under the same load.
     """
-    watch = Stopwatch()
+    watch = StageTimer()
     whole = 0.0
     keyframes = 0
     ended = False
@@ -88,7 +88,7 @@ class StageByStage:
     Only calls go through `watch`: what the loop does between them belongs to no stage.
     """
 
-    def __init__(self, env: SensingEnv[ClosedLoop], watch: Stopwatch):
+    def __init__(self, env: SensingEnv[ClosedLoop], watch: StageTimer):
         self._watch = watch
         self._rig = rig = env.rig
         self.world = world = env.loop.world

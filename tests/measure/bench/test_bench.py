@@ -16,7 +16,7 @@ from care_sim.measure.bench.keyframe import (
     REST,
     WHOLE,
     StageByStage,
-    Stopwatch,
+    StageTimer,
     stages,
 )
 from care_sim.measure.bench.ratios import TWO_OVER_ONE
@@ -57,7 +57,7 @@ def test_the_stages_one_by_one_are_the_keyframes_of_the_loop(scenario):
         observation, _ = env.reset(seed=config.seed)
         twin.reset(seed=config.seed)
         loop = env.unwrapped.loop
-        apart = StageByStage(twin.unwrapped, Stopwatch())
+        apart = StageByStage(twin.unwrapped, StageTimer())
         tracked = 0
         ended = False
         while not ended:

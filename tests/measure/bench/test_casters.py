@@ -8,7 +8,12 @@ import pytest
 
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.scanning.casters import PEER_CASTERS, casters
-from care_sim.measure.bench.scanning.moving_bodies import NEAREST_M, SENSOR, SWAY_M, moving_bodies
+from care_sim.measure.bench.scanning.moving_bodies import (
+    NEAREST_BODY_M,
+    SENSOR,
+    SWAY_M,
+    moving_bodies,
+)
 from care_sim.measure.bench.scanning.scans import REFERENCE_ENGINE, agreement, drawn_cells, scans
 from care_sim.sensors.engines import ENGINES
 from care_sim.world.bodies import CATALOGUE
@@ -77,7 +82,7 @@ def test_bodies_move_with_every_scan_and_stay_in_reach(grid):
     assert np.all(moved <= 2 * SWAY_M)
     distances = np.hypot(*bodies.poses[:, :2].T)
     longest = max(kind.size[0] for kind in bodies.kinds) / 2
-    assert distances.min() >= NEAREST_M > longest + SWAY_M
+    assert distances.min() >= NEAREST_BODY_M > longest + SWAY_M
     assert distances.max() + SWAY_M < grid.range_m
 
 

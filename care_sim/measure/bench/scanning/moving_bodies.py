@@ -9,7 +9,7 @@ from care_sim.core.types import CLASSES
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE, BodyKind
 
-NEAREST_M = 8.0
+NEAREST_BODY_M = 8.0
 """No bus, which is 11 m long, reaches the sensor."""
 _FARTHEST_M = 48.0
 """Every body lies within the reach of 50 m."""
@@ -41,7 +41,7 @@ def moving_bodies(bodies: int, seed: int) -> MovingBodies:
     """Bodies of the five classes in turn, evenly spread over the ring around the sensor."""
     rng = np.random.default_rng(seed)
     # Uniform in the square of the distance is uniform in area.
-    distance = np.sqrt(rng.uniform(NEAREST_M**2, _FARTHEST_M**2, bodies))
+    distance = np.sqrt(rng.uniform(NEAREST_BODY_M**2, _FARTHEST_M**2, bodies))
     bearing, heading = rng.uniform(-np.pi, np.pi, (2, bodies))
     kinds = tuple(CATALOGUE[CLASSES[number % len(CLASSES)]] for number in range(bodies))
     x = distance * np.cos(bearing)
