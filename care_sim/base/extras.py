@@ -99,7 +99,12 @@ def silenced(descriptor: int) -> Iterator[None]:
     # still leads out, and what is printed meanwhile must leave it before the descriptor does again.
     c_library = ctypes.CDLL(None)
     c_library.fflush(None)
-    kept = os.dup(descriptor)
+    try:
+        kept = os.dup(descriptor)
+    except OSError:
+        # The process was started without this descriptor, so that nothing comes through anyway.
+        yield
+        return
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     try:
