@@ -40,7 +40,7 @@ def check_file_size(path: Path, most: int = MOST_BYTES) -> None:
     """
     there = path.stat()
     if not stat.S_ISREG(there.st_mode):
-        raise ValueError("it is no regular file")
+        raise ValueError("it is not a regular file")
     if there.st_size > most:
         raise ValueError(f"it holds {there.st_size} bytes and may hold {most}")
 

@@ -200,4 +200,5 @@ def _widened(span: Numbers4, point: Floats, camera: CameraModel) -> Numbers4:
 @compiled()
 def _along(axis: NDArray[np.float64], x: float, y: float, z: float) -> float:
     """The part of (x, y, z) along an axis (3,)."""
-    return axis[0] * x + axis[1] * y + axis[2] * z  # type: ignore[no-any-return]
+    part: float = axis[0] * x + axis[1] * y + axis[2] * z
+    return part

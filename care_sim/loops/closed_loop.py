@@ -87,6 +87,7 @@ class ClosedLoop:
         self._memory.predict()
         self._look(self._picture_of(scan))
 
+        # What was near, or was hit, is of the time since the scan; the rest is of the scan itself.
         target = world.first_sighting
         return Keyframe(
             index=index,

@@ -59,6 +59,7 @@ def pool_of_another_drive(
     return BoxPool.of(seen, times_s, rig.cameras, near_s=NEAR_S)
 
 
+# All episodes of a film have one pool, and they are mostly played one after the other.
 @lru_cache(maxsize=1)
 def pool_of_film(film: Film) -> BoxPool:
     """All boxes of a film. In a short one those are usable that are half of it away, so that every

@@ -54,6 +54,7 @@ class OpenLoop:
     ):
         self.film = film
         self.rig = rig
+        # As in the closed loop: a fault of one sensor leaves the draws of the others.
         camera_seed, lidar_seed, odometry_seed = seeds
         objects = sorted(
             {number for shot in film.shots for number in shot.annotations.objects.tolist()}

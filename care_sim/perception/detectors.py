@@ -23,7 +23,7 @@ PROXY = "returns"
 
 def _faults(made: Any) -> Iterator[str]:
     if not callable(made):
-        yield "makes nothing"
+        yield "is not callable"
 
 
 DETECTORS: Plugins[Any] = Plugins(

@@ -42,10 +42,10 @@ GLASS = (0.25, 0.32, 0.38)
 def _box(
     x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], colour: Triple
 ) -> Part:
-    extents = (x, y, z)
-    size = tuple(high - low for low, high in extents)
-    centre = tuple((high + low) / 2 for low, high in extents)
-    return Part("box", size, centre, colour)  # type: ignore[arg-type]
+    """A box from where to where it reaches along each axis of the body."""
+    size = (x[1] - x[0], y[1] - y[0], z[1] - z[0])
+    centre = ((x[1] + x[0]) / 2, (y[1] + y[0]) / 2, (z[1] + z[0]) / 2)
+    return Part("box", size, centre, colour)
 
 
 def _two_box(

@@ -62,7 +62,7 @@ def zeros(path, size):
 
 @pytest.mark.parametrize(
     ("more", "reason"),
-    [(1, r"it holds \d+ bytes and may hold \d+"), (None, "it is no regular file")],
+    [(1, r"it holds \d+ bytes and may hold \d+"), (None, "it is not a regular file")],
 )
 def test_every_reader_refuses_what_is_too_large_before_it_is_read(
     tmp_path, monkeypatch, more, reason

@@ -135,7 +135,7 @@ def test_a_package_that_ends_the_program_gets_one_line(install):
         ("stubborn", r"detector stubborn refuses \{\}: RuntimeError: no weights"),
         ("quits", r"detector quits refuses \{\}: SystemExit: 2"),
         ("blind", "detector blind is no PointDetector: Blind has no method detect"),
-        ("number", "detector number cannot be loaded: own_detectors:module makes nothing"),
+        ("number", "detector number cannot be loaded: own_detectors:module is not callable"),
         ("lost", "detector lost cannot be loaded: AttributeError: .*Nowhere"),
     ],
 )
