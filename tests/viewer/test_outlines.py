@@ -2,7 +2,7 @@ import numpy as np
 
 from care_sim.core.grid import AngularGrid
 from care_sim.viewer.recording.entities import ROW_PIXELS
-from care_sim.viewer.recording.outlines import outlines
+from care_sim.viewer.recording.picture_log import outlines
 
 GRID = AngularGrid(columns=8, rows=4)
 

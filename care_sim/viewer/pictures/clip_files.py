@@ -1,4 +1,4 @@
-"""Moving pictures as files: MP4 through FFmpeg, animated GIF, WebP and PNG through Pillow."""
+"""Clips as files: MP4 through FFmpeg, animated GIF, WebP and PNG through Pillow."""
 
 import errno
 from collections.abc import Callable, Iterable, Sequence
@@ -13,9 +13,9 @@ from care_sim.base.checks import check_known
 from care_sim.base.extras import import_imageio_ffmpeg
 from care_sim.base.files import GIF, MP4, PNG, WEBP, check_output, replacing, why_unwritable
 
-GIF_COLOURS = 96
-"""Colours of a GIF, the same in all of its pictures: flat surfaces need no more, and half the file
-goes.
+_GIF_COLOURS = 96
+"""Colours of a GIF, the same in all of its pictures: enough for flat surfaces, and the file is half
+as large.
 """
 
 
@@ -32,11 +32,11 @@ def check_clip(path: Path) -> None:
 def write_clip(
     path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
 ) -> None:
-    """Write pictures of one size, `picture_s` seconds each, the last for `hold_s`; an animation
-    begins anew.
+    """Write pictures of one size as a clip: each is shown for `picture_s` seconds, the last for
+    `hold_s`. An animation starts over at its end.
 
-    The ending of `path`, which `check_clip` has let pass, decides the form. The file is there whole
-    or not at all.
+    The ending of `path`, which `check_clip` has accepted, decides the form. The file is written
+    whole or not at all.
     """
     with replacing(path, CLIP_KINDS[path.suffix]) as unfinished:
         ENDINGS[path.suffix](unfinished, pictures, picture_s, hold_s)
@@ -45,12 +45,13 @@ def write_clip(
 def _write_mp4(
     path: Path, pictures: Iterable[Image.Image], picture_s: float, hold_s: float
 ) -> None:
+    # FFmpeg is told the size of the pictures first, so that the first of them is taken out.
     shown = iter(pictures)
     first = next(shown)
     ffmpeg = import_imageio_ffmpeg()
     settings = {
         "fps": 1 / picture_s,
-        "macro_block_size": 2,
+        "macro_block_size": 2,  # H.264 needs even sizes; larger blocks would scale the picture
         "quality": 7,
         "ffmpeg_log_level": "quiet",
     }
@@ -61,13 +62,14 @@ def _write_mp4(
             for picture in chain([first], shown):
                 film.send(picture.tobytes())
                 sent += 1
+            # A film has one rate for all pictures: to hold the last is to repeat it.
             for _ in range(round(hold_s / picture_s) - 1):
                 film.send(picture.tobytes())
                 sent += 1
         written, _ = ffmpeg.count_frames_and_secs(str(path))
     except (OSError, RuntimeError):
         written = 0
-    # FFmpeg does not tell us that it failed: a film that lacks a picture tells.
+    # FFmpeg does not report that it failed, but its film then lacks pictures.
     if written != sent:
         raise OSError(errno.EIO, why_unwritable(path) or "FFmpeg could not write it", str(path))
 
@@ -87,13 +89,12 @@ def _write_gif(
 
 
 def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
-    """The pictures in the colours that serve a dozen of them best; undithered, what stands still is
-    stored once.
-    """
+    """The pictures in one palette, the best for a dozen of them."""
     sample = np.concatenate(
         [np.asarray(picture) for picture in pictures[:: max(1, len(pictures) // 12)]]
     )
-    common = Image.fromarray(sample).quantize(GIF_COLOURS, Image.Quantize.MEDIANCUT)
+    common = Image.fromarray(sample).quantize(_GIF_COLOURS, Image.Quantize.MEDIANCUT)
+    # Without dithering, pixels that stand still have one colour, and are stored once.
     return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
 
 

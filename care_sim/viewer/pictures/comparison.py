@@ -1,5 +1,5 @@
-"""The picture of a keyframe beside that of another policy: chase view, the cells ahead, and what
-came of it.
+"""A picture of a keyframe to be shown beside that of another policy: chase view, the cells ahead,
+and whether the first-sighting actor is detected.
 """
 
 from collections.abc import Sequence
@@ -23,18 +23,19 @@ from care_sim.viewer.pictures.keyframe import (
     mark_tracks,
 )
 
-_VIEW = (512, 320)
-_CAMERA = PinholeCamera(*_VIEW, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
+_VIEW_SIZE = (512, 320)
+_CAMERA = PinholeCamera(*_VIEW_SIZE, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
 _TOP = 36
 _COLUMN_PIXELS = 2
 _ROW_PIXELS = 3
-_GRID_TOP = _TOP + _VIEW[1] + 22
-COMPARISON_WIDTH, COMPARISON_HEIGHT = _VIEW[0], 508
+_GRID_TOP = _TOP + _VIEW_SIZE[1] + 22
+COMPARISON_WIDTH = _VIEW_SIZE[0]
+COMPARISON_HEIGHT = 508
 
 
 def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
-    """A picture WIDTH x HEIGHT of where `loop` stands after the keyframes `frames`, under the
-    heading `name`.
+    """A picture of the state of `loop` after the keyframes `frames`, under the heading `name`,
+    COMPARISON_WIDTH x COMPARISON_HEIGHT pixels.
 
     Above, the street from behind the car, as in `care_sim.viewer.pictures.keyframe`. Below, the
     front half of the angular grid with the cells that fired, coloured by range, and whether the
@@ -76,6 +77,7 @@ def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
 
 
 def _cells_ahead(loop: ClosedLoop) -> Image.Image:
+    # Ahead is the middle of the picture of the grid, so that its two middle quarters are the front.
     grid = loop.rig.grid
     whole = drawing.grid_picture(grid, loop.belief.ranges, 1)
     ahead = whole.crop((grid.columns // 4, 0, 3 * grid.columns // 4, grid.rows))
@@ -85,7 +87,7 @@ def _cells_ahead(loop: ClosedLoop) -> Image.Image:
 
 
 def verdict_text(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:
-    """What has come of the first sighting so far."""
+    """Whether the first-sighting actor is detected so far: words, and the colour of that state."""
     seen = next((frame.time_s for frame in frames if frame.in_view), None)
     found = next((frame.time_s for frame in frames if frame.detected), None)
     if found is None:

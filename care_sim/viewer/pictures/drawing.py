@@ -1,6 +1,4 @@
-"""What is drawn over pictures: boxes in space, boxes in the image, labels, the angular grid in
-colours.
-"""
+"""Parts of pictures: boxes in space, boxes in the image, labels, the angular grid in colours."""
 
 from collections.abc import Iterable
 
@@ -32,8 +30,10 @@ def label(
     draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, colour: Colour, size: int = 13
 ) -> None:
     """Text centred over a point, on a dark plate, kept inside the picture."""
+    # A text does not begin at its own origin: its box tells where the ink lies.
     left, top, right, bottom = draw.textbbox((0, 0), text, font(size))
-    width, height = right - left + 6, bottom - top + 6
+    width = right - left + 6
+    height = bottom - top + 6
     canvas = draw.im.size
     x = min(max(at[0] - width / 2, 0), canvas[0] - width)
     y = min(max(at[1] - height - 2, 0), canvas[1] - height)
@@ -76,19 +76,19 @@ def image_boxes(
 
 
 def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: int) -> Image.Image:
-    """The scan (E, A) as the car sees it: left of the picture is the left, straight ahead is the
-    middle.
-    """
+    """The scan (E, A) as the car sees it: its left is left, straight ahead is the middle."""
     picture = np.full((*grid.shape, 3), NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
     picture[fired] = NO_RETURN_COLOUR
     picture[returned] = range_colours(ranges[returned] / grid.range_m)
+    # Columns run counter-clockwise from behind, so that the right comes first.
     return Image.fromarray(np.repeat(picture[:, ::-1], row_pixels, axis=0))
 
 
 def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """(..., 3) colours of ranges given as shares of the reach: near is bright."""
+    """(..., 3) colours of ranges that are given as shares of the reach: near is bright."""
+    # The ends of the scale are left out: they are too close to the background and to white.
     colours: NDArray[np.uint8] = _RANGE_COLOURS(0.05 + 0.75 * np.asarray(shares), bytes=True)[
         ..., :3
     ]

@@ -1,5 +1,6 @@
-"""A second, furnished copy of the world for pictures that people look at; the episode's own is not
-touched.
+"""A copy of the world for pictures that people look at, with ground, the car and marks on its path.
+
+The world of the episode is not touched.
 """
 
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ CHASE_SIZE = (960, 460)
 CHASE_CAMERA = PinholeCamera(
     *CHASE_SIZE, np.deg2rad(80.0), (-10.0, 0.0, 3.6), 0.0, np.deg2rad(-16.0)
 )
-"""Behind the car and above it, in the frame of the LiDAR; low enough to keep a strip of sky."""
+"""Behind the car and above it, in the frame of the LiDAR; low enough for a strip of sky."""
 
 METRE_MARKS = (10.0, 20.0, 30.0, 40.0)
 """Distances ahead of the LiDAR at which the path carries a bar, metres."""
@@ -29,7 +30,7 @@ _BAR = (0.8, 0.8, 0.78)
 
 @contextmanager
 def furnished(world: World) -> Iterator[BulletWorld]:
-    """A simulator with every actor where it is now, and an asphalt ground; freed at the end."""
+    """A simulator with every actor at its present pose and an asphalt ground; freed at the end."""
     scene = BulletWorld()
     try:
         scene.add(_slab("asphalt", (400.0, 100.0, 0.2), -0.1, _ASPHALT), world.ego.pose)
@@ -41,11 +42,12 @@ def furnished(world: World) -> Iterator[BulletWorld]:
 
 
 def add_car(scene: BulletWorld, world: World, sensor_x: float) -> None:
-    """The car itself, and on the ground the strip that the controller guards, with a bar every ten
+    """Add the car and, on the ground, the strip that the controller guards, with a bar every ten
     metres.
 
-    `sensor_x` is where the LiDAR stands ahead of the car's centre, metres.
+    `sensor_x` is the place of the LiDAR ahead of the car's centre, metres.
     """
+    # Path and bars stand 2 cm over what is below them, so that they are what is seen.
     x, y, yaw = world.ego.pose
     width = world.ego_kind.size[1] + 2 * BrakingRules().side_margin_m
     for kind, ahead in (

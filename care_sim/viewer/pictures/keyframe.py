@@ -1,5 +1,5 @@
-"""The picture of a keyframe: chase view with boxes, the camera's picture, the angular grid, a line
-of text.
+"""The picture of a keyframe of the closed loop: chase view with boxes, the camera's picture, the
+angular grid, a line of text.
 """
 
 import numpy as np
@@ -29,12 +29,21 @@ from care_sim.viewer.pictures.furnished_world import (
     furnished,
 )
 
-PICTURE_WIDTH, PICTURE_HEIGHT = 960, 720
+PICTURE_WIDTH = 960
+PICTURE_HEIGHT = 720
 _HEADER = 40
 _PANELS = _HEADER + CHASE_SIZE[1]
 _CAMERA_AT = (20, _PANELS + 30)
 _GRID_AT = (392, _PANELS + 44)
 _ROW_PIXELS = 4
+_DIRECTIONS = (
+    (0.0, "behind", "la"),
+    (0.25, "left", "ma"),
+    (0.5, "ahead", "ma"),
+    (0.75, "right", "ma"),
+    (1.0, "behind", "ra"),
+)
+"""Directions below the grid: share of its width, name, anchor of the text."""
 _BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
 TRACKED_COLOUR = (90, 220, 255)
@@ -47,8 +56,8 @@ BRAKING_COLOUR = (255, 80, 70)
 
 
 def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]:
-    """A picture (HEIGHT, WIDTH, 3) of where `loop` stands, and of the scan of the keyframe before,
-    `frame`.
+    """A picture (PICTURE_HEIGHT, PICTURE_WIDTH, 3) of the present state of `loop`, and of the scan
+    of the keyframe before, `frame`.
 
     Above, the street from behind the car: tracks as wireframes, an arrow at the first-sighting
     actor, and on the ground the strip the controller guards. Below, the front camera with its
@@ -57,6 +66,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     """
     canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
     with furnished(loop.world) as scene:
+        # The front camera does not see the car that carries it, nor the marks on the ground.
         camera = Image.fromarray(scene.colours(loop.rig.cameras[0], loop.sensor))
         add_car(scene, loop.world, LIDAR_POSITION[0])
         chase = Image.fromarray(scene.colours(CHASE_CAMERA, loop.sensor))
@@ -96,6 +106,7 @@ def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe |
 
 def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None) -> None:
     draw = ImageDraw.Draw(chase)
+    # Numbers stand beside the bars, 1.6 m to the left, on the ground below the LiDAR.
     for metres in METRE_MARKS:
         ground = np.array([metres, 1.6, -LIDAR_POSITION[2], 0.0, 0.0, 0.0, 0.0])
         if at := drawing.point_above(CHASE_CAMERA, ground):
@@ -106,7 +117,8 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
 
 
 def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks) -> None:
-    """Tracks as wireframes with their classes, faint those that the last scan missed."""
+    """Tracks as wireframes with their classes; those that the last scan missed are faint."""
+    # Tracks come nearest first: the nearest is drawn last, over the others.
     for box, number, misses in reversed(
         list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))
     ):
@@ -123,11 +135,14 @@ def mark_first_sighting(
     target = loop.world.first_sighting
     if target is None:
         return
-    state, colour = "hidden", HIDDEN_COLOUR
+    state = "hidden"
+    colour = HIDDEN_COLOUR
     if frame is not None and frame.detected:
-        state, colour = "detected", DETECTED_COLOUR
+        state = "detected"
+        colour = DETECTED_COLOUR
     elif loop.picture.shows(target.body):
-        state, colour = "in view", IN_VIEW_COLOUR
+        state = "in view"
+        colour = IN_VIEW_COLOUR
     (box,) = loop.sensor.boxes_to_local(loop.world.boxes([target]))
     if at := drawing.point_above(camera, box):
         drawing.arrow(draw, at, f"{target.name}: {state}", colour)
@@ -148,8 +163,8 @@ def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
 def draw_grid(
     canvas: Image.Image, draw: ImageDraw.ImageDraw, grid: AngularGrid, ranges: NDArray[np.floating]
 ) -> None:
-    """The angular grid with a scan (E, A), its directions and its colours, in the lower right of a
-    picture.
+    """The angular grid with a scan (E, A), in the lower right of a picture, with its directions and
+    a legend of its colours.
     """
     left, top = _GRID_AT
     picture = drawing.grid_picture(grid, ranges, _ROW_PIXELS)
@@ -161,22 +176,9 @@ def draw_grid(
         INK,
         drawing.font(14),
     )
-    for share, name, anchor in ((0.0, "behind", "la"), (0.25, "left", "ma"), (0.5, "ahead", "ma")):
-        draw.text(
-            (left + share * grid.columns, bottom + 4),
-            name,
-            FAINT_INK,
-            drawing.font(13),
-            anchor=anchor,
-        )
-    for share, name, anchor in ((0.75, "right", "ma"), (1.0, "behind", "ra")):
-        draw.text(
-            (left + share * grid.columns, bottom + 4),
-            name,
-            FAINT_INK,
-            drawing.font(13),
-            anchor=anchor,
-        )
+    for share, name, anchor in _DIRECTIONS:
+        at = (left + share * grid.columns, bottom + 4)
+        draw.text(at, name, FAINT_INK, drawing.font(13), anchor=anchor)
     _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
 
 
@@ -186,11 +188,11 @@ def _draw_legend(
     for x, colour, name in (
         (0, NOT_FIRED_COLOUR, "not fired"),
         (95, NO_RETURN_COLOUR, "no return"),
-        (195, None, ""),
     ):
-        if colour is not None:
-            draw.rectangle((left + x, top, left + x + 14, top + 12), colour)
-            draw.text((left + x + 20, top - 2), name, FAINT_INK, drawing.font(13))
+        draw.rectangle((left + x, top, left + x + 14, top + 12), colour)
+        draw.text((left + x + 20, top - 2), name, FAINT_INK, drawing.font(13))
+
+    # The scale of ranges, from 0 to the reach.
     scale = np.tile(drawing.range_colours(np.linspace(0.0, 1.0, 160)), (13, 1, 1))
     canvas.paste(Image.fromarray(scale), (left + 245, top))
     draw.text((left + 240, top - 2), "0 m", FAINT_INK, drawing.font(13), anchor="ra")

@@ -20,14 +20,16 @@ _MAP_SIZE = (PICTURE_WIDTH, 460)
 _BOTTOM = _TOP + _MAP_SIZE[1]
 _PIXELS_PER_M = _MAP_SIZE[1] / (2 * RANGE_M + 4)
 _RINGS = (10.0, 20.0, 30.0, 40.0, RANGE_M)
+"""Radii of the range rings, metres."""
 _CAR = np.array([0.0, 0.0, 0.0, *CATALOGUE["ego"].size, 0.0])
 _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
+"""What a box gains in length and width for its second line."""
 
 FOUND_COLOUR = (80, 230, 110)
 MISSED_COLOUR = (255, 120, 60)
 OUT_OF_RANGE_COLOUR = (95, 100, 108)
 RING_COLOUR = (52, 56, 63)
-RETURN = (172, 176, 184)
+RETURN_COLOUR = (172, 176, 184)
 PLAN_LEGEND = (
     ("found", FOUND_COLOUR),
     ("not found", MISSED_COLOUR),
@@ -44,12 +46,13 @@ def draw_plan(
     scored: NDArray[np.bool_],
     appearing: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
-    """A picture (HEIGHT, WIDTH, 3) of keyframe `index` of a film from above, the car driving to the
-    right.
+    """A picture (PICTURE_HEIGHT, PICTURE_WIDTH, 3) of keyframe `index` of a film from above, the
+    car driving to the right.
 
-    The annotated objects (n,): found, not found, or beyond the range that is `scored`; those
-    `appearing` have a double line. The returns of the fired cells, and below the angular grid with
-    their ranges. `record` is None before the first scan. The episode is left as it was.
+    It shows the annotated objects (n,), which are `found`, not found, or beyond the range that is
+    `scored`; those `appearing` have a double line. It shows the returns of the fired cells and,
+    below, the angular grid with their ranges. `record` is None before the first scan. The episode
+    is left as it was.
     """
     shot = loop.film.shots[index]
     returned = _returned(shot.cloud, record)
@@ -83,7 +86,7 @@ def _map(
             drawing.font(11),
             anchor="rm",
         )
-    draw.point(_pixels(points[:, :2]).ravel().tolist(), RETURN)
+    draw.point(_pixels(points[:, :2]).ravel().tolist(), RETURN_COLOUR)
     _draw_box(draw, _CAR, INK, 2)
     for box, colour, appears in zip(boxes, colours, appearing, strict=True):
         _draw_box(draw, box, colour, 2)
@@ -118,7 +121,9 @@ def _write_words(
     draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
     for row, (text, colour) in enumerate(PLAN_LEGEND):
         draw.text((20, _BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
-    draw.text((20, _BOTTOM + 40 + 24 * len(PLAN_LEGEND)), "dots: returns", RETURN, drawing.font(16))
+    draw.text(
+        (20, _BOTTOM + 40 + 24 * len(PLAN_LEGEND)), "dots: returns", RETURN_COLOUR, drawing.font(16)
+    )
 
 
 def _draw_box(draw: ImageDraw.ImageDraw, box: Floats, colour: drawing.Colour, width: int) -> None:
@@ -141,9 +146,11 @@ def _returned(cloud: Cloud, record: OpenLoopKeyframe | None) -> Cloud:
 def _ranges(
     loop: OpenLoop, returned: Cloud, record: OpenLoopKeyframe | None
 ) -> NDArray[np.float64]:
+    """(E, A) metres as an observation has them: 0 not fired, the reach without a return."""
     grid = loop.rig.grid
     ranges = np.zeros(grid.size)
     if record is not None:
+        # A recording may hold several points of one cell: the nearest counts.
         ranges[record.fired] = grid.range_m
         np.minimum.at(ranges, returned.cells, np.linalg.norm(returned.points, axis=1))
     return ranges.reshape(grid.shape)

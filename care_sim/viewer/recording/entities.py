@@ -4,17 +4,19 @@ from care_sim.core.types import CLASSES
 
 ABOUT_ENTITY = "about"
 """The page that says what a recording holds; every other entity is one of an episode."""
-SECONDS, KEYFRAME = "seconds", "keyframe"
-"""The timelines: time of the scan, and number of the keyframe from 0."""
+SECONDS = "seconds"
+"""The timeline of the time of the scan."""
+KEYFRAME = "keyframe"
+"""The timeline of the number of the keyframe, from 0."""
 
 ROW_PIXELS = 2
-"""Pixel rows of the grid's picture to a row of cells, which is about twice as high as a column is
-wide.
+"""Pixel rows per row of cells in the picture of the grid: a row is about twice as high as a column
+is wide.
 """
 WEDGE_M = 30.0
-"""How far a wedge, which has no depth, is drawn."""
+"""Length at which a wedge, which has no depth, is drawn."""
 MOST_POINTS = 6000
-"""Of more returns every second or third is drawn: full scans would fill 9 MB in 6 s."""
+"""Of more returns, only every second or third is drawn: full scans would fill 9 MB in 6 s."""
 
 ENTITIES = {
     "world": "axes: x along the road, y left, z up; metres",

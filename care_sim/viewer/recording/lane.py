@@ -10,16 +10,16 @@ from care_sim.core.frames import Floats
 from care_sim.viewer.recording.entities import KEYFRAME, SECONDS
 
 THIN = -1.0
-"""Radius of lines; Rerun takes negative ones for points of the screen."""
+"""Radius of lines; Rerun takes a negative radius as points of the screen."""
 
 
 def entity_path(lane: str, entity: str) -> str:
-    """The path of an entity of an episode; the name of a lane may hold anything."""
+    """The path of an entity of an episode; the name of a lane may hold any character."""
     return f"{rr.escape_entity_path_part(lane)}/{entity}"
 
 
 class Lane:
-    """Logs below `name` into a stream."""
+    """Logs the entities of one episode into a stream, below `name`."""
 
     def __init__(self, stream: rr.RecordingStream, name: str):
         self._stream = stream
@@ -36,9 +36,8 @@ class Lane:
         self._stream.log(entity_path(self.name, entity), *content)
 
     def log_list(self, entity: str, count: int, make: Callable[[], Sequence[Any]]) -> None:
-        """Log a list of `count` things at the present keyframe, made by `make`; nothing if it was
-        and is empty.
-        """
+        """Log a list of `count` things at the present keyframe, made by `make`."""
+        # An empty list is logged once, to clear what stood there, and then no more.
         if count or self._counts.get(entity) != 0:
             self.log(entity, *make())
         self._counts[entity] = count
@@ -46,7 +45,7 @@ class Lane:
     def log_curve(
         self, entity: str, keyframes: Sequence[int], times_s: Sequence[float], values: Floats
     ) -> None:
-        """Log one number per keyframe (n,) at once, which costs as much as logging one."""
+        """Log one number per keyframe, `values` (n,), at once: it costs as much as logging one."""
         times = (
             rr.TimeColumn(KEYFRAME, sequence=keyframes),
             rr.TimeColumn(SECONDS, duration=times_s),
@@ -61,7 +60,8 @@ class Lane:
 
 
 def box_batch(table: Floats, **appearance: Any) -> rr.Boxes3D:
-    """Boxes (n, 7), upright, in the frame of their entity."""
+    """Upright boxes (n, 7) in the frame of their entity."""
+    # Quaternions (0, 0, z, w) of a turn about the vertical.
     half = table[:, 6] / 2
     turns = np.column_stack([np.zeros((len(table), 2)), np.sin(half), np.cos(half)])
     return rr.Boxes3D(centers=table[:, :3], sizes=table[:, 3:6], quaternions=turns, **appearance)

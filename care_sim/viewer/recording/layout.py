@@ -1,4 +1,4 @@
-"""The blueprint: views that tell the story without a click."""
+"""The blueprint: which views a recording opens with, and where."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,16 @@ import rerun.blueprint as rrb
 from care_sim.viewer.recording.entities import ABOUT_ENTITY, SECONDS
 from care_sim.viewer.recording.lane import entity_path
 
-EYE_M, TARGET_M = (-11.0, 0.0, 6.0), (12.0, 0.0, -1.0)
-"""Behind the car and above it, in the sensor frame."""
-DARK = (24, 26, 30)
-GRID_TITLE = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
+_EYE_M = (-11.0, 0.0, 6.0)
+"""Where the chase view looks from: behind the car and above it, in the sensor frame."""
+_TARGET_M = (12.0, 0.0, -1.0)
+"""Where it looks to."""
+_DARK = (24, 26, 30)
+_GRID_TITLE = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
 
 
 def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:
-    """Of one episode, or of several side by side."""
+    """The views of one episode, or of several side by side."""
     story = _one(lanes[0]) if len(lanes) == 1 else _several(lanes)
     time = rrb.TimePanel(state="collapsed", timeline=SECONDS, play_state="playing", loop_mode="all")
     panels = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), time
@@ -59,9 +61,9 @@ def _chase(lane: str) -> rrb.Spatial3DView:
             f"- {entity_path(lane, 'world/lidar/camera/**')}",
         ],
         name=f"{lane}: the street",
-        background=DARK,
+        background=_DARK,
         line_grid=False,
-        eye_controls=rrb.EyeControls3D(position=EYE_M, look_target=TARGET_M, eye_up=(0, 0, 1)),
+        eye_controls=rrb.EyeControls3D(position=_EYE_M, look_target=_TARGET_M, eye_up=(0, 0, 1)),
     )
 
 
@@ -71,7 +73,7 @@ def _camera(lane: str) -> rrb.Spatial2DView:
 
 
 def _grid(lane: str) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {GRID_TITLE}")
+    return rrb.Spatial2DView(origin=entity_path(lane, "grid"), name=f"{lane}: {_GRID_TITLE}")
 
 
 def _states(lanes: Sequence[str]) -> rrb.StateTimelineView:

@@ -12,18 +12,17 @@ from care_sim.base.files import RERUN, replacing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.watcher import WatchedKeyframe
-from care_sim.viewer.recording.camera_photo import photograph
 from care_sim.viewer.recording.entities import ABOUT_ENTITY, LANES, about
-from care_sim.viewer.recording.grid_pictures import PictureLog
 from care_sim.viewer.recording.lane import Lane
 from care_sim.viewer.recording.layout import blueprint
-from care_sim.viewer.recording.measures import MeasureLog
-from care_sim.viewer.recording.space import SpaceLog
+from care_sim.viewer.recording.measure_log import MeasureLog
+from care_sim.viewer.recording.picture_log import PictureLog, photograph
+from care_sim.viewer.recording.space_log import SpaceLog
 
 
 class Recording(AbstractContextManager["Recording"]):
-    """Writes `path`, which is there once this is closed; `lanes` are the names of the episodes that
-    will be in it. Until then it is held in memory: 1 to 9 MB an episode.
+    """Writes `path` when it is closed; `lanes` are the names of the episodes that will be in it.
+    Until then all is held in memory: 1 to 9 MB per episode.
 
     Raises InvalidInput for a lane with the name of the page `about`, and as
     `care_sim.base.files.replacing` does.
@@ -38,8 +37,8 @@ class Recording(AbstractContextManager["Recording"]):
         self._file = ExitStack()
         self._unfinished = self._file.enter_context(replacing(path, RERUN))
         self._stream = rr.RecordingStream("care-sim")
-        # Rerun's own writer is a thread that a full disk ends, and whatever waits for it then waits
-        # for ever.
+        # Rerun's own writer is a thread. A full disk ends it, and whatever waits for it then waits
+        # for ever: so the recording is held in memory, and written here.
         self._memory = self._stream.memory_recording()
         self._stream.send_blueprint(blueprint(self._lanes), make_active=False)
         self._file.callback(self._write)
@@ -49,7 +48,7 @@ class Recording(AbstractContextManager["Recording"]):
         )
 
     def episode(self, name: str, loop: ClosedLoop) -> "RecordedEpisode":
-        """Begin the lane `name`. Raises InvalidInput for one that was not announced."""
+        """Begin the lane `name`. Raises InvalidInput for a name that is none of `lanes`."""
         if name not in self._lanes:
             raise unknown("lane", name, self._lanes)
         colour = LANES[self._lanes.index(name) % len(LANES)]

@@ -8,7 +8,7 @@ import pytest
 
 import care_sim
 from care_sim.viewer.pictures.keyframe import PICTURE_HEIGHT, PICTURE_WIDTH
-from care_sim.viewer.pictures.scene_from_above import FOUND_COLOUR, MISSED_COLOUR, RETURN
+from care_sim.viewer.pictures.scene_from_above import FOUND_COLOUR, MISSED_COLOUR, RETURN_COLOUR
 
 STEPS_OUT = 5
 """The keyframe at which the person of the drive appears."""
@@ -57,13 +57,13 @@ def test_there_is_a_picture_before_the_first_scan_and_after_the_last(play):
 
 def test_what_fired_decides_what_is_drawn_as_found(play):
     before, scanned = play("full", keyframes=1)[0]
-    assert count(before, FOUND_COLOUR) == count(before, RETURN) == 0
+    assert count(before, FOUND_COLOUR) == count(before, RETURN_COLOUR) == 0
     assert count(before, MISSED_COLOUR) > 50
     assert count(scanned, FOUND_COLOUR) > 50
-    assert count(scanned, RETURN) > 500
+    assert count(scanned, RETURN_COLOUR) > 500
     _, starved = play("random", budget=1e-4, keyframes=1)[0]
     assert count(starved, FOUND_COLOUR) == 0
-    assert count(starved, RETURN) <= 2
+    assert count(starved, RETURN_COLOUR) <= 2
 
 
 def test_a_first_sighting_has_a_second_line_at_its_keyframe_alone(play):

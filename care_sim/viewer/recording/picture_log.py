@@ -1,31 +1,43 @@
-"""What is logged in pictures: the camera's detections, and the cells of the angular grid."""
+"""What is logged in pictures: what the camera shows and detects, and the cells of the grid."""
 
+from collections.abc import Sequence
+from io import BytesIO
 from itertools import compress
 
 import numpy as np
 import rerun as rr
+from PIL import Image
 
 from care_sim.core.actions import SHARES
 from care_sim.core.frames import Floats
+from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane
-from care_sim.viewer.recording.outlines import outlines
 
-CAMERA = "world/lidar/camera"
-COLOURS = {
+_CAMERA = "world/lidar/camera"
+_BOX_COLOURS = {
     "explained": entities.EXPLAINED_RGB,
     "residual": entities.RESIDUAL_RGB,
     "missed": entities.MISSED_RGB,
 }
-OUTLINES = {
+_OUTLINE_COLOURS = {
     "hulls": entities.EGO_RGB,
     "wedges/explained": entities.EXPLAINED_RGB,
     "wedges/residual": entities.RESIDUAL_RGB,
 }
+
+
+_SKY = (186, 203, 218)
+_ROAD = (58, 60, 65)
+_NOTHING = 255
+"""What the renderer paints where no body is."""
+_QUALITY = 80
+"""Of a JPEG, out of 100: a recording stays small."""
 
 
 class PictureLog:
@@ -43,26 +55,26 @@ class PictureLog:
             camera_xyz=rr.ViewCoordinates.FLU,
             image_plane_distance=1.0,
         )
-        lane.fix(CAMERA, place, lens)
+        lane.fix(_CAMERA, place, lens)
         shares = [
             (n, name, colour)
             for n, (name, colour) in enumerate(zip(SHARES, entities.SHARE_COLOURS, strict=True))
         ]
         lane.fix("grid", rr.AnnotationContext(shares))
-        for kind, colour in COLOURS.items():
-            # explained ones stand side by side: their names would overlap
+        for kind, colour in _BOX_COLOURS.items():
+            # Explained ones stand side by side, so that their names would overlap.
             names = rr.Points2D.from_fields(
                 colors=[colour], radii=[0.0], show_labels=kind != "explained"
             )
             lane.fix(
-                f"{CAMERA}/{kind}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]), names
+                f"{_CAMERA}/{kind}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]), names
             )
-        for entity, colour in OUTLINES.items():
+        for entity, colour in _OUTLINE_COLOURS.items():
             lane.fix(f"grid/{entity}", rr.Boxes2D.from_fields(colors=[colour], radii=[THIN]))
 
     def log(self, watched: WatchedKeyframe, photo: bytes) -> None:
         """A keyframe and the JPEG of its camera."""
-        self._lane.log(CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
+        self._lane.log(_CAMERA, rr.EncodedImage(contents=photo, media_type="image/jpeg"))
         self._log_detections(watched.situation)
         self._log_grid(watched)
 
@@ -81,10 +93,12 @@ class PictureLog:
         )
 
     def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:
-        """Boxes, and their names as those of points, which the viewer does not break into lines."""
+        """Log boxes, and their names as those of points below them, since the viewer breaks names
+        of boxes into lines.
+        """
         below = np.column_stack([boxes[:, [0, 2]].mean(axis=1), boxes[:, 3]])
         self._lane.log_list(
-            f"{CAMERA}/{kind}",
+            f"{_CAMERA}/{kind}",
             len(boxes),
             lambda: (_boxes(boxes), rr.Points2D(below, labels=names)),
         )
@@ -93,6 +107,7 @@ class PictureLog:
         belief = watched.situation.belief
         known = watched.situation.known
         rig = self._rig
+        # Left is left, as in the pictures of `care_sim.viewer.pictures.drawing.grid_picture`.
         cells = np.repeat(watched.shares[:, ::-1], entities.ROW_PIXELS, axis=0)
         self._lane.log("grid/cells", rr.SegmentationImage(cells))
         sectors = wedges(belief.detections, rig)
@@ -113,3 +128,40 @@ def _boxes(boxes: Floats) -> rr.Boxes2D:
 
 def _names(detections: ImageDetections) -> list[str]:
     return [CLASSES[number] for number in detections.classes]
+
+
+def photograph(loop: ClosedLoop) -> bytes:
+    """A JPEG of what the camera shows now, small enough to keep, with sky and road behind it."""
+    camera = loop.rig.cameras[0]
+    picture = loop.world.bullet.colours(camera, loop.sensor)
+
+    # The renderer leaves white where no body is: sky above the middle of the picture, road below.
+    backdrop = np.full_like(picture, _ROAD)
+    backdrop[: camera.height // 2] = _SKY
+    empty = (picture == _NOTHING).all(axis=2)
+    np.copyto(backdrop, picture, where=~empty[..., None])
+    file = BytesIO()
+    Image.fromarray(backdrop).save(file, "JPEG", quality=_QUALITY)
+    return file.getvalue()
+
+
+def outlines(sectors: Sequence[Cells], grid: AngularGrid) -> Floats:
+    """(n, 4: left, top, right, bottom in pixels) boxes around angular rectangles of cells, over the
+    picture of the grid: two for one that lies across the seam behind the car, none for one without
+    cells.
+    """
+    boxes = [box for cells in sectors if len(cells) for box in _cell_boxes(cells, grid)]
+    return np.array(boxes, float).reshape(-1, 4)
+
+
+def _cell_boxes(cells: Cells, grid: AngularGrid) -> list[tuple[float, ...]]:
+    top = int(cells[0]) // grid.columns
+    bottom = int(cells[-1]) // grid.columns + 1
+    # Cells ascend row by row, and every row has the columns of the first. These have a gap where
+    # the rectangle lies across the seam.
+    columns = cells[: np.searchsorted(cells, (top + 1) * grid.columns)] % grid.columns
+    runs = np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1)
+    # The picture has the last column at its left.
+    upper = top * entities.ROW_PIXELS
+    lower = bottom * entities.ROW_PIXELS
+    return [(grid.columns - 1 - run[-1], upper, grid.columns - run[0], lower) for run in runs]

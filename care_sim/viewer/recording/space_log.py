@@ -1,4 +1,4 @@
-"""What is logged in space: bodies, the car and its way, returns, tracks, wedges."""
+"""What is logged in space: bodies, the car and its path, returns, tracks, wedges."""
 
 import math
 
@@ -15,13 +15,14 @@ from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 
-PATH_M = 40.0
-CORNERS = (1, 2, 4, 3)
-"""The corners of an image box among its rays, in turn."""
-SHARE_COLOUR_ARRAY = np.array(entities.SHARE_COLOURS, np.uint8)
-GLASSY = FillMode.TransparentFillMajorWireframe
-"""People look through bodies at what they hide."""
-MARGIN_M = 0.15
+_PATH_M = 40.0
+"""Length of the strip that the controller guards, as far as it is drawn."""
+_CORNERS = (1, 2, 4, 3)
+"""Places of the corners of an image box among its rays, one after the other around it."""
+_SHARE_COLOURS = np.array(entities.SHARE_COLOURS, np.uint8)
+_GLASSY = FillMode.TransparentFillMajorWireframe
+"""Bodies are drawn so that one can look through them at what they hide."""
+_MARGIN_M = 0.15
 """How much larger than its body the box of the first-sighting actor is drawn."""
 
 
@@ -33,15 +34,21 @@ class SpaceLog:
         self._rig = rig
         self._driven: list[Floats] = []
         lane.fix("world", rr.ViewCoordinates.FLU)
+
+        # The strip on the ground that the controller guards, below the sensor.
         width = ego_width_m + 2 * BrakingRules().side_margin_m
-        strip = np.array([[PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, PATH_M, width, 0.02, 0.0]])
+        strip = np.array(
+            [[_PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, _PATH_M, width, 0.02, 0.0]]
+        )
         lane.fix(
             "world/lidar/path", box_batch(strip, colors=entities.PATH_RGB, fill_mode=FillMode.Solid)
         )
+
+        # What stays as it is for the whole episode; places follow with every keyframe.
         lane.fix(
             "world/ego", rr.Boxes3D.from_fields(colors=[entities.EGO_RGB], fill_mode=FillMode.Solid)
         )
-        lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=GLASSY))
+        lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY))
         lane.fix(
             "world/driven", rr.LineStrips3D.from_fields(colors=[entities.EGO_RGB], radii=[THIN])
         )
@@ -69,7 +76,7 @@ class SpaceLog:
         self._log_tracks(situation)
         for kind, chosen in (("residual", ~situation.known), ("explained", situation.known)):
             self._log_wedges(
-                kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, CORNERS]
+                kind, wedge_rays(situation.belief.detections, self._rig)[chosen][:, _CORNERS]
             )
 
     def _log_bodies(self, situation: TrueSituation, state: str) -> None:
@@ -80,9 +87,10 @@ class SpaceLog:
         self._lane.log(
             "world/bodies", box_batch(situation.bodies, colors=colours, labels=situation.names)
         )
+        # A box around the first-sighting actor, in the colour of its state.
         if situation.target is not None:
             around = situation.bodies[[situation.target]] + np.array(
-                [0, 0, 0, *[2 * MARGIN_M] * 3, 0]
+                [0, 0, 0, *[2 * _MARGIN_M] * 3, 0]
             )
             text = [f"{situation.names[situation.target]}: {state}"]
             self._lane.log(
@@ -100,8 +108,9 @@ class SpaceLog:
 
     def _log_returns(self, watched: WatchedKeyframe) -> None:
         cells, points = watched.returned(self._rig.grid)
+        # Every nth return, so that there are at most MOST_POINTS.
         step = math.ceil(len(cells) / entities.MOST_POINTS) or 1
-        colours = SHARE_COLOUR_ARRAY[watched.shares.ravel()[cells[::step]]]
+        colours = _SHARE_COLOURS[watched.shares.ravel()[cells[::step]]]
         self._lane.log("world/lidar/returns", rr.Points3D(points[::step], colors=colours))
 
     def _log_tracks(self, situation: TrueSituation) -> None:

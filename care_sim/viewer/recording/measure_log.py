@@ -15,8 +15,8 @@ from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import Lane
 
-MEASURE_UNITS = {"speed": "m/s", "distance": "m", "clearance": "m", "braking": ""}
-MEASURE_FIELDS = {
+_UNITS = {"speed": "m/s", "distance": "m", "clearance": "m", "braking": ""}
+_FIELDS = {
     "speed": "speed_mps",
     "distance": "distance_m",
     "clearance": "clearance_m",
@@ -25,7 +25,9 @@ MEASURE_FIELDS = {
 
 
 class MeasureLog:
-    """Logs the numbers of an episode, in the colour of its lane; `budget` is B in cells."""
+    """Logs the numbers of an episode as curves in the colour of its lane, its states and its
+    events; `budget` is B in cells.
+    """
 
     def __init__(self, lane: Lane, budget: int, colour: tuple[int, int, int]):
         self._lane = lane
@@ -33,7 +35,8 @@ class MeasureLog:
         self._states: dict[str, str] = {}
         self._frames: list[Keyframe] = []
         self._counts: list[Cells] = []
-        for name, unit in MEASURE_UNITS.items():
+        # Curves of numbers; those of the budget have a colour per share.
+        for name, unit in _UNITS.items():
             step = InterpolationMode.StepAfter if name == "braking" else InterpolationMode.Linear
             series = rr.SeriesLines(
                 names=f"{lane.name} {name} {unit}".strip(), colors=colour, interpolation_mode=step
@@ -41,6 +44,8 @@ class MeasureLog:
             lane.fix(f"measures/{name}", series)
         for name, colour_ in zip(SHARES[1:], entities.SHARE_COLOURS[1:], strict=True):
             lane.fix(f"budget/{name}", rr.SeriesLines(names=f"{name} %", colors=colour_))
+
+        # States with a name and a colour for each of their values.
         actor = entities.ACTOR_COLOURS
         brake = {"off": entities.COASTING_RGB, "on": entities.BRAKE_RGB}
         for entity, colours in (("states/actor", actor), ("states/brake", brake)):
@@ -64,7 +69,7 @@ class MeasureLog:
             self._lane.log("events", rr.TextLog(f"collision at {frame.impact_speed_mps:.1f} m/s"))
 
     def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """The episode is over, or was left: log its curves and its result."""
+        """Log the curves and the result of the episode, None where it was left unfinished."""
         self._log_curves()
         lines = [
             f"| {name} | {'-' if value is None else value} |"
@@ -80,16 +85,18 @@ class MeasureLog:
     def _log_curves(self) -> None:
         frames = self._frames
         percents = 100 * np.reshape(self._counts, (-1, len(SHARES))) / self._budget
-        for name, field in MEASURE_FIELDS.items():
+        for name, field in _FIELDS.items():
             self._log_curve(
                 f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float)
             )
+        # Either a policy's demand tells the shares, or a raw action scored the cells itself.
         for share in (
             (CHOSEN, FLOOR) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE, FLOOR)
         ):
             self._log_curve(f"budget/{SHARES[share]}", percents[:, share])
 
     def _log_curve(self, entity: str, values: Floats) -> None:
+        # Without a first-sighting actor there is no distance, and no point of the curve.
         kept = np.flatnonzero(np.isfinite(values))
         frames = [self._frames[number] for number in kept]
         self._lane.log_curve(
@@ -101,6 +108,7 @@ class MeasureLog:
         if state == before:
             return
         self._states[entity] = state
+        # What an episode begins with is no event, unless it is worth telling.
         self._lane.log(entity, rr.StateChange(state=state))
         if before is not None or state not in ("off", "out of view"):
             self._lane.log("events", rr.TextLog(words))
