@@ -147,10 +147,12 @@ class World:
         self._steps += 1
         self.time = round(self._steps * WORLD_STEP_S, 9)
 
-        # An event may start others, so those that are due are listed before any is called.
-        for event in [event for due, event in self._events if due <= self.time]:
+        # Events that are due are taken off the list before any is called: one may start another,
+        # which has its turn at the next step if it is due already.
+        due = [event for start, event in self._events if start <= self.time]
+        self._events = [(start, event) for start, event in self._events if start > self.time]
+        for event in due:
             event()
-        self._events = [(due, event) for due, event in self._events if due > self.time]
         self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / WORLD_STEP_S)
 
         # Poses are read after events, which may change who moves.

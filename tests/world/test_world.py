@@ -102,6 +102,13 @@ def test_events_happen_once_at_their_step(world):
     assert WORLD_STEP_S == 0.05
 
 
+def test_an_event_may_start_one_that_is_due_already(world):
+    happened = []
+    world.at(0.1, lambda: world.at(0.0, lambda: happened.append(world.time)))
+    world.advance(0.0, 0.3)
+    assert happened == pytest.approx([0.15])
+
+
 def test_labels_are_for_reported_bodies_of_the_five_classes(world):
     car = world.add("a", "car", (10.0, 5.0, 0.0))
     silent = world.add("b", "car", (20.0, 5.0, 0.0), reported=False)
