@@ -18,8 +18,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Demand, Detections, ImageDetections, Tracks
 from care_sim.envs import register_all
 from care_sim.policies import make_policy, policy_names
-from care_sim.policies.base import Policy
-from care_sim.policies.privileged import PrivilegedPolicy
+from care_sim.policies.base import Policy, PrivilegedPolicy
 
 __version__ = version("care-sim")
 __all__ = [

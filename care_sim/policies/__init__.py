@@ -1,5 +1,5 @@
 """Policies by name: the built-in ones and those that installed packages add
-(`care_sim.policies.installed`).
+(`care_sim.policies.makers`).
 """
 
 import gymnasium
@@ -8,9 +8,14 @@ from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.seed_finder import SeedFinder
-from care_sim.policies.installed import policy_faults
 from care_sim.policies.learned.learned_scorer import LearnedScorer
 from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
+from care_sim.policies.makers import (
+    PolicyMaker,
+    check_parameters,
+    is_privileged,
+    policy_faults,
+)
 from care_sim.policies.paper.all_camera import AllCamera
 from care_sim.policies.paper.beam_reduce import BeamReduce
 from care_sim.policies.paper.care import Care
@@ -24,7 +29,6 @@ from care_sim.policies.paper.history_uniform import HistoryUniform
 from care_sim.policies.paper.random import Random
 from care_sim.policies.paper.random_points import RandomPoints
 from care_sim.policies.paper.uncertainty import Uncertainty
-from care_sim.policies.parameters import PolicyMaker, check_parameters, is_privileged
 
 __all__ = [
     "BUILT_IN",

@@ -1,4 +1,6 @@
-"""What a policy is: a Belief in, a Demand out; the shared allocator does the rest."""
+"""What a policy is: a Belief in, a Demand out; the shared allocator does the rest. A privileged one
+is handed the truth as well, through a door of its own.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -11,6 +13,7 @@ from care_sim.core.belief import Belief, Observation
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
+from care_sim.loops.truth import Truth
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
 """What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan,
@@ -65,3 +68,23 @@ class Policy(ABC):
         if cells.min(initial=0) < 0 or cells.max(initial=0) >= self.rig.grid.size:
             raise InvalidInput(f"cells must lie in 0..{self.rig.grid.size - 1}")
         return cells
+
+
+class PrivilegedPolicy(Policy):
+    """A policy that may ask for the truth about the coming keyframe: a bound or a reference, no
+    policy of a car.
+
+    `make_policy` hands `truth` to subclasses of this class and to nobody else. They are never
+    tagged causal, and always privileged or non-causal, whatever they claim.
+    """
+
+    tags: ClassVar[tuple[str, ...]] = ("privileged",)
+
+    def __init_subclass__(cls, **options: object) -> None:
+        super().__init_subclass__(**options)
+        honest = tuple(tag for tag in cls.tags if tag != "causal")
+        cls.tags = honest if {"privileged", "non-causal"} & {*honest} else ("privileged", *honest)
+
+    def __init__(self, rig: Rig, truth: Truth):
+        super().__init__(rig)
+        self.truth = truth

@@ -8,7 +8,7 @@ from textwrap import wrap
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.plugins import package_of
 from care_sim.policies import BUILT_IN, POLICIES, maker, policy_names, tags_of
-from care_sim.policies.parameters import PolicyMaker, settable
+from care_sim.policies.makers import PolicyMaker, settable
 
 TEXT_WIDTH = 80
 

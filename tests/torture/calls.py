@@ -236,7 +236,7 @@ def policy(case):
     """Make a policy and ask it."""
     from care_sim import make_policy, policy_names
     from care_sim.policies import BUILT_IN
-    from care_sim.policies.parameters import settable
+    from care_sim.policies.makers import settable
 
     name = case.rng.choice([*policy_names(), some(case)])
     with suppress(TypeError):

@@ -16,8 +16,7 @@ from care_sim.core.types import Action, Demand
 from care_sim.envs.sensing import sensing, shows_belief
 from care_sim.envs.spaces import checked_scores
 from care_sim.envs.wrappers.grid_observation import GridObservation
-from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.tiling import Tiling, reserve_demand, sector_demand
 
 
 class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], RecordConstructorArgs):

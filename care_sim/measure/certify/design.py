@@ -13,7 +13,7 @@ from random import Random
 from typing import Any
 
 from care_sim.policies import BUILT_IN
-from care_sim.policies.parameters import is_privileged
+from care_sim.policies.makers import is_privileged
 
 CLOSED = ("CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0")
 STREET = "CARE-Street-v0"

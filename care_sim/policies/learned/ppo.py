@@ -10,8 +10,7 @@ from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.learned.grid_features import GridFeatures
 from care_sim.policies.learned.score_map import ScoreMap
-from care_sim.policies.learned.sector_demand import reserve_demand, sector_demand
-from care_sim.policies.learned.tiling import Tiling
+from care_sim.policies.learned.tiling import Tiling, reserve_demand, sector_demand
 from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 

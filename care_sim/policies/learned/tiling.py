@@ -1,5 +1,5 @@
 """Equal tiles of the angular grid: the sectors that an agent scores, and the coarse blocks in which
-it sees.
+it sees. What scores of sectors ask of the allocator.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 
 
 @dataclass(frozen=True)
@@ -60,3 +63,20 @@ class Tiling:
         flat = np.ravel(scores)
         many = min(np.count_nonzero(flat > 0), -(-enough // self.cells.shape[1]))
         return list(self.cells[np.argsort(-flat, kind="stable")[:many]])
+
+
+def reserve_demand(
+    belief: Belief, rig: Rig, sectors: Tiling, scores: NDArray[np.floating]
+) -> Demand:
+    """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
+    first.
+
+    Twice the budget is enough of them: at most one budget of cells lies in the hulls already.
+    """
+    layers = [[cells] for cells in sectors.ranked(scores, 2 * rig.budget)]
+    return Demand(rig.hulls(belief.tracks.boxes), layers)
+
+
+def sector_demand(rig: Rig, sectors: Tiling, scores: NDArray[np.floating]) -> Demand:
+    """The sectors with a positive score alone, best first."""
+    return Demand(layers=[[cells] for cells in sectors.ranked(scores, rig.budget)])

@@ -4,7 +4,7 @@ import numpy as np
 
 from care_sim.core.belief import Belief
 from care_sim.core.types import Demand
-from care_sim.policies.privileged import PrivilegedPolicy
+from care_sim.policies.base import PrivilegedPolicy
 
 
 class HistoryOracle(PrivilegedPolicy):

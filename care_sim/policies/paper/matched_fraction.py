@@ -8,7 +8,7 @@ from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
-from care_sim.policies.privileged import PrivilegedPolicy
+from care_sim.policies.base import PrivilegedPolicy
 
 
 class MatchedFraction(PrivilegedPolicy):

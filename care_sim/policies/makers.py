@@ -1,13 +1,16 @@
-"""What of a policy's arguments a user may set, and what comes from the environment."""
+"""What makes a policy: a `Policy` subclass, or another callable that takes a `Rig` and parameters.
+
+Which of its arguments a user may set, which come from the environment, and what is wrong with an
+entry of the group `care_sim.policies` that makes none.
+"""
 
 import inspect
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeAlias
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
-from care_sim.policies.base import Policy
-from care_sim.policies.privileged import PrivilegedPolicy
+from care_sim.policies.base import TAGS, Policy, PrivilegedPolicy
 
 PolicyMaker: TypeAlias = Callable[..., Policy]
 """A policy class, or another callable that takes a rig and parameters."""
@@ -42,3 +45,21 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
 
 def _given(make: PolicyMaker) -> int:
     return 2 if is_privileged(make) else 1
+
+
+def policy_faults(made: Any) -> Iterator[str]:
+    """In which ways a loaded object makes no policy, as `care_sim.base.plugins.Plugins` asks."""
+    if not callable(made) or (inspect.isclass(made) and not issubclass(made, Policy)):
+        yield "is no Policy"
+    if inspect.isabstract(made):
+        yield f"is abstract: it lacks {', '.join(sorted(made.__abstractmethods__))}"
+    try:
+        inspect.signature(made)
+    except (TypeError, ValueError):
+        yield "tells no parameters"
+    tags = getattr(made, "tags", TAGS)
+    source = getattr(made, "source", "")
+    if not (isinstance(tags, tuple) and tags and all(tag in TAGS for tag in tags)):
+        yield f"has tags {tags!r}; allowed is a tuple of {', '.join(TAGS)}"
+    if not isinstance(source, str):
+        yield f"has the source {source!r}; allowed is one line of text"
