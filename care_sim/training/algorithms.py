@@ -1,5 +1,5 @@
-"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration; imported when one
-is trained.
+"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration. Both libraries are
+imported when a learner is trained, since their extra 'rl' is optional.
 """
 
 import math
@@ -30,7 +30,7 @@ def algorithm(name: str) -> Any:
     return {"ppo": PPO, "sac": SAC}[name]
 
 
-def make(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
+def make_learner(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
     """A learner that has learned nothing yet."""
     policy, options = _settings(config)
     log = str(config.out / "tensorboard") if config.tensorboard else None
@@ -49,9 +49,12 @@ def make(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
 
 def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
     """The policy, and the options that are the learner's own."""
+    # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
     from care_sim.training.networks import Sectored, SectorPolicy
 
     shape = len(CHANNELS), config.rows, config.columns
+    # PPO scores sectors with the network that `ppo` later runs in NumPy. The others keep their own
+    # networks behind features of the sectors, since their critics or memories need a vector.
     own = {
         "features_extractor_class": Sectored,
         "features_extractor_kwargs": {

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores)}
 
 
-def bare(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
-    """The environment without wrappers, for the rules; with the first budget, unless given.
+def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
+    """The environment without wrappers, which the rules play, with `budget` or the first budget of
+    the configuration.
 
-    Raises InvalidInput for an unknown one or a wrong argument.
+    Raises InvalidInput for an unknown environment or a wrong argument.
     """
     known = care_sim.envs.IDS
     check_known("environment", config.env, known)
+    # Only the closed loop has a reward of weighted terms.
     reward: dict[str, Any] = (
         {"reward_weights": {"gain": config.gain}} if config.env in CLOSED_LOOP else {}
     )
@@ -40,17 +42,17 @@ def bare(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any,
 
 def wrapped(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
     """As the learner acts and sees."""
-    acting = ACTIONS[config.action](bare(config, budget), config.azimuths, config.elevations)
+    acting = ACTIONS[config.action](plain(config, budget), config.azimuths, config.elevations)
     return GridObservation(acting, config.columns, config.rows)
 
 
 def training(config: AgentConfig, budget: float) -> gymnasium.Env[Any, Any]:
-    """The same over training seeds."""
+    """The same, over episodes of training seeds."""
     return TrainingSeeds(wrapped(config, budget), config.seed)
 
 
 def side_by_side(config: AgentConfig) -> "VecEnv":
-    """The training environments as one, watched."""
+    """The training environments as one vector, which reports episodes to the learner's log."""
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
 
     budgets = islice(cycle(config.budget), config.environments)
@@ -58,6 +60,7 @@ def side_by_side(config: AgentConfig) -> "VecEnv":
         partial(training, config, budget) for budget in budgets
     ]
     if config.processes:
+        # Spawned, not forked: PyTorch has threads by now, and a fork copies their locks.
         with starting():
             return VecMonitor(
                 SubprocVecEnv([partial(following, maker) for maker in makers], start_method="spawn")

@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
 CONFIG, RULES, CURVE = "config.json", "rules.json", "curve.csv"
-COLUMNS = ("steps", "seconds", "return", "distance_m")
-MOST = 1e30
-"""What a return or a distance may be and still be drawn."""
+CURVE_COLUMNS = ("steps", "seconds", "return", "distance_m")
+_LARGEST_DRAWN = 1e30
+"""The largest return or distance that a figure can draw."""
 Evaluation = tuple[int, float, float, float | None]
-"""Of `COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open
+"""Of `CURVE_COLUMNS`: environment steps, seconds of learning, mean return, metres (none in the open
 loop).
 """
 
@@ -64,10 +64,11 @@ class Folder:
         self._curve = read_curve(self.path / CURVE) if config.resume else []
 
     def begin(self, model: "BaseAlgorithm") -> None:
-        """Write the configuration down, and the learner as it is: from here on the run can be
+        """Write the configuration down, and the learner as it is. From here on the run can be
         resumed.
         """
         self.path.mkdir(parents=True, exist_ok=True)
+        # The checkpoint first: a folder with a configuration alone could not be resumed.
         self.save(model)
         write_text(self.path / CONFIG, self.config.to_json())
 
@@ -94,13 +95,14 @@ class Folder:
         self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
     ) -> None:
         """Write an evaluation and, when it is the best yet, the weights."""
+        # The weights first: when the curve knows an evaluation, its weights are there.
         if score.mean_return > max((row[2] for row in self._curve), default=float("-inf")):
             self._export(model, score, seconds, rig)
         self._curve.append(
             (model.num_timesteps, round(seconds, 1), score.mean_return, score.distance_m)
         )
         with replacing(self.path / CURVE) as unfinished, unfinished.open("w", newline="") as file:
-            csv.writer(file).writerows([COLUMNS, *self._curve])
+            csv.writer(file).writerows([CURVE_COLUMNS, *self._curve])
 
     def save(self, model: "BaseAlgorithm") -> None:
         """Write a checkpoint."""
@@ -110,8 +112,10 @@ class Folder:
     def _export(
         self, model: "BaseAlgorithm", score: ValidationScore, seconds: float, rig: Rig
     ) -> None:
+        # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
         from care_sim.training.networks import SectorPolicy
 
+        # Only this network has a twin in NumPy; the others act from their checkpoint.
         if isinstance(model.policy, SectorPolicy):
             save_weights(
                 self.weights, model.policy.arrays(), self._card(model, score, seconds, rig)
@@ -125,6 +129,7 @@ class Folder:
         return Card(
             kind="ppo",
             grid=rig.grid,
+            # Trained at several budgets, the weights fit any.
             budget=rig.budget if len(config.budget) == 1 else None,
             wrapper=config.wrapping,
             scenario=config.env,
@@ -204,8 +209,8 @@ def read_curve(path: Path) -> list[Evaluation]:
         check_file_size(path)
         with path.open(newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
-        if tuple(head) != COLUMNS:
-            raise ValueError(f"its columns are not {', '.join(COLUMNS)}")
+        if tuple(head) != CURVE_COLUMNS:
+            raise ValueError(f"its columns are not {', '.join(CURVE_COLUMNS)}")
         return [_evaluation(row) for row in rows]
     except (ValueError, csv.Error) as error:
         raise InvalidInput(f"{path} is damaged: {error}") from error
@@ -225,4 +230,4 @@ def _is_text(value: object) -> bool:
 
 
 def _is_finite(value: object) -> bool:
-    return is_number(value) and abs(value) <= MOST  # type: ignore[arg-type]
+    return is_number(value) and abs(value) <= _LARGEST_DRAWN  # type: ignore[arg-type]

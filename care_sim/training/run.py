@@ -12,7 +12,7 @@ from care_sim.base.extras import import_torch
 from care_sim.study.progress import ProgressLines, Show, progress_bar, rounded_duration
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
-from care_sim.training.environments import bare, side_by_side, wrapped
+from care_sim.training.environments import plain, side_by_side, wrapped
 from care_sim.training.folder import Folder
 from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import ValidationScore, acting, evaluate, rule
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
 RULES = {"random": None, "history": None, "care": None, "full": 1.0}
-"""What the learner is held against, with its budget where that is not the learner's."""
+"""The rules that the learner is compared with, and their budget where it is not the learner's."""
 
 
 def train_agent(config: AgentConfig) -> int:
@@ -29,6 +29,7 @@ def train_agent(config: AgentConfig) -> int:
 
     Raises InvalidInput for what does not fit, MissingExtra for a library that is not installed.
     """
+    # What is missing is told before the folder is made.
     algorithms.algorithm(config.algorithm)
     _check_tensorboard(config)
     import_torch().set_num_threads(config.threads)
@@ -36,7 +37,11 @@ def train_agent(config: AgentConfig) -> int:
     env = wrapped(config)
     envs = side_by_side(config)
     try:
-        model = _resumed(config, folder, envs) if config.resume else algorithms.make(config, envs)
+        model = (
+            _resumed(config, folder, envs)
+            if config.resume
+            else algorithms.make_learner(config, envs)
+        )
         folder.begin(model)
         for name, score in folder.rules(partial(_rules, config)).items():
             _say(f"{name}: {score}")
@@ -56,7 +61,9 @@ def _resumed(config: AgentConfig, folder: Folder, envs: Any) -> "BaseAlgorithm":
             f"{folder.path}: {model.num_timesteps} steps are done; ask for more than that with "
             "--steps"
         )
+    # Episodes other than those before the interruption; the same again at every resumption.
     envs.seed(config.seed + model.num_timesteps)
+    # The experience of SAC is not kept, so it gathers some anew before it learns from it.
     if config.algorithm == "sac":
         model.learning_starts += model.num_timesteps  # type: ignore[attr-defined]
     return model
@@ -66,14 +73,18 @@ def _rules(config: AgentConfig) -> dict[str, ValidationScore]:
     """What the rules score on the validation seeds."""
     scores = {}
     for name, budget in RULES.items():
-        env = bare(config, budget)
+        env = plain(config, budget)
         scores[name] = evaluate(env, rule(name, env), validation_seeds(config.episodes))
         env.close()
     return scores
 
 
 def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any) -> None:
-    """Evaluate and learn in turn, until the last step is evaluated."""
+    """Evaluate and learn in turn, until the last step is evaluated.
+
+    Stable-Baselines3's EvalCallback and CheckpointCallback cannot do it: the one evaluates episodes
+    of seeds that it draws itself, the other does not replace its files whole.
+    """
     clock = Stopwatch(folder.seconds)
     begun = model.num_timesteps
     with (
@@ -83,6 +94,7 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
     ):
         shown = _shower(show, config, clock, begun)
         while True:
+            # A resumed run may have been interrupted between learning and evaluation.
             if not folder.evaluated(model):
                 score = evaluate(env, acting(model), validation_seeds(config.episodes))
                 folder.keep(model, score, clock.seconds, env.unwrapped.rig)
@@ -93,7 +105,7 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
                 _stretch(model, min(config.evaluate_every, left), shown, folder)
     if learned := model.num_timesteps - begun:
         _say(
-            f"{learned / clock.here:.0f} environment steps a second inside {config.algorithm}, "
+            f"{learned / clock.here:.0f} environment steps per second inside {config.algorithm}, "
             "learning included"
         )
     _say(f"kept in {folder.path}")
@@ -108,6 +120,7 @@ def _stretch(
         shown(local["self"].num_timesteps)
         return True
 
+    # An interrupt ends `learn` anywhere; what was learned until then is kept.
     try:
         model.learn(steps, ConvertCallback(each), reset_num_timesteps=False)
     finally:
@@ -126,7 +139,7 @@ def _shower(
 
 
 class Stopwatch:
-    """Seconds spent in learning; evaluations do not count."""
+    """Seconds spent in learning, evaluations left out; `before` are those of a resumed run."""
 
     def __init__(self, before: float):
         self._before = before

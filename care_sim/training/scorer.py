@@ -26,14 +26,16 @@ from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Arrays, Card, save_weights
 from care_sim.sources.streets.street import CALIBRATION_SEEDS
 from care_sim.training.card_provenance import machine_line, package_versions
-from care_sim.training.scorer_data import BUDGETS, OTHERS, Examples, balanced, examples
+from care_sim.training.scorer_data import OTHER_CELLS, SCORER_BUDGETS, Examples, balanced, examples
 
-UNITS = 16
+HIDDEN_UNITS = 16
 """As many as score a keyframe within half a millisecond on one core."""
 BATCH = 4096
-RATE = 3e-3
+"""Cells per gradient."""
+LEARNING_RATE = 3e-3
+"""Of Adam, at the first step."""
 HELD_OUT = tuple(range(2000, 2004))
-"""Streets that belong neither to the calibration nor to the evaluation: the card tells the loss on
+"""Streets that belong neither to the calibration nor to the evaluation. The card tells the loss on
 them.
 """
 
@@ -78,15 +80,16 @@ def train_scorer(
     with _one_thread(torch):
         torch.manual_seed(seed)
         network = torch.nn.Sequential(
-            torch.nn.Linear(learned.inputs.shape[1], UNITS),
+            torch.nn.Linear(learned.inputs.shape[1], HIDDEN_UNITS),
             torch.nn.ReLU(),
-            torch.nn.Linear(UNITS, 1, bias=False),
+            torch.nn.Linear(HIDDEN_UNITS, 1, bias=False),
         )
         _descend(torch, network, learned, np.random.default_rng(seed), steps)
         losses = {
             name: _loss_of(torch, network, data)
             for name, data in zip(_STREETS, (learned, held_out), strict=True)
         }
+    # PyTorch holds (units, inputs); the policy multiplies inputs (n, inputs) from the left.
     layer, bias, out = (parameter.detach().numpy() for parameter in network.parameters())
     return {"layer": layer.T, "bias": bias, "out": out[0]}, losses
 
@@ -94,7 +97,7 @@ def train_scorer(
 def _descend(
     torch: Any, network: Any, learned: Examples, rng: np.random.Generator, steps: int
 ) -> None:
-    optimizer = torch.optim.Adam(network.parameters(), lr=RATE)
+    optimizer = torch.optim.Adam(network.parameters(), lr=LEARNING_RATE)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
     for rows in _batches(rng, len(learned), steps):
         optimizer.zero_grad()
@@ -104,8 +107,8 @@ def _descend(
 
 
 def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArray[np.int64]]:
-    """Rows of so many batches; a pass is in random order, and what does not fill a batch is left
-    out of it.
+    """Rows (n,) of `steps` batches. Each pass over the examples is in random order; what does not
+    fill a batch at its end is left out.
     """
     size = min(BATCH, count)
     order = np.empty(0, np.int64)
@@ -122,6 +125,7 @@ def _loss(torch: Any, network: Any, data: Examples, rows: NDArray[np.int64]) -> 
         torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weigh)
     )
     scores = network(inputs)[:, 0]
+    # With logits: the logarithm of a sigmoid that underflows would be minus infinity.
     return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weigh)
 
 
@@ -139,7 +143,7 @@ def _gathered(name: str, seeds: tuple[int, ...]) -> Examples:
 
 
 def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Card:
-    budgets = ", ".join(f"{budget:g}" for budget in BUDGETS)
+    budgets = ", ".join(f"{budget:g}" for budget in SCORER_BUDGETS)
     positive = int(learned.positive.sum())
     return Card(
         "learned-scorer",
@@ -147,7 +151,7 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
         scenario="CARE-Street-v0",
         data=f"{len(learned)} cells, {positive} of them positive, of generated streets "
         f"under history at {budgets} of "
-        f"the cells, with six cameras and with the front one; {OTHERS} others a keyframe",
+        f"the cells, with six cameras and with the front one; {OTHER_CELLS} others a keyframe",
         seeds={name: list(seeds) for name, seeds in _STREETS.items()} | {"training": made.seed},
         steps=made.steps,
         machine=machine_line(),
@@ -158,7 +162,7 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
 
 @contextmanager
 def _one_thread(torch: Any) -> Iterator[None]:
-    """Sums in one order, whatever the machine has."""
+    """One thread of PyTorch: sums then have one order, however many cores the machine has."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

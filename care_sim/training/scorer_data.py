@@ -33,18 +33,18 @@ from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
 from care_sim.policies.paper.history import History
 from care_sim.sources.streets.recording import street_film
 
-BUDGETS = (0.03, 0.10, 0.35)
+SCORER_BUDGETS = (0.03, 0.10, 0.35)
 """The paper's scarcest closed loop, the budget that both loops share, and its most generous open
 loop.
 """
-OTHERS = 200
-"""Cells of a keyframe that are not positive and are kept."""
+OTHER_CELLS = 200
+"""Cells drawn per keyframe; those that are not positive are kept as examples."""
 
 
 @dataclass(frozen=True)
 class Examples:
-    """`inputs` (n, CUES + OUTLOOKS) of cells, whether they are `positive` (n,), and what they
-    `weigh` (n,).
+    """`inputs` (n, SCAN_INPUTS + len(RIG_INPUTS)) of cells, whether they are `positive` (n,), and
+    what they `weigh` (n,).
     """
 
     inputs: Float32s
@@ -60,7 +60,7 @@ def examples(seeds: Iterable[int]) -> Iterator[Examples]:
     for seed in seeds:
         film = street_film(seed)
         for number, (shown, budget) in enumerate(
-            (shown, b) for shown in (film, front_alone(film)) for b in BUDGETS
+            (shown, b) for shown in (film, front_alone(film)) for b in SCORER_BUDGETS
         ):
             rng = np.random.default_rng([seed, number])
             yield _joined([*_play(FilmEnv(shown, budget=budget), seed, rng)])
@@ -69,6 +69,7 @@ def examples(seeds: Iterable[int]) -> Iterator[Examples]:
 def balanced(plays: Iterable[Examples]) -> Examples:
     """All plays as one, positive and other examples of equal weight, 1 on average."""
     together = _joined([*plays])
+    # In float64: millions of weights are summed. Each group then weighs half of the total.
     weigh = together.weigh.astype(np.float64)
     for group in (together.positive, ~together.positive):
         weigh[group] *= len(weigh) / 2 / max(weigh[group].sum(), 1e-12)
@@ -87,10 +88,13 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     cloud = loop.shot.cloud
     annotations = loop.shot.annotations
     in_range = np.hypot(annotations.boxes[:, 0], annotations.boxes[:, 1]) <= RANGE_M
+    # A track knows no object; the truth gives the box of the one behind it, bit for bit as it is
+    # annotated.
     behind_tracks = loop.true_boxes(loop.belief.tracks)
     tracked = (annotations.boxes[:, None] == behind_tracks[None]).all(axis=2).any(axis=1)
     wanted = np.isin(cloud.objects, annotations.objects[in_range & ~tracked])
     cells, first = np.unique(cloud.cells[wanted], return_index=True)
+    # Per object: how many cells return from it. Fewer than MIN_RETURNS would not detect it.
     _, group, sizes = np.unique(
         cloud.objects[wanted][first], return_inverse=True, return_counts=True
     )
@@ -111,7 +115,8 @@ def _keyframe(
     loop: OpenLoop, belief: Belief, cues: CellInputs, rng: np.random.Generator
 ) -> Examples:
     positive, shares = untracked_cells(loop)
-    others = np.setdiff1d(rng.choice(cues.rig.grid.size, OTHERS, replace=False), positive)
+    # Drawn from all cells and not from the others alone: a few of so many are positive.
+    others = np.setdiff1d(rng.choice(cues.rig.grid.size, OTHER_CELLS, replace=False), positive)
     cells = np.concatenate([positive, others])
     seen = cues.of(belief, cues.rig.hulls(belief.tracks.boxes))
     weigh = np.concatenate([shares, np.ones(len(others), np.float32)])

@@ -25,8 +25,10 @@ def test_it_learns_what_there_is_to_learn():
     """One label in ten is wrong: the loss cannot fall below 0.325, the entropy of that."""
     arrays, losses = scorer.train_scorer(drawn(0), drawn(1), 0, 300)
     assert {name: array.shape for name, array in arrays.items()} == {
-        "layer": (INPUTS, scorer.UNITS), "bias": (scorer.UNITS,), "out": (scorer.UNITS,),
-    }  # fmt: skip
+        "layer": (INPUTS, scorer.HIDDEN_UNITS),
+        "bias": (scorer.HIDDEN_UNITS,),
+        "out": (scorer.HIDDEN_UNITS,),
+    }
     assert losses["held out"] == pytest.approx(0.325, abs=0.06)
     cues = np.zeros((2, INPUTS), np.float32)
     cues[1, 0] = 1

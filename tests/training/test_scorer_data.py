@@ -9,8 +9,8 @@ from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
 from care_sim.training.scorer import HELD_OUT
 from care_sim.training.scorer_data import (
-    BUDGETS,
-    OTHERS,
+    OTHER_CELLS,
+    SCORER_BUDGETS,
     Examples,
     balanced,
     examples,
@@ -87,10 +87,10 @@ def test_positive_and_other_examples_weigh_the_same_and_1_on_average():
 @pytest.mark.slow
 def test_a_street_gives_the_same_examples_again():
     once, again = ([*examples([2000])] for _ in range(2))
-    assert len(once) == 2 * len(BUDGETS)
+    assert len(once) == 2 * len(SCORER_BUDGETS)
     for one, other in zip(once, again, strict=True):
         assert one.inputs.shape == (len(one), SCAN_INPUTS + len(RIG_INPUTS))
         assert np.array_equal(one.inputs, other.inputs)
         assert np.array_equal(one.weigh, other.weigh)
-        assert 39 * OTHERS < (~one.positive).sum() <= 40 * OTHERS
+        assert 39 * OTHER_CELLS < (~one.positive).sum() <= 40 * OTHER_CELLS
         assert one.positive.any()

@@ -14,7 +14,7 @@ from care_sim.policies.learned.weights import load_weights
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
-from care_sim.training.environments import bare, training
+from care_sim.training.environments import plain, training
 from care_sim.training.seeds import TRAINING, VALIDATION, validation_seeds
 from care_sim.training.validation import evaluate, rule
 
@@ -61,7 +61,7 @@ def test_learners_of_neighbouring_seeds_share_no_episode():
 
 
 def test_an_evaluation_is_the_mean_of_its_episodes():
-    env = bare(PpoConfig())
+    env = plain(PpoConfig())
     care_rule, seeds = rule("care", env), [VALIDATION, VALIDATION + 1]
     each = [evaluate(env, care_rule, [seed]) for seed in seeds]
     both = evaluate(env, care_rule, seeds)
@@ -81,7 +81,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     assert [line.partition(":")[0] for line in said.splitlines()[:-2]] == [
         "random", "history", "care", "full", "0 steps", "64 steps", "128 steps",
     ]  # fmt: skip
-    assert "environment steps a second inside ppo" in said.splitlines()[-2]
+    assert "environment steps per second inside ppo" in said.splitlines()[-2]
     settings = json.loads((out / "config.json").read_text())
     assert (settings["algorithm"], settings["budget"], settings["hidden"]) == ("ppo", [0.03], 4)
 
@@ -104,7 +104,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
     best = max(float(row["return"]) for row in rows)
     assert weights.card.result["validation"]["mean_return"] == pytest.approx(best)
     assert (weights.card.budget, weights.card.wrapper) == (492, Wrapping())
-    env = bare(PpoConfig())
+    env = plain(PpoConfig())
     care_sim.make_policy("ppo", env, path=out / "weights.npz")
     env.close()
 

@@ -103,13 +103,13 @@ def test_it_fires_what_its_learner_would_behind_the_wrappers(tmp_path, env, acti
 
 def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
     pytest.importorskip("stable_baselines3")
-    from care_sim.training.algorithms import make
+    from care_sim.training.algorithms import make_learner
     from care_sim.training.config import PpoConfig
     from care_sim.training.environments import side_by_side
 
     config = PpoConfig(environments=2, rollout=32, batch=32, hidden=8)
     envs = side_by_side(config)
-    model = make(config, envs).learn(128)
+    model = make_learner(config, envs).learn(128)
     save_weights(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
     numpy = ScoreMap(load_weights(tmp_path / "w.npz"), config.wrapping)
     observations = envs.reset()
