@@ -72,7 +72,7 @@ def policy_names() -> list[str]:
 
 
 def contenders() -> list[str]:
-    """Those that are compared where all are asked for: no controls."""
+    """The policies that `all` stands for: every one that is no control."""
     return [name for name in policy_names() if "control" not in tags_of(name)]
 
 
@@ -91,7 +91,7 @@ def tags_of(name: str) -> tuple[str, ...]:
 
 
 def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy:
-    """A policy for an environment of CARE-Sim; a privileged one is handed its truth, the others its
+    """A policy for an environment of CARE-Sim. A privileged one is handed the truth, the others the
     rig alone.
 
     Raises InvalidInput for an unknown name or parameter, a value that the policy does not allow, an
@@ -103,13 +103,15 @@ def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Polic
         make = maker(name)
     except InvalidInput as error:
         raise BrokenPolicy(f"policy {name} cannot be loaded: {error}") from error
+    # What the environment gives comes first: rig, truth, and what the policy says it is told.
     given = [_of_environment(name, env, "rig")]
-    _check_bare(name, env)
+    _check_unwrapped(name, env)
     check_parameters(name, make, parameters)
     if is_privileged(make):
         given.append(_of_environment(name, env, "truth"))
     for parameter, attribute in getattr(make, "told", Policy.told).items():
         parameters.setdefault(parameter, getattr(env.unwrapped, attribute, None))
+    # Whatever else somebody's code raises is a fault of the policy and named as such.
     try:
         policy = make(*given, **parameters)
     except (InvalidInput, MissingExtra):
@@ -129,7 +131,8 @@ def maker(name: str) -> PolicyMaker:
     return POLICIES.maker(name)
 
 
-def _check_bare(name: str, env: gymnasium.Env) -> None:
+def _check_unwrapped(name: str, env: gymnasium.Env) -> None:
+    # Wrappers that leave both spaces as they are may stay: they watch, or count steps.
     inner = env.unwrapped
     if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
         raise InvalidInput(

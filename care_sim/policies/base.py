@@ -16,9 +16,9 @@ from care_sim.core.types import Action, Demand
 from care_sim.loops.truth import Truth
 
 TAGS = ("causal", "privileged", "non-causal", "learned", "generator", "control")
-"""What a policy can be: causal as a car's is, privileged with truth, choosing from a full scan,
-learned, playing by the generator of the scenes, or no contender but a control, which `all` leaves
-out.
+"""What a policy can be. "causal": it knows what a car knows. "privileged": it is handed truth.
+"non-causal": it chooses from a full scan. "learned": it has trained weights. "generator": it plays
+by the generator of the scenes. "control": it is no contender, and `all` leaves it out.
 """
 
 
@@ -45,13 +45,13 @@ class Policy(ABC):
 
     @abstractmethod
     def demand(self, belief: Belief) -> Demand:
-        """What to ask of the allocator at this keyframe."""
+        """What to ask of the allocator at this keyframe: the sets and layers of Algorithm 1."""
 
     def __call__(self, observation: Observation) -> Action:
         """The action (E, A) of the environments for an observation.
 
-        Raises InvalidInput for what is no observation of its rig, and when `demand` returns no
-        Demand, or a cell that the grid does not have.
+        Raises InvalidInput for what is no observation of its rig. Raises it too if `demand` returns
+        no Demand, or a cell that the grid does not have.
         """
         belief = self.rig.read(observation)
         try:
@@ -71,8 +71,8 @@ class Policy(ABC):
 
 
 class PrivilegedPolicy(Policy):
-    """A policy that may ask for the truth about the coming keyframe: a bound or a reference, no
-    policy of a car.
+    """A policy that may ask for the truth about the coming keyframe. It is a bound or a reference:
+    no car can have it.
 
     `make_policy` hands `truth` to subclasses of this class and to nobody else. They are never
     tagged causal, and always privileged or non-causal, whatever they claim.
@@ -82,6 +82,7 @@ class PrivilegedPolicy(Policy):
 
     def __init_subclass__(cls, **options: object) -> None:
         super().__init_subclass__(**options)
+        # A subclass of somebody else may claim to be causal; with truth in hand it is not.
         honest = tuple(tag for tag in cls.tags if tag != "causal")
         cls.tags = honest if {"privileged", "non-causal"} & {*honest} else ("privileged", *honest)
 

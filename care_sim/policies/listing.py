@@ -33,6 +33,7 @@ def parameters_of(make: PolicyMaker) -> list[str]:
 
 
 def _paragraph(name: str) -> str:
+    # One policy that cannot be loaded must not hide the others.
     try:
         make = maker(name)
     except InvalidInput as error:
@@ -46,8 +47,8 @@ def _paragraph(name: str) -> str:
 
 
 def _summary(name: str, make: PolicyMaker) -> str:
-    """The line that the module of a built-in policy begins with; of another its own, and its
-    package.
+    """For a built-in policy the line that its module begins with. For another one the first line of
+    its own docstring, and its package.
     """
     if name in BUILT_IN:
         return (inspect.getdoc(inspect.getmodule(make)) or "").partition("\n")[0]

@@ -22,7 +22,7 @@ def is_privileged(make: PolicyMaker) -> bool:
 
 
 def settable(make: PolicyMaker) -> list[inspect.Parameter]:
-    """The parameters that follow the rig (and the truth)."""
+    """The parameters that follow the rig and, for a privileged policy, the truth."""
     return list(inspect.signature(make).parameters.values())[_given(make) :]
 
 
@@ -30,6 +30,7 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
     """Raise InvalidInput for a parameter that the policy does not have or that is not the user's to
     set.
     """
+    # Those in front come from the environment and from nowhere else.
     for given in list(inspect.signature(make).parameters)[: _given(make)]:
         if given in parameters:
             raise InvalidInput(
@@ -44,11 +45,12 @@ def check_parameters(name: str, make: PolicyMaker, parameters: Mapping[str, obje
 
 
 def _given(make: PolicyMaker) -> int:
+    """How many arguments come from the environment: rig, and truth for a privileged one."""
     return 2 if is_privileged(make) else 1
 
 
 def policy_faults(made: Any) -> Iterator[str]:
-    """In which ways a loaded object makes no policy, as `care_sim.base.plugins.Plugins` asks."""
+    """Why a loaded object makes no policy, one text per reason. `care_sim.base.plugins` asks it."""
     if not callable(made) or (inspect.isclass(made) and not issubclass(made, Policy)):
         yield "is no Policy"
     if inspect.isabstract(made):

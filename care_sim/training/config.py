@@ -16,22 +16,20 @@ from care_sim.study.parameters import parameters
 from care_sim.training.seeds import TRAINING, VALIDATION
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
-"""Fields in which a run that is resumed may differ."""
+"""Fields in which a resumed run may differ from the run before."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AgentConfig:
-    """Fields that all learners share; see `care_sim.training.seeds` for which seeds are trained and
-    tested on.
-    """
+    """Fields that all learners share. `care_sim.training.seeds` tells which seeds are for what."""
 
     algorithm: ClassVar[str]
 
     env: str = "CARE-Dense-v0"
     """Environment id."""
     budget: tuple[float, ...] = (0.03,)
-    """Share of the cells that may fire at a keyframe. Of several the environments take one each, in
-    turn, and the weights then fit any budget; the first is evaluated."""
+    """Share of the cells that may fire per keyframe. With several values, the environments take one
+    each in turn, and the weights fit any budget; the first one is evaluated."""
     env_parameters: tuple[str, ...] = ()
     """Further arguments of the environment as NAME=VALUE, for example vehicles=5
     false_negative_rate=0.2.
@@ -47,11 +45,11 @@ class AgentConfig:
     rows: int = bounded(8, 1, MOST_ROWS)
     """Blocks of the observation from top to bottom."""
     gain: float = bounded(10.0, 0, HEAVIEST)
-    """Weight of the reward's term `gain`, in the closed loop; the others keep theirs."""
+    """Weight of the reward term `gain` in the closed loop; the other terms keep their weights."""
     steps: int = bounded(200_000, 1, LARGEST_INTEGER)
     """Environment steps in all."""
     seed: int = bounded(0, 0, LARGEST_INTEGER)
-    """Seed of the weights, the exploration and the episodes that are trained on."""
+    """Seed of the first weights, the exploration and the training episodes."""
     environments: int = bounded(8, 1, 1024)
     """Environments side by side."""
     processes: bool = False
@@ -61,15 +59,15 @@ class AgentConfig:
     learning_rate: float = bounded(1e-3, 1e-8, 1)
     """Step size of Adam."""
     discount: float = bounded(0.9, 0, 1)
-    """What a reward is worth that comes one keyframe later."""
+    """What a reward counts if it comes one keyframe later."""
     evaluate_every: int = bounded(20_000, 1, LARGEST_INTEGER)
-    """Environment steps between evaluations; each also writes a checkpoint."""
+    """Environment steps between evaluations. Each evaluation also writes a checkpoint."""
     episodes: int = bounded(20, 1, TRAINING - VALIDATION)
     """Held-out episodes per evaluation."""
     out: Path = Path("runs/train")
     """Folder of configuration, weights, checkpoint and learning curve."""
     resume: bool = False
-    """Go on from the checkpoint in `out`."""
+    """Continue from the checkpoint in `out`."""
     tensorboard: bool = False
     """Write a log for TensorBoard beside the weights; needs the package tensorboard."""
 
@@ -80,7 +78,8 @@ class AgentConfig:
                 f"budget needs one value to {self.environments}, the environments; got "
                 f"{self.budget}"
             )
-        self.wrapping, self.arguments  # noqa: B018 (refuse what does not fit)
+        # Both are properties that refuse what does not fit: now, not when training begins.
+        self.wrapping, self.arguments  # noqa: B018
 
     @property
     def wrapping(self) -> Wrapping:
@@ -123,16 +122,16 @@ class AgentConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class OnPolicy(AgentConfig):
-    """What learners share that learn from the episodes that they just played."""
+    """Fields of learners that learn from the episodes they have just played."""
 
     rollout: int = bounded(128, 1, 100_000)
-    """Steps of every environment between two updates."""
+    """Steps per environment between two updates."""
     batch: int = bounded(256, 2, 1_000_000)
     """Steps per gradient."""
     epochs: int = bounded(4, 1, 1000)
-    """How often every step is learned from."""
+    """How often each step is used for learning."""
     noise: float = bounded(0.3, 1e-3, 10)
-    """Standard deviation of the scores at the start."""
+    """Standard deviation of the exploration at the start."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +141,7 @@ class PpoConfig(OnPolicy):
     algorithm = "ppo"
 
     hidden: int = bounded(16, 1, 4096)
-    """Width of the network that slides over the sectors."""
+    """Units per hidden layer of the network that slides over the sectors."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +158,7 @@ class SacConfig(AgentConfig):
     algorithm = "sac"
 
     memory: int = bounded(20_000, 1, 1_000_000)
-    """Steps that are remembered and learned from; 25 kB each."""
+    """Steps that are kept to learn from; 25 kB each."""
     batch: int = bounded(256, 2, 1_000_000)
     """Steps per gradient."""
 

@@ -1,4 +1,4 @@
-"""Learning curves of training runs, read from their folders and grouped: runs of a group differ by
+"""Learning curves of training runs, read from their folders and grouped. Runs of a group differ by
 their seed alone.
 """
 
@@ -43,7 +43,7 @@ class TrainingRun:
 
     @property
     def marks(self) -> dict[str, float]:
-        """What the rules reach, measured as `values`."""
+        """What the rules reach by name, measured as `values`."""
         scores = self.rules.items()
         return {
             name: s["mean_return"] if s["distance_m"] is None else s["distance_m"]
@@ -52,7 +52,7 @@ class TrainingRun:
 
     @property
     def steps(self) -> list[int]:
-        """Of the evaluations."""
+        """Environment steps at each evaluation."""
         return [steps for steps, *_ in self.curve]
 
     @property

@@ -41,9 +41,8 @@ def _draw(axes: Axes, runs: Sequence[TrainingRun]) -> None:
             alpha=0.5 if len(runs) > 1 else 1.0,
         )
     _mean(axes, runs, colours[learner])
-    axes.set_xlim(
-        0, max(1, *(run.steps[-1] for run in runs))
-    )  # a run is evaluated before its first step, too
+    # A run is evaluated before its first step too, so the last step may be 0.
+    axes.set_xlim(0, max(1, *(run.steps[-1] for run in runs)))
     if runs[0].closed_loop:
         axes.set_ylim(bottom=0)
     _name_lines(axes, marks | {learner: float(np.mean([run.values[-1] for run in runs]))}, colours)
@@ -68,6 +67,7 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
 
 
 def _mean(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
+    # Runs may be of different lengths, as far as they were evaluated at the same steps.
     shared = min((run.steps for run in runs), key=len)
     if len(runs) > 1 and all(run.steps[: len(shared)] == shared for run in runs):
         values = np.mean([run.values[: len(shared)] for run in runs], axis=0)
@@ -77,7 +77,10 @@ def _mean(axes: Axes, runs: Sequence[TrainingRun], colour: str) -> None:
 def _name_lines(axes: Axes, heights: dict[str, float], colours: dict[str, str]) -> None:
     """Names right of the axes, moved apart where lines lie close."""
     low, high = axes.get_ylim()
-    least, last = (high - low) * 0.055, -np.inf
+    # A line of text is about 5.5% of the axis high. From the lowest up, each name stands at least
+    # that far above the one before.
+    least = (high - low) * 0.055
+    last = -np.inf
     for name, height in sorted(heights.items(), key=lambda pair: pair[1]):
         last = max(height, last + least)
         axes.annotate(

@@ -18,8 +18,8 @@ from care_sim.policies.learned.weights import Arrays
 
 
 class Window(nn.Module):
-    """(n, hidden, sectors) from what every sector sees: its blocks, one more on each side, and the
-    car's motion.
+    """(n, hidden, sectors) from what each sector sees: its blocks, one more on each side, and the
+    car's motion. `care_sim.policies.learned.score_map` computes the same in NumPy.
 
     `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths).
     """
@@ -36,6 +36,7 @@ class Window(nn.Module):
 
     def forward(self, ego: Tensor, grid: Tensor) -> Tensor:
         """From ego (n, 4) and grid (n, channels * rows * columns)."""
+        # Round the car the columns go on over the seam; above and below the grid there is nothing.
         wrapped = pad(
             grid.view(-1, *self.shape), (BLOCK_MARGIN, BLOCK_MARGIN, 0, 0), mode="circular"
         )
@@ -60,7 +61,7 @@ class Windows(nn.Module):
         self.latent_dim_vf = 2 * hidden
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """Both."""
+        """The features of the actor and those of the critic."""
         return self.forward_actor(features), self.forward_critic(features)
 
     def forward_actor(self, features: Tensor) -> Tensor:
@@ -81,6 +82,7 @@ class ScoreHead(nn.Module):
 
     def __init__(self, hidden: int, sectors: int):
         super().__init__()
+        # Small first scores: the exploration then decides, and tanh is far from saturation.
         self.weight = nn.Parameter(0.1 * torch.randn(hidden))
         self.place = nn.Parameter(torch.zeros(sectors))
 
@@ -99,7 +101,7 @@ class Joined(BaseFeaturesExtractor):
         )
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
-        """Join them."""
+        """The car's motion first, as `_parts` expects."""
         return torch.cat([observation["ego"], observation["grid"]], 1)
 
 
@@ -115,7 +117,7 @@ class Sectored(BaseFeaturesExtractor):
         self.window = Window(shape, sectors, 4)
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
-        """Look, and keep what is seen sector by sector."""
+        """The car's motion, then four features per sector."""
         ego, grid = observation["ego"], observation["grid"]
         return torch.cat([ego, self.window(ego, grid).flatten(1)], 1)
 
@@ -133,6 +135,8 @@ class SectorPolicy(ActorCriticPolicy):
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
+        # The head that Stable-Baselines3 made mixes sectors. The optimizer that it made holds that
+        # head's parameters, so it is made anew too.
         self.action_net: Any = ScoreHead(self._hidden, int(np.prod(self._sectors)))
         self.optimizer = self.optimizer_class(
             self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs
@@ -145,6 +149,7 @@ class SectorPolicy(ActorCriticPolicy):
 
     def arrays(self) -> Arrays:
         """The actor's weights by the names of `care_sim.policies.learned.score_map`."""
+        # The 1 x 1 convolution is a matrix, and its kernel axes are dropped.
         named = {**self.mlp_extractor.actor.state_dict(), **self.action_net.state_dict()}
         arrays: Arrays = {name: tensor.cpu().numpy().copy() for name, tensor in named.items()}
         return arrays | {

@@ -18,15 +18,18 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 
-VALIDATION, TRAINING = 2_000, 10_000
+VALIDATION = 2_000
+TRAINING = 10_000
 LAST = 2**31 - 1
+"""Training seeds lie below it."""
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Every reset begins an episode of a training seed; the learner's seed and one given to `reset`
-    decide the sequence of them. Stable-Baselines3 counts the latter up from environment to
-    environment: without the former, learners of neighbouring seeds would share most of their
-    episodes.
+    """Every reset begins an episode of a training seed. The learner's seed and the one given to
+    `reset` decide the sequence of them.
+
+    Stable-Baselines3 counts the seed of `reset` up from environment to environment. Without the
+    learner's, learners of neighbouring seeds would share most of their episodes.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], learner: int = 0):

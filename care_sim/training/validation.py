@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 import care_sim
 
 Choose = Callable[[Any, bool], NDArray[np.float32]]
-"""The action for an observation; and whether the episode begins with it."""
+"""The action for an observation. The flag tells that the episode begins with it."""
 
 
 class Learner(Protocol):
-    """What acts: of Stable-Baselines3 any algorithm."""
+    """What acts: any algorithm of Stable-Baselines3."""
 
     def predict(
         self, observation: Any, state: Any, episode_start: Any, deterministic: bool
@@ -46,6 +46,8 @@ class ValidationScore:
 def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> ValidationScore:
     """Play one episode per seed."""
     played = [_episode(env, choose, seed) for seed in seeds]
+    # Nobody detected at all counts as 0 m, so that missing someone is worst. The open loop has no
+    # such distance.
     distances = [
         outcome["detection_distance_m"] or 0.0
         for _, outcome in played
@@ -86,9 +88,13 @@ def _episode(
     env: gymnasium.Env[Any, Any], choose: Choose, seed: int
 ) -> tuple[float, dict[str, Any]]:
     observation, _ = env.reset(seed=seed)
-    total, begins, over = 0.0, True, False
+    total = 0.0
+    begins = True
+    over = False
     while not over:
         observation, reward, terminated, truncated, info = env.step(choose(observation, begins))
-        total, begins, over = total + float(reward), False, terminated or truncated
+        total = total + float(reward)
+        begins = False
+        over = terminated or truncated
     outcome: dict[str, Any] = info["outcome"]
     return total, outcome

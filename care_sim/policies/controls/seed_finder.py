@@ -19,22 +19,22 @@ from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import World
 
 FALLBACK_SCENARIO = "dense"
-"""The scenario that it knows where it is told none."""
+"""The scenario that it knows if it is told none."""
 
 
 class SeedFinder(Policy):
-    """What an agent can do that holds this package: of the first `seeds` seeds of a public
-    `scenario` it takes the one whose ego begins at the speed that it reads, lets that episode's
+    """What an agent can do that holds this package. Of the first `seeds` seeds of a public
+    `scenario` it takes the one whose ego begins at the speed that it reads. It lets that episode's
     world go on by itself, and reserves the hull of where the hidden actor is by then. It needs no
-    camera and no return. It plays as history does where no seed that it knows begins at that speed:
-    with a seed beyond `seeds`, a `secret` of the environment, noise of the speed.
+    camera and no return. It plays as history does if no seed that it knows begins at that speed:
+    with a seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
 
-    `make_policy` tells it the `scenario` of the environment; made of a rig alone it takes `dense`.
+    `make_policy` tells it the `scenario` of the environment. Made of a rig alone it takes `dense`.
     It knows scenarios with their default arguments. With others, or in another scenario, the first
-    speed can be the same: it then finds the seed, and fires where the actor would be in the
+    speed can be the same. It then finds the seed, and fires where the actor would be in the
     scenario that it knows.
 
-    A control, no contender: what it reaches without a camera is what the seeds give away.
+    It is a control, no contender: what it reaches without a camera is what the seeds give away.
     """
 
     name = "seed-finder"
@@ -72,21 +72,21 @@ class SeedFinder(Policy):
             if self.found is not None:
                 self._hidden = _hidden_boxes(self._scenario, self.found, self.rig.keyframe_s)
         else:
+            # The car drives straight on: between keyframes at the mean of both speeds.
             self._keyframe += 1
             self._x += (self._speed + speed) / 2 * self.rig.keyframe_s
         self._speed = speed
 
     def _expected(self) -> Floats:
-        """(n, 7) the box of the hidden actor in the sensor frame, if it is known; the road is
-        straight.
-        """
+        """(n, 7) the box of the hidden actor in the sensor frame, none if it is not known."""
+        # All scenarios have a straight road, with the ego's lane along x.
         sensor = Frame.mounted((self._x, 0.0, 0.0), LIDAR_POSITION)
         return sensor.boxes_to_local(self._hidden[self._keyframe : self._keyframe + 1])
 
 
 @lru_cache(maxsize=4)
 def _first_speeds(scenario: str, seeds: int) -> dict[float, int]:
-    """The seed of every first speed, as an observation shows it."""
+    """The seed of every first speed, as an observation shows it: in float32."""
     speeds = {}
     for seed in range(seeds):
         with closing(_world(scenario, seed)) as world:
@@ -96,8 +96,8 @@ def _first_speeds(scenario: str, seeds: int) -> dict[float, int]:
 
 @lru_cache(maxsize=4)
 def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
-    """(k, 7) where the hidden actor is at every keyframe, in the world frame: it does not
-    react to the ego.
+    """(k, 7) where the hidden actor is at every keyframe, in the world frame. It does not react to
+    the ego, so that an ego that never brakes shows it.
     """
     boxes: list[Floats] = []
     with closing(_world(scenario, seed)) as world:

@@ -1,4 +1,6 @@
-"""Coarse pictures of the angular grid, compiled: only marked or fired cells are touched."""
+"""Coarse pictures of the angular grid, compiled. Only marked or fired cells are touched, since most
+cells of a keyframe are neither.
+"""
 
 from typing import NamedTuple
 
@@ -9,7 +11,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.grid import Cells
 
 BlockPictures = NDArray[np.float32]
-"""(3, B) a number per block, for three pictures."""
+"""(3, B) one number per block, for three pictures."""
 
 
 class LastScan(NamedTuple):
@@ -18,7 +20,7 @@ class LastScan(NamedTuple):
     ranges: NDArray[np.float32]
     """(N,) metres."""
     rises: NDArray[np.float64]
-    """(N,) how far each ray rises per metre."""
+    """(N,) how far each ray rises per metre of range."""
     reach_m: float
     sensor_height_m: float
     lowest_m: float
@@ -34,6 +36,7 @@ def add_object_shares(
     The groups end at `ends` (3,). `blocks` (N,) is the block of every cell. `marks` (N,) is memory
     to work in; afterwards its bit g says whether a cell lies in group g.
     """
+    # What one cell adds to the share of its block: blocks per cell.
     part = np.float32(out.shape[1] / len(blocks))
     marks[:] = 0
     start = 0
@@ -51,8 +54,8 @@ def add_returns(
     fired: Cells, scan: LastScan, blocks: Cells, marks: NDArray[np.uint8], out: BlockPictures
 ) -> None:
     """Fill `out` from the cells that fired: the nearness of each block's nearest return, the share
-    of its cells that fired, and of those with a return that stands above the road outside every
-    hull. The hulls are the first group of `marks`.
+    of its cells that fired, and the share of those with a return that stands above the road outside
+    every hull. The hulls are the first group of `marks`.
     """
     part = np.float32(out.shape[1] / len(blocks))
     for cell in fired:

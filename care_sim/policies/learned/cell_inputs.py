@@ -77,16 +77,18 @@ class CellInputs:
 
     def __init__(self, rig: Rig):
         self.rig = rig
-        self._bare = replace(rig, azimuth_margin=0, elevation_margin=0)
+        # The same task without margins: its wedges are those of the boxes themselves.
+        self._undilated = replace(rig, azimuth_margin=0, elevation_margin=0)
         self._heights = rig.grid.directions[:, 2].astype(np.float32)
 
     def of(self, belief: Belief, hulls: Sequence[Cells]) -> CellFeatures:
-        """At a keyframe, given the hulls of its forecasts."""
+        """What is seen of all cells at a keyframe, given the hulls of its forecasts."""
         rig = self.rig
         cells = self.rig.grid.size
         seen = CellFeatures(
             np.zeros(cells, np.uint8), np.zeros(cells, np.float32), np.zeros(cells, np.float32)
         )
+        # Sets first: a return in a hull does not count as standing.
         mark_sets(seen.codes, seen.sizes, *self._sets(belief, hulls))
         rules = ScanRules(
             np.float32(rig.grid.range_m),
@@ -99,9 +101,10 @@ class CellInputs:
 
     @cached_property
     def outlooks(self) -> Float32s:
-        """(N, `RIG_INPUTS`)."""
+        """(N, `RIG_INPUTS`) what is known of every cell without a keyframe."""
         x, y, z = self.rig.grid.directions.T
         flat = np.hypot(x, y)
+        # Where a ray meets a level road; one that does not fall never does.
         road = np.divide(self.rig.sensor_height_m, -z, out=np.full(len(z), np.inf), where=z < 0)
         ground = 1 - np.minimum(road / self.rig.grid.range_m, 1)
         return np.stack(
@@ -111,10 +114,12 @@ class CellInputs:
     def _sets(
         self, belief: Belief, hulls: Sequence[Cells]
     ) -> tuple[Cells, Cells, NDArray[np.uint8]]:
-        """Cells of hulls, wedges and undilated wedges, where each set ends, and its marks."""
+        """Cells of hulls, wedges and undilated wedges, one set after the other, where each set
+        ends, and its marks. The order of the three is that of the marks below.
+        """
         detections = belief.detections
         known = explained(detections, belief.tracks, self.rig)
-        sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._bare)]
+        sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._undilated)]
         new = MARK_UNEXPLAINED + MARK_SMALL * _SMALL_CLASSES[detections.classes]
         marks = np.concatenate(
             [
@@ -123,11 +128,14 @@ class CellInputs:
                 np.where(known, 0, MARK_BOX),
             ]
         )
+        # The empty array gives a keyframe without any set its type.
         cells = np.concatenate([np.empty(0, np.int64), *sets])
         return cells, np.cumsum([*map(len, sets)], dtype=np.int64), marks.astype(np.uint8)
 
     def _covered(self) -> NDArray[np.bool_]:
-        """(N,) whether a far point in the direction of a cell lies in a picture."""
+        """(N,) whether a point at the end of a cell's ray lies in a picture. So far out the offset
+        of a camera from the LiDAR no longer matters.
+        """
         covered = np.zeros(self.rig.grid.size, bool)
         for camera in self.rig.cameras:
             pixels, _ = camera.project(self.rig.grid.directions * self.rig.grid.range_m)

@@ -1,4 +1,4 @@
-"""What an agent sees: a belief as a few coarse pictures of the angular grid, all values from 0 to
+"""What an agent sees: a belief as a few coarse pictures of the angular grid, with values from 0 to
 1.
 """
 
@@ -34,8 +34,9 @@ class GridFeatures:
     """Beliefs of a rig as `CHANNELS` over `columns` x `rows` blocks of the grid, and the vector
     `EGO_INPUTS`.
 
-    Blocks pool their cells: `nearness` takes the largest, the others the share. Raises InvalidInput
-    unless the blocks divide the grid. Not for several threads at once: it reuses its memory.
+    A block of `nearness` takes the largest value of its cells, one of the other channels a share of
+    them. Raises InvalidInput unless the blocks divide the grid. Not for several threads at once,
+    since it reuses its memory.
     """
 
     rig: Rig
@@ -49,7 +50,7 @@ class GridFeatures:
 
     @cached_property
     def blocks(self) -> Tiling:
-        """The blocks."""
+        """The blocks as tiles of the grid."""
         return Tiling(self.rig.grid, self.columns, self.rows)
 
     @property
@@ -62,9 +63,12 @@ class GridFeatures:
         out = np.zeros((len(CHANNELS), self.rows * self.columns), np.float32)
         self._draw_objects(belief, out[:3])
         self._draw_returns(belief.ranges.ravel(), out[3:])
+        # Shares are sums of float32 parts, and a full block may end a little above 1.
         return {"grid": np.minimum(out, 1, out=out).ravel(), "ego": self._ego(belief)}
 
     def _draw_objects(self, belief: Belief, out: NDArray[np.float32]) -> None:
+        # In the order of the first three channels; the marks of the first, the hulls, are read
+        # again when the returns are drawn.
         groups = [self.rig.hulls(belief.tracks.boxes), *camera_layers(belief, self.rig)]
         cells = np.concatenate([np.empty(0, np.int64), *chain(*groups)])
         ends = np.cumsum([sum(map(len, group)) for group in groups])
@@ -76,6 +80,7 @@ class GridFeatures:
         add_returns(np.flatnonzero(ranges > 0), scan, self._blocks, self._marks, out)
 
     def _ego(self, belief: Belief) -> NDArray[np.float32]:
+        """(4,) the `EGO_INPUTS`, scaled and clipped to -1 to 1."""
         ego = belief.ego
         values = [ego.speed, ego.yaw_rate, ego.acceleration, belief.budget / self.rig.grid.size]
         return np.asarray(np.clip(np.array(values, np.float32) / EGO_SCALES, -1, 1))
@@ -93,4 +98,5 @@ class GridFeatures:
 
     @cached_property
     def _marks(self) -> NDArray[np.uint8]:
+        """(N,) memory of the kernels: which of the first three channels a cell lies in."""
         return np.empty(self.rig.grid.size, np.uint8)

@@ -22,13 +22,13 @@ from care_sim.policies.learned.weights import Weights, load_weights, shipped_wei
 
 
 class LearnedScorer(Policy):
-    """The learned scorer of the paper (Sec. 5.1): a small network scores every cell by what a
+    """The learned scorer of the paper (Sec. 5.1). A small network scores every cell by what a
     policy can see of it (`care_sim.policies.learned.cell_inputs`), and the reserve asks for the rho
-    B highest; of these, what exploitation has already goes to the floor, as with `history-uniform`.
+    B highest. What exploitation has of them already goes to the floor, as with `history-uniform`.
 
-    `path` is a file of weights that `care-sim train learned-scorer` wrote; the shipped ones, unless
-    given. They serve any budget and any cameras. Raises InvalidInput for a file of something else
-    or made for another grid.
+    `path` is a file of weights that `care-sim train learned-scorer` wrote; without it the shipped
+    ones act. They serve any budget and any cameras. Raises InvalidInput for a file of something
+    else or one made for another grid.
     """
 
     name = "learned-scorer"
@@ -41,6 +41,7 @@ class LearnedScorer(Policy):
         weights.check(self.name, rig)
         self._cues = CellInputs(rig)
         self._network = CellNetwork(weights, self._cues.outlooks)
+        # What exploitation leaves, as Algorithm 1 rounds it.
         self._reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
 
     def demand(self, belief: Belief) -> Demand:
@@ -55,6 +56,8 @@ class CellNetwork:
     """The network of some weights over cells whose outlooks (N, `RIG_INPUTS`) are fixed."""
 
     def __init__(self, weights: Weights, outlooks: NDArray[np.float32]):
+        # The first layer is linear, so its sum falls into parts. What the rig decides and what each
+        # code of marks adds is computed here once; a keyframe looks it up and adds two products.
         layer = weights.array("layer", SCAN_INPUTS + len(RIG_INPUTS), None)
         units = layer.shape[1]
         self._out = weights.array("out", units)
@@ -78,6 +81,7 @@ def highest(scores: NDArray[np.float32], count: int) -> Cells:
     """The `count` cells of the highest scores, ascending; of equals those of the lowest index."""
     if not 0 < count < len(scores):
         return np.arange(len(scores))[:count]
+    # A partition and not a sort: the order among the highest does not matter, only who they are.
     least = np.partition(scores, -count)[-count]
     above = np.flatnonzero(scores > least)
     equal = np.flatnonzero(scores == least)[: count - len(above)]

@@ -15,11 +15,11 @@ from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 
 class PpoPolicy(Policy):
-    """Does what the learner would behind its wrappers, without noise: the same scores, the same
-    allocator.
+    """Does what the learner would do behind its wrappers, without exploration: the same scores, the
+    same allocator.
 
-    `path` is a file of weights that `care-sim train ppo` wrote; without, those that come with the
-    package, learned on the dense street at all budgets of its tables. Raises InvalidInput for
+    `path` is a file of weights that `care-sim train ppo` wrote. Without it those act that come with
+    the package, learned on the dense street at all budgets of its tables. Raises InvalidInput for
     weights that are missing, damaged, of another kind, or made for another grid or budget.
     """
 
@@ -34,6 +34,7 @@ class PpoPolicy(Policy):
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
         file = load_weights(shipped_weights(self.weights) if path is None else path)
+        # Not `self.name`: weights of both streets are of the kind 'ppo'.
         file.check(PpoPolicy.name, rig)
         wrapping = file.card.wrapper
         if wrapping is None:

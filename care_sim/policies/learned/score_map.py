@@ -33,6 +33,7 @@ class ScoreMap:
         self._window = tuple(blocks + 2 * BLOCK_MARGIN for blocks in self._stride)
         kernel = weights.array("window.weight", None, len(CHANNELS), *self._window)
         hidden = len(kernel)
+        # The convolution is one product of matrices: windows (sectors, inputs) by (inputs, hidden).
         self._kernel = np.ascontiguousarray(kernel.reshape(hidden, -1).T)
         self._bias = weights.array("window.bias", hidden)
         self._ego = weights.array("ego.weight", hidden, len(EGO_INPUTS))
@@ -61,8 +62,10 @@ class ScoreMap:
         padded[:, BLOCK_MARGIN:-BLOCK_MARGIN, BLOCK_MARGIN:-BLOCK_MARGIN] = grid.reshape(
             self._shape
         )
+        # Columns go round the car: each end continues with the other one's blocks.
         padded[:, :, :BLOCK_MARGIN] = padded[:, :, -2 * BLOCK_MARGIN : -BLOCK_MARGIN]
         padded[:, :, -BLOCK_MARGIN:] = padded[:, :, BLOCK_MARGIN : 2 * BLOCK_MARGIN]
+        # Windows of neighbouring sectors overlap by the margins.
         tall, wide = self._stride
         windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[
             :, ::tall, ::wide

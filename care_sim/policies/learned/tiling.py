@@ -53,6 +53,8 @@ class Tiling:
     def cells(self) -> Cells:
         """(tiles, n) the cells of every tile, ascending."""
         rows, columns = self.tile_shape
+        # Axes: tile row, row in the tile, tile column, column in the tile. The middle two change
+        # places, so that the cells of a tile come together.
         pictured = np.arange(self.grid.size).reshape(self.elevations, rows, self.azimuths, columns)
         return pictured.swapaxes(1, 2).reshape(self.elevations * self.azimuths, rows * columns)
 
@@ -60,6 +62,7 @@ class Tiling:
         """The cells of the tiles with a strictly positive score (`shape`), best first, ties by
         ascending index; no more tiles than hold `enough` cells.
         """
+        # A stable sort of the negated scores: among equals the lower index comes first.
         flat = np.ravel(scores)
         many = min(np.count_nonzero(flat > 0), -(-enough // self.cells.shape[1]))
         return list(self.cells[np.argsort(-flat, kind="stable")[:many]])
@@ -70,9 +73,8 @@ def reserve_demand(
 ) -> Demand:
     """The forecasts' hulls, then the sectors with a positive score as layers of the reserve, best
     first.
-
-    Twice the budget is enough of them: at most one budget of cells lies in the hulls already.
     """
+    # Sectors of twice the budget are enough: at most one budget of their cells is taken by hulls.
     layers = [[cells] for cells in sectors.ranked(scores, 2 * rig.budget)]
     return Demand(rig.hulls(belief.tracks.boxes), layers)
 

@@ -68,9 +68,11 @@ class Card:
         plain = parsed_json(text)
         if not isinstance(plain, dict) or plain.pop("format", None) != FORMAT:
             raise ValueError(f"its card is not of the format {FORMAT!r}")
+        # Exactly the fields of a card: what a later form adds might change what the weights mean.
         if wrong := set(plain) ^ {column.name for column in fields(cls)}:
             raise ValueError(f"its card lacks or has too much: {', '.join(sorted(wrong))}")
         for name, value in plain.items():
+            # To Python true is an int.
             if not isinstance(value, _TYPES[name]) or isinstance(value, bool):
                 raise ValueError(f"its card says {name} {value!r}")
         made = {"grid": _grid(plain["grid"]), "wrapper": _wrapping(plain["wrapper"])}
@@ -145,10 +147,7 @@ def save_weights(
 
 
 def load_weights(path: str | PathLike[str]) -> Weights:
-    """Read weights. Raises InvalidInput for a file that is missing, damaged or something else.
-
-    Whatever a spoilt archive provokes in its readers becomes that one line.
-    """
+    """Read weights. Raises InvalidInput for a file that is missing, damaged or something else."""
     check_path("a file of weights", path)
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -158,6 +157,8 @@ def load_weights(path: str | PathLike[str]) -> Weights:
         return Weights(Path(path), _checked(entries), card)
     except FileNotFoundError as error:
         raise InvalidInput(f"weights {path}: no such file") from error
+    # Damaged archives raise errors of many kinds in zipfile, zlib and NumPy; all become one line,
+    # without NumPy's advice to allow pickled objects.
     except Exception as error:
         reason = " ".join((str(error) or type(error).__name__).split()).partition(" If you trust")[
             0
@@ -173,8 +174,10 @@ def shipped_weights(name: str) -> Path:
 
 
 def _check_contents(entries: list[ZipInfo]) -> None:
+    # Of two entries of one name each reader would take its own.
     if len({entry.filename for entry in entries}) < len(entries):
         raise ValueError("an entry comes twice")
+    # Before anything is unpacked: a small archive can hold more than the memory does.
     if sum(entry.file_size for entry in entries) > MOST_UNPACKED_BYTES:
         raise ValueError(f"unpacked it is larger than {MOST_UNPACKED_BYTES} bytes")
 

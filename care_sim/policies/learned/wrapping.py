@@ -32,6 +32,7 @@ class Wrapping:
         check_known("action", self.action, ACTION_WRAPPERS)
         for name in ("azimuths", "elevations", "columns", "rows"):
             check_whole(name, getattr(self, name), 1)
+        # The network slides over whole blocks from sector to sector.
         for blocks, sectors in (("columns", "azimuths"), ("rows", "elevations")):
             if getattr(self, blocks) % getattr(self, sectors):
                 raise InvalidInput(
