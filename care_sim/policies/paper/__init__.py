@@ -1,1 +1,1 @@
-"""The policies of the paper, one a file."""
+"""The policies of the paper, one per file."""

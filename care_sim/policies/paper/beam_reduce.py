@@ -11,8 +11,8 @@ from care_sim.policies.base import Policy
 
 class BeamReduce(Policy):
     """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), which drops scan lines from a
-    cloud, adapted by the paper (Sec. 5.1) into a causal scan policy: it fires whole rows, the
-    nearest to the horizon first, and the last one thinned evenly, so that exactly B cells are asked
+    cloud. The paper (Sec. 5.1) adapts it into a causal scan policy, which fires whole rows, the
+    nearest to the horizon first. The last row is thinned evenly, so that exactly B cells are asked
     for.
     """
 
@@ -32,8 +32,11 @@ def horizon_rows(grid: AngularGrid, count: int) -> list[Cells]:
     """The cells of the rows nearest the horizon, nearest first, `count` in all; the last row evenly
     thinned.
     """
+    # The height of a row's unit rays orders rows as their elevation does. Rows as far above the
+    # horizon as below keep the order of their index: the upper one first.
     nearest = np.argsort(np.abs(grid.directions[:: grid.columns, 2]), kind="stable")
     whole, rest = divmod(count, grid.columns)
+    # Whole rows, then the rest in one more, if there is any.
     widths = [grid.columns] * whole + [rest] * (rest > 0)
     return [
         row * grid.columns + np.arange(width) * grid.columns // width

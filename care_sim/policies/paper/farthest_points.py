@@ -21,6 +21,7 @@ class FarthestPoints(MatchedFraction):
 
     def __init__(self, rig: Rig, truth: Truth):
         super().__init__(rig, truth)
+        # A missing extra is told before the episode, not at its first keyframe.
         import_open3d()
 
     def kept(self, cells: Cells, points: Floats, count: int) -> Cells:

@@ -24,5 +24,5 @@ class Full(Policy):
             )
 
     def demand(self, belief: Belief) -> Demand:
-        """All cells, as one reserve layer."""
+        """All cells, as one reserve layer: exploitation alone would stop at (1 - rho) B."""
         return Demand(layers=[[np.arange(self.rig.grid.size)]])

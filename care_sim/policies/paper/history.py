@@ -6,9 +6,9 @@ from care_sim.policies.base import Policy
 
 
 class History(Policy):
-    """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning:
-    the exploitation sets are the dilated hulls of the forecasts, nearest first; the reserve is
-    empty.
+    """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning.
+    The exploitation sets are the dilated hulls of the forecasts, nearest first. The reserve is
+    empty, so the random floor takes what they leave.
     """
 
     name = "history"
@@ -16,4 +16,5 @@ class History(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls of all forecasts."""
+        # The tracks of a belief come nearest first, and their hulls keep that order.
         return Demand(self.rig.hulls(belief.tracks.boxes))

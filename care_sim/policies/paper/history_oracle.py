@@ -9,7 +9,7 @@ from care_sim.policies.base import PrivilegedPolicy
 
 class HistoryOracle(PrivilegedPolicy):
     """The oracle of the paper (Sec. 5.2): history, with the forecast of every tracked object
-    replaced by its true next position. An upper bound on any learned predictor of regions; new
+    replaced by its true next position. It bounds any learned predictor of regions from above. New
     objects stay unknown to it.
     """
 
@@ -19,5 +19,6 @@ class HistoryOracle(PrivilegedPolicy):
     def demand(self, belief: Belief) -> Demand:
         """Hulls of the true boxes, nearest first."""
         boxes = self.truth.boxes(belief.tracks)
+        # True places may be in another order than the forecasts were; equal ones keep theirs.
         nearest_first = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
         return Demand(self.rig.hulls(boxes[nearest_first]))

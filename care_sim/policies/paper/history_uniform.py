@@ -22,6 +22,7 @@ class HistoryUniform(Policy):
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
+        # What exploitation leaves, as Algorithm 1 rounds it.
         reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
         self._pattern = uniform_pattern(rig.grid, reserve)
 
@@ -31,13 +32,16 @@ class HistoryUniform(Policy):
 
 
 def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
-    """`count` different cells, ascending: as many in every row, evenly spaced, each row turned by
-    the golden ratio.
+    """`count` different cells, ascending: as many in every row, evenly spaced, each row shifted
+    against the one above by the golden ratio of its spacing.
     """
+    # The numbers go to the rows as evenly as whole numbers can. Then each one's place in its row.
     numbers = np.arange(count)
     row = numbers * grid.rows // max(count, 1)
     in_row = np.bincount(row, minlength=grid.rows)
     place = numbers - (np.cumsum(in_row) - in_row)[row]
+    # Unshifted, the pattern would be a lattice with empty columns. The spacing in a row is at least
+    # one column, so no cell comes twice.
     column = np.floor((place + row * GOLDEN % 1) * grid.columns / in_row[row]).astype(np.int64)
     cells: Cells = row * grid.columns + column
     return cells

@@ -12,7 +12,7 @@ from care_sim.policies.base import PrivilegedPolicy
 
 
 class MatchedFraction(PrivilegedPolicy):
-    """A reference that is not causal (paper, Sec. 5.1): it sees the full cloud of P points before
+    """A reference that is not causal (paper, Sec. 5.1). It sees the full cloud of P points before
     it chooses, keeps round(beta P) of them, and so saves no sensing. The rest of the budget goes to
     cells that return nothing, in ascending order, so that the shared floor adds no point.
     """
@@ -29,6 +29,7 @@ class MatchedFraction(PrivilegedPolicy):
         returned = np.isfinite(scan.ranges)
         cells = scan.cells[returned]
         points = self.rig.grid.directions[cells] * scan.ranges[returned, None]
+        # beta is the budget over all cells: the belief tells the budget in cells.
         kept = self.kept(cells, points, round(belief.budget * len(cells) / self.rig.grid.size))
         silent = scan.cells[~returned][: belief.budget - len(kept)]
         return Demand(layers=[[kept], [silent]])

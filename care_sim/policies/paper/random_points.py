@@ -17,8 +17,8 @@ class RandomPoints(MatchedFraction):
     """The first reference of the paper (Sec. 5.1): a matched fraction of the full cloud, drawn at
     random.
 
-    `seed` and the cloud decide the draw, so that no two keyframes or episodes share one; the last
-    bits of the cloud, which are a processor's own, do not.
+    `seed` and the cloud decide the draw, so that no two keyframes or episodes share one. The last
+    bits of the cloud differ between processors and do not enter.
     """
 
     name = "random-points"

@@ -33,6 +33,7 @@ class Uncertainty(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then unexplained returns in shells of distance, nearest first."""
         cells, ranges = self._unexplained(belief)
+        # A layer per shell; a layer's one set is taken in ascending order of its cells.
         shell = np.floor(ranges / SHELL_M)
         layers = [[cells[shell == number]] for number in np.unique(shell)]
         return Demand(self.rig.hulls(belief.tracks.boxes), layers)
@@ -41,6 +42,7 @@ class Uncertainty(Policy):
         """Cells (n,) and ranges (n,) of the last scan's returns above the ground and outside
         detected boxes.
         """
+        # 0 was not fired, and the range of the grid returned nothing.
         cells = np.flatnonzero((belief.ranges > 0) & (belief.ranges < self.rig.grid.range_m))
         ranges = belief.ranges.ravel()[cells].astype(np.float64)
         points = self.rig.grid.directions[cells] * ranges[:, None]
@@ -51,6 +53,7 @@ class Uncertainty(Policy):
 
     def _detected_boxes(self, belief: Belief) -> Floats:
         """(n, 7) boxes detected at the last scan, moved back to it, in the sensor frame of then."""
+        # Tracks are forecasts for the coming keyframe: back by their own way, then by the car's.
         seen = belief.tracks.take(belief.tracks.misses == 0)
         boxes = seen.boxes.copy()
         boxes[:, :2] -= seen.velocities * self.rig.keyframe_s
@@ -59,8 +62,12 @@ class Uncertainty(Policy):
 
 def _travelled(ego: Ego, duration: float) -> Frame:
     """The sensor frame of now in that of `duration` seconds ago."""
+    # The speed half way back. A car that has just set off stood before; it did not drive the other
+    # way.
     mean = ego.speed - ego.acceleration * duration / 2
     way = (max(mean, 0.0) if ego.speed >= 0 else min(mean, 0.0)) * duration
+    # An arc of constant yaw rate has a chord in the direction of half the turn. Its length is taken
+    # for the arc's: at 1 rad/s and 0.1 s they differ by 4 parts in 10,000.
     yaw = ego.yaw_rate * duration
     return Frame(way * np.cos(yaw / 2), way * np.sin(yaw / 2), 0.0, yaw)
 
