@@ -1,1 +1,1 @@
-"""Recorded drives as films: Argoverse 2 logs and nuScenes databases."""
+"""Where films come from: generated streets, Argoverse 2 logs and nuScenes databases."""

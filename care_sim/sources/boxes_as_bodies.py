@@ -34,6 +34,7 @@ class Prop:
     @property
     def bounds(self) -> tuple[float, ...]:
         """The box along the sensor's axes that holds it, however it is turned."""
+        # Each of its own axes reaches along a sensor's axis by the absolute value of their cosine.
         extents = np.abs(self.frame.rotation.as_matrix()) @ self.size
         return (*self.frame.origin.tolist(), *extents.tolist(), 0.0)
 
@@ -49,12 +50,13 @@ def sense(
     """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell
     fired.
 
-    The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing: real
-    roads undulate, and a plane in the world would bury what stands where they fall.
+    The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing, because
+    real roads undulate: a plane in the world would bury what stands where they fall.
     """
     reported = [prop for prop in props if prop.label is not None]
     annotations = annotations_of(reported)
     with closing(BulletWorld(ground=False)) as world:
+        # All of them occlude. Those of the five classes have a number in the film.
         bodies = {id(prop): _add(world, prop, sensor) for prop in props}
         numbers = {bodies[id(prop)]: prop.number for prop in reported}
         labels = {bodies[id(prop)]: CLASSES.index(str(prop.label)) for prop in reported}

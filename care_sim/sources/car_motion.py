@@ -8,10 +8,11 @@ from care_sim.core.frames import Floats, Frame
 from care_sim.core.types import Ego
 
 SPAN_S = 0.5
-"""How far back the poses count: a keyframe. At 10 Hz these are six, which average out the
-centimetres by which recorded poses err; longer spans lag behind a driver who begins to brake."""
+"""How far back the poses count: a keyframe. At 10 Hz these are six poses, which average out the
+centimetres by which recorded poses err. Longer spans lag behind a driver who begins to brake."""
 LEAST_POSES = 3
-"""The fewest that tell a steady acceleration without lag; at 2 Hz they reach back a second."""
+"""The fewest poses that tell a steady acceleration without lag. At 2 Hz they reach back a second.
+"""
 
 
 def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
@@ -24,6 +25,7 @@ def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
     """
     if len(poses) < 2:
         return [Ego() for _ in poses]
+    # Headings that jump by a whole turn would be read as a spin.
     yaws = np.unwrap([pose.yaw for pose in poses])
     places = np.array([[pose.x, pose.y, yaw] for pose, yaw in zip(poses, yaws, strict=True)])
     return [_motion(times_s, places, pose) for pose in range(len(poses))]
@@ -31,10 +33,14 @@ def motions(times_s: Floats, poses: Sequence[Frame]) -> list[Ego]:
 
 def _motion(times_s: Floats, places: Floats, now: int) -> Ego:
     """The motion at row `now` of `places` (n, 3: x, y, heading)."""
+    # The span, 1% longer so that a pose at its very end counts whatever the clock's rounding; at
+    # least LEAST_POSES, from the beginning of the drive if there are no earlier ones.
     first = min(
         int(np.searchsorted(times_s, times_s[now] - 1.01 * SPAN_S)), max(now + 1 - LEAST_POSES, 0)
     )
     window = slice(first, max(now + 1, LEAST_POSES))
+    # Relative to now: the coefficients of the parabola are then place, rate and half the change of
+    # the rate at this very moment.
     times = times_s[window] - times_s[now]
     degree = min(len(times_s), LEAST_POSES) - 1
     rates = np.polynomial.polynomial.polyfit(times, places[window] - places[now], degree)

@@ -1,7 +1,7 @@
 """What a recording can hold: the ranges of boxes, poses and times, alike for every source.
 
-They are wide. What lies beyond is damage: further on it would become infinities and NaN, or a body
-that ends Bullet (round ones without a radius do).
+They are wide. What lies beyond is damage. Further on it would become infinities and NaN, or a body
+that ends Bullet (a round one without a radius does).
 """
 
 from pathlib import Path
@@ -45,9 +45,11 @@ def quaternion_fault(turns: Floats, has_heading: bool = True) -> tuple[int, str]
     """The first of quaternions (n, 4: x, y, z, w) that turns nothing, or leaves no heading where
     there must be one: its row, and what is wrong with it.
     """
-    lengths = np.linalg.norm(np.clip(turns, -2, 2), axis=1)  # squares of larger ones overflow
+    # Clipped, since squares of large numbers overflow.
+    lengths = np.linalg.norm(np.clip(turns, -2, 2), axis=1)
     unit = (lengths >= UNIT[0]) & (lengths <= UNIT[1])
     x, y, z, w = np.where(unit[:, None], turns, 0.0).T
+    # The sine of the pitch is 2 (w y - x z) over the square of the quaternion's length.
     steep = np.abs(w * y - x * z) * 2 > np.sin(MOST_PITCH) * np.where(unit, lengths, 1.0) ** 2
     for wrong, reason in (
         (~unit, "a quaternion that is not of length 1"),

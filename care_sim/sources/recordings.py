@@ -38,8 +38,8 @@ class Recordings(ABC):
 
     @abstractmethod
     def files(self, scene: str) -> list[Path]:
-        """The files that say what is in a scene, those that are missing too; the sweeps of nuScenes
-        are not among them.
+        """The files that say what is in a scene, missing ones included. The sweeps of nuScenes are
+        not among them.
         """
 
 
@@ -61,6 +61,7 @@ class Argoverse2(Recordings):
 
     def files(self, scene: str) -> list[Path]:
         """Poses and annotations."""
+        # The folder may itself be the log.
         own = self.folder / scene
         log = own if own.is_dir() else self.folder
         return [log / POSE_FILE, *sorted(log.glob(ANNOTATION_FILES))]
@@ -68,8 +69,8 @@ class Argoverse2(Recordings):
 
 @dataclass(frozen=True)
 class NuScenes(Recordings):
-    """A nuScenes v1.0 database: the scenes of a `split`, of a `version` where the folder holds
-    several; the cameras' boxes come from the file `camera_detections`, else from projected
+    """A nuScenes v1.0 database: the scenes of a `split`, of a `version` if the folder holds
+    several. The cameras' boxes come from the file `camera_detections`, or else from projected
     annotations.
     """
 
@@ -132,10 +133,11 @@ def recordings(text: str, options: Mapping[str, object] | None = None) -> Record
 
 @lru_cache(maxsize=1)
 def film_of(source: Recordings, scene: str) -> Film:
-    """The film of a scene; the last one is kept, for policies that meet the same scene in turn."""
+    """The film of a scene. The last one is kept, for policies that meet the same scene in turn."""
     return source.film(scene)
 
 
+# Tables and detections are large and the same for all scenes: the last ones stay read.
 @lru_cache(maxsize=1)
 def _database(root: Path, version: str | None) -> Database:
     return Database(root, version)

@@ -55,7 +55,7 @@ class Streets:
     split: str = "evaluation"
 
     def scenes(self) -> list[Scene]:
-        """One a seed."""
+        """One per seed."""
         return [Scene(street_name(seed), seed) for seed in SPLITS[self.split]]
 
     def film(self, scene: Scene) -> Film:
@@ -79,8 +79,8 @@ class Recorded:
         return self.recordings.kind
 
     def scenes(self) -> list[Scene]:
-        """By name; one seed for all, since the name of a scene is part of what draws its faults and
-        floor.
+        """By name. All have one seed, since the name of a scene is part of what draws its faults
+        and floor.
         """
         return [Scene(name, 0) for name in self.recordings.scenes()]
 
@@ -102,7 +102,7 @@ class Recorded:
 
 
 LONGEST_NUMBER = 40
-"""Digits that are read of a number of scenes."""
+"""Digits that are read of a number of scenes. Python refuses to read some thousands."""
 SPLITS = {"evaluation": EVALUATION_SEEDS, "calibration": CALIBRATION_SEEDS}
 
 
@@ -128,8 +128,9 @@ def source_of(text: str, **options: object) -> Source:
 
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
-    """The scenes that are asked for: one whole number means that many, from the first; else scenes
-    by name; all of them without. Raises InvalidInput for a name or a number that there is not.
+    """The scenes that are asked for. One whole number means that many, from the first. Otherwise
+    they are names, and without any all scenes are meant. Raises InvalidInput for a name or a number
+    that there is not.
     """
     if not names:
         return scenes
@@ -144,4 +145,5 @@ def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     known = {scene.name: scene for scene in scenes}
     for name in names:
         check_known("scene", name, known)
+    # Each once, in the order in which they were asked for.
     return [known[name] for name in dict.fromkeys(names)]

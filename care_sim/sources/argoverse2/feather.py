@@ -1,4 +1,4 @@
-"""Columns of Feather files; what is missing or broken is named in one line."""
+"""Columns of Feather files. What is missing or broken is named in one line."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -27,7 +27,8 @@ def read_columns(
     try:
         table = feather.read_table(path)
         table.validate(full=True)
-        names = table.column_names  # those of broken characters show only now
+        # Names that are no UTF-8 show only when they are read.
+        names = table.column_names
     except FileNotFoundError:
         raise InvalidInput(f"{path}: no such file") from None
     except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:

@@ -45,7 +45,7 @@ ARGOVERSE2_SENSOR_HEIGHT_M = UP_LIDAR[2] + CAR_FRAME_HEIGHT_M
 ARGOVERSE2_KEYFRAME_S = 0.5
 NANOSECONDS = 10**9
 HALF_SWEEP_NS = NANOSECONDS // 20
-"""Annotations come at 10 Hz: the nearest is this far from a moment at most, unless a sweep holds
+"""Annotations come at 10 Hz. The nearest is at most this far from a moment, unless a sweep holds
 none.
 """
 
@@ -79,6 +79,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
             f"{pose_file}: no pose for the timestamp {without_pose[0]} of {boxes_file.name}"
         )
     keyframes = _keyframes(sweeps, poses["timestamp_ns"])
+    # The car's motion is fitted to all annotated moments, the film is made of the keyframes.
     moments = np.union1d(sweeps, keyframes)
     cars = _car_frames(poses, moments)
     times = (moments - moments[0]) / NANOSECONDS
@@ -124,8 +125,11 @@ def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
 
 def _nearest(stamps: Cells, moments: Cells) -> Cells:
     """(m,) the nearest of ascending `stamps` (n,) to every one of `moments` (m,)."""
-    after = np.clip(np.searchsorted(stamps, moments), 1, max(len(stamps) - 1, 1))
-    before, after = stamps[after - 1], stamps[np.minimum(after, len(stamps) - 1)]
+    # The first stamp that is not earlier, and the one before it; a single stamp is both. Of two
+    # that are as near the earlier counts.
+    row = np.clip(np.searchsorted(stamps, moments), 1, max(len(stamps) - 1, 1))
+    before = stamps[row - 1]
+    after = stamps[np.minimum(row, len(stamps) - 1)]
     return np.where(moments - before <= after - moments, before, after)
 
 
@@ -133,6 +137,7 @@ def _car_frames(poses: Columns, moments: Cells) -> list[Frame]:
     """The car's frame at every moment, each of which has a pose. The world is the city's, moved to
     the first.
     """
+    # City coordinates lie kilometres from their origin; those of a film begin at its first place.
     rows = np.searchsorted(poses["timestamp_ns"], moments)
     places = table(poses, PLACE)[rows]
     turns = Rotation.from_quat(table(poses, TURN)[rows])
@@ -152,6 +157,7 @@ def _props(boxes: Columns) -> list[Prop]:
     numbers = boxes["number"].tolist()
     labels = [ARGOVERSE2_CATEGORIES[name] for name in boxes["category"].tolist()]
     sizes = [tuple(size) for size in table(boxes, SIZE).tolist()]
+    # The LiDAR is mounted without a turn, so its frame differs by its place alone.
     places = table(boxes, PLACE) - UP_LIDAR
     turns = table(boxes, TURN)
     frames = [

@@ -1,5 +1,5 @@
-"""The tables of an Argoverse 2 log: annotations and poses of the car, checked; what is wrong is
-named in one line.
+"""The tables of an Argoverse 2 log: annotations and poses of the car. They are checked, and what is
+wrong is named in one line.
 """
 
 from pathlib import Path
@@ -95,6 +95,7 @@ def read_boxes(path: Path) -> tuple[Cells, Columns]:
     box that no drive holds (`care_sim.sources.plausible`), an object annotated twice at once.
     """
     boxes = read_columns(path, _BOX_TYPES, _BOX_RANGES)
+    # A sweep that annotates the recording car alone is annotated too: nobody else is there.
     sweeps = np.unique(boxes["timestamp_ns"])
     kept = boxes["category"] != RECORDING_CAR
     boxes = {name: column[kept] for name, column in boxes.items()}
@@ -104,6 +105,7 @@ def read_boxes(path: Path) -> tuple[Cells, Columns]:
     for category in np.unique(boxes["category"]).tolist():
         if category not in ARGOVERSE2_CATEGORIES:
             raise InvalidInput(f"{path}: {unknown('category', category, ARGOVERSE2_CATEGORIES)}")
+    # Tracks are numbered in the order of their ids, wherever in the file they come.
     numbers = np.unique(boxes["track_uuid"], return_inverse=True)[1]
     fault = quaternion_fault(table(boxes, TURN))
     if fault is not None:
@@ -138,6 +140,7 @@ def _seen(boxes: Columns, row: int) -> str:
 
 def _first_again(rows: Cells) -> int | None:
     """The first of rows (n, k) that stands further up as well."""
+    # `np.unique` gives where each different row stands first; all other rows repeat one.
     repeated = np.ones(len(rows), dtype=bool)
     repeated[np.unique(rows, axis=0, return_index=True)[1]] = False
     return int(repeated.argmax()) if repeated.any() else None

@@ -48,6 +48,8 @@ class RecordedCamera:
         """The same camera with its principal point in the middle of a picture that holds the
         recorded one.
         """
+        # Wide enough that the recorded picture lies within, however far off the middle its
+        # principal point is; even, so that the middle is a whole pixel.
         frame = self.frame
         width, height = (
             2 * math.ceil(max(middle, size - middle))
@@ -55,6 +57,7 @@ class RecordedCamera:
         )
         position = (frame.x, frame.y, frame.z)
         angle = float(2 * np.arctan(width / 2 / self.focal))
+        # A camera's pitch is positive upwards, a frame's about y, to the left, downwards.
         return PinholeCamera(width, height, angle, position, frame.yaw, -frame.pitch, frame.roll)
 
     @property
@@ -67,6 +70,7 @@ def recorded_camera(mount: Frame, intrinsic: Floats, lidar: Frame) -> RecordedCa
     """From frames in the car: the camera's (z forward, x right, y down) and the LiDAR's sensor
     frame.
     """
+    # From axes x forward, y left, z up to those of the camera.
     ahead = Rotation.from_matrix([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
     turn = lidar.rotation.inv() * mount.rotation * ahead
     frame = Frame.turned_by(turn, lidar.vectors_to_local(mount.origin - lidar.origin))
@@ -90,6 +94,7 @@ def projected_detections(
         boxes = projected(camera, annotations.boxes)
         area = np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0, None), axis=1)
         pixels = area * shares * (CAMERA_WIDTH / PICTURE[0]) ** 2
+        # The same rule as for rendered pictures, at their width.
         seen = pixels >= MIN_PIXELS
         columns = annotations.classes, confidence_of(pixels), boxes
         rows.append(_rows([column[seen] for column in columns], number))
@@ -103,6 +108,7 @@ def projected(camera: RecordedCamera, boxes: Floats) -> Floats:
     """(n, 4) image boxes of 3D boxes (n, 7), cut at the edges of the recorded picture, empty where
     it shows none.
     """
+    # A box behind the camera projects to NaN and becomes a point, which has no area.
     shift = camera.shift
     limits = np.tile(PICTURE, 2) + shift
     return np.clip(np.nan_to_num(camera.pinhole.project_boxes(boxes), nan=shift[0]), shift, limits)

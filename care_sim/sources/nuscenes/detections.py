@@ -29,7 +29,7 @@ COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
 COCO_LAST = 90
 """The categories of COCO are numbered from 1 to this."""
 FARTHEST_PX = 1e5
-"""How far a box may reach, within the picture or beside it: its area is to be a number."""
+"""How far a box may reach, within the picture or beside it, so that its area stays a number."""
 SAME_OBJECT_IOU = 0.5
 """A detection lies on the object of its class whose projected box overlaps it at least this much
 (PASCAL VOC).
@@ -74,12 +74,13 @@ class DetectionFile:
         pictures: Sequence[JsonRow],
         annotations: Annotations,
     ) -> IdentifiedDetections:
-        """The detections on the pictures of a keyframe, one a camera, each with the object that it
-        lies on.
+        """The detections on the pictures of a keyframe, one picture per camera, each with the
+        object that it lies on.
         """
         rows = [np.empty((0, len(ImageDetections.COLUMNS)))]
         objects = [np.empty(0, np.int64)]
         for number, (camera, picture) in enumerate(zip(cameras, pictures, strict=True)):
+            # COCO names pictures by token or by file, so a picture may be known under both.
             found = self._found.get(picture["token"], []) + self._found.get(picture["filename"], [])
             boxes = np.array([box for _, _, box in found]).reshape(-1, 4) + camera.shift
             classes = np.array([label for label, _, _ in found], dtype=np.int64)
@@ -102,6 +103,8 @@ def _rows(path: Path) -> list[JsonRow]:
     content = read_json(path)
     results = content.get("results") if isinstance(content, dict) else None
     if isinstance(results, dict) and all(isinstance(rows, list) for rows in results.values()):
+        # Rows of the map do not repeat their token. What is no row stays, and is refused with its
+        # number.
         pairs = [(token, row) for token, rows in results.items() for row in rows]
         return [
             {"sample_data_token": token, **row} if isinstance(row, dict) else row
@@ -157,10 +160,9 @@ def _behind(boxes: Floats, classes: Cells, shown: Floats, annotations: Annotatio
     """
     if not len(boxes) or not len(shown):
         return np.full(len(boxes), NOBODY, np.int64)
-    low, high = (
-        np.maximum(boxes[:, None, :2], shown[:, :2]),
-        np.minimum(boxes[:, None, 2:], shown[:, 2:]),
-    )
+    # Intersection over union of every detection (n) with every projected box (m).
+    low = np.maximum(boxes[:, None, :2], shown[:, :2])
+    high = np.minimum(boxes[:, None, 2:], shown[:, 2:])
     common = np.prod(np.clip(high - low, 0, None), axis=-1)
     areas, others = (np.prod(b[:, 2:] - b[:, :2], axis=1) for b in (boxes, shown))
     overlap = np.where(

@@ -63,6 +63,7 @@ def nuscenes_film(
         _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
     ]
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
+    # Times are microseconds; the motion is that of the poses at which the sweeps were taken.
     egos = motions(times, cars)
     shots = tuple(
         stage.shot(*moment)
@@ -75,7 +76,7 @@ def nuscenes_film(
 
 @dataclass(frozen=True)
 class _Stage:
-    """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number for every
+    """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number per
     instance.
     """
 
@@ -146,6 +147,7 @@ def _recordings(database: Database, sample: JsonRow) -> dict[str, JsonRow]:
 
 
 def _frame(database: Database, table: str, token: str) -> Frame:
+    # The tables write w first, SciPy writes it last.
     w, x, y, z = database.numbers(table, token, "rotation", 4).tolist()
     mounted = table == "calibrated_sensor"
     fault = quaternion_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
@@ -159,7 +161,8 @@ def _lidar_mount(database: Database, data: JsonRow) -> Frame:
     """The sensor frame in the car's: x forward where LIDAR_TOP has y forward."""
     token = data["calibrated_sensor_token"]
     own = _frame(database, "calibrated_sensor", token)
-    if own.z < 0:  # the car's frame stands on it
+    # The car's frame stands on the road.
+    if own.z < 0:
         path = database.path("calibrated_sensor")
         raise InvalidInput(f"{path}: {token!r} lies below the road, at {own.z:g} m")
     return Frame.turned_by(own.rotation * _FORWARD_FROM_RIGHT, own.origin)
@@ -200,6 +203,7 @@ def _object_numbers(database: Database, samples: list[JsonRow]) -> dict[str, int
     tokens = {
         box["instance_token"] for sample in samples for box in database.annotations(sample["token"])
     }
+    # Sorted: the order of a set differs from process to process.
     return {token: number for number, token in enumerate(sorted(tokens))}
 
 
@@ -223,7 +227,7 @@ def _annotations(
 
 
 def _world_box(database: Database, box: JsonRow) -> tuple[float, ...]:
-    """Sizes are width, length, height in the table."""
+    """Centre, length, width, height and heading; the table has width, length, height."""
     frame = _frame(database, "sample_annotation", box["token"])
     width, length, height = database.numbers(
         "sample_annotation", box["token"], "size", 3, within=SIZES_M
@@ -236,6 +240,7 @@ def _shares(database: Database, boxes: list[JsonRow]) -> Floats:
 
 
 def _share(database: Database, token: str) -> float:
+    """The share of an object that its level of visibility stands for; 1 without a level."""
     if not token:
         return 1.0
     level = database.row("visibility", token)["level"]

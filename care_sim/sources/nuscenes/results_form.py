@@ -20,8 +20,8 @@ MODALITIES = {
     "use_map": False,
     "use_external": False,
 }
-"""What the form's `meta` must tell. The camera decides where a policy looks, the LiDAR measures the
-boxes.
+"""What the form's `meta` must tell. The camera decides where a policy looks, and the LiDAR measures
+the boxes.
 """
 MOST_BOXES = 500
 """A sample with more is refused."""
@@ -35,9 +35,9 @@ ATTRIBUTES = {
     "bicycle": ("cycle.without_rider", "cycle.with_rider"),
     "pedestrian": ("pedestrian.standing", "pedestrian.moving"),
 }
-"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. The others of
-the eight official attributes, a vehicle that only stopped and a person who sits, are nothing that a
-box and its speed could tell.
+"""The attribute of what stands, and of what moves. A bicycle that moves is ridden. Of the eight
+official attributes two are left out, a vehicle that only stopped and a person who sits: a box and
+its speed cannot tell them.
 """
 
 
@@ -50,6 +50,7 @@ def result_boxes(shot: Shot, detections: Detections, velocities: Floats) -> list
     quaternion w, x, y, z.
     """
     scores = confidences(detections)
+    # Stable: of equal scores the earlier one stays, on every machine.
     order = np.argsort(-scores, kind="stable")[:MOST_BOXES]
     world = shot.sensor.boxes_to_world(detections.boxes)
     moves = turned(velocities, shot.sensor.yaw)
@@ -64,9 +65,9 @@ def result_boxes(shot: Shot, detections: Detections, velocities: Floats) -> list
 
 
 def confidences(detections: Detections) -> Floats:
-    """(n,) the detector's own scores; for one that has none n / (n + MIN_RETURNS) of n returns: a
-    half where an object begins to count, towards 1 with more, and never 0, which the devkit reads
-    as a recall not reached.
+    """(n,) the detector's own scores. For a detector without scores n / (n + MIN_RETURNS) of n
+    returns: a half if an object just counts, towards 1 with more returns. It is never 0, which the
+    devkit reads as a recall that was not reached.
     """
     if detections.scores is not None:
         return detections.scores
@@ -85,6 +86,7 @@ def _box(name: str, box: Floats, velocity: Floats, score: float) -> JsonRow:
     return {
         "translation": [x, y, z],
         "size": [width, length, height],
+        # A turn by yaw about z.
         "rotation": [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))],
         "velocity": velocity.tolist(),
         "detection_name": name,

@@ -42,14 +42,15 @@ VAL = tuple(
 
 
 def scenes(database: Database, split: str = "val") -> list[JsonRow]:
-    """The scenes of a split that the database holds, by name: of `val`, of a split in
-    `<root>/<version>/splits.json` (a map from names of splits to lists of names of scenes, which
-    goes before), or `all`.
+    """The scenes of a split that the database holds: of `val`, of `all`, or of a split in
+    `<root>/<version>/splits.json`, a map from names of splits to lists of names of scenes.
 
     Raises InvalidInput for an unknown split, a scene of `splits.json` that the database lacks, and
     an empty split.
     """
     by_name = {row["name"]: row for row in database.rows("scene").values()}
+    # The official split names scenes of which a database may hold a few; a split of its own must be
+    # whole, and comes before an official one of the same name.
     own = _own_splits(database)
     known = {"all": sorted(by_name), "val": [name for name in VAL if name in by_name], **own}
     check_known("split", split, known)

@@ -10,7 +10,7 @@ from care_sim.core.frames import Floats, Frame, turned
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
-VALUES_A_POINT = 5
+VALUES_PER_POINT = 5
 """float32 x, y, z, intensity and ring."""
 MOST_SWEEP_BYTES = 2**28
 """Bytes of a file: 13 million points, some hundred times a sweep of any LiDAR."""
@@ -37,15 +37,14 @@ def read_points(path: Path) -> Floats:
         values = np.fromfile(path, np.uint8)
     except OSError as error:
         raise InvalidInput(f"{path}: cannot be read ({error})") from error
-    if values.size % (4 * VALUES_A_POINT) or not values.size:
+    if values.size % (4 * VALUES_PER_POINT) or not values.size:
         raise InvalidInput(
-            f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_A_POINT} "
+            f"{path}: {values.size} bytes are no whole number of points of {4 * VALUES_PER_POINT} "
             "bytes"
         )
-    places = values.view("<f4").reshape(-1, VALUES_A_POINT)[:, :3]
-    finite = np.isfinite(places).all(
-        axis=1
-    )  # before they are cast, which warns of a NaN that signals
+    places = values.view("<f4").reshape(-1, VALUES_PER_POINT)[:, :3]
+    # Before they are cast: the cast warns of a signalling NaN.
+    finite = np.isfinite(places).all(axis=1)
     if not finite.all():
         raise InvalidInput(f"{path}: point {finite.argmin()} has a place that is not finite")
     points = places.astype(float)
@@ -61,6 +60,7 @@ def recorded_cloud(
     ranges = np.linalg.norm(points, axis=1)
     cells = grid.cells_of(points)
     (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & (ranges <= grid.range_m))
+    # A cloud comes in the order of its cells; of several points in a cell all stay.
     order = kept[np.argsort(cells[kept], kind="stable")]
     return Cloud(cells[order], points[order], owners(points[order], annotations, sensor))
 
@@ -71,6 +71,8 @@ def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Cells:
 
     Boxes stand upright in the world, however the frame `sensor` of points and annotations leans.
     """
+    # A ball round each box finds the few points that may lie in it. From the largest box down, so
+    # that the smallest one that holds a point has the last word.
     found = np.full(len(points), NOBODY, np.int64)
     boxes = sensor.boxes_to_world(annotations.boxes)
     places = KDTree(sensor.origin + sensor.vectors_to_world(points))

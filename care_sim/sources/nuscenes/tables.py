@@ -75,8 +75,8 @@ class Database:
         return self.folder / f"{table}.json"
 
     def rows(self, table: str) -> dict[str, JsonRow]:
-        """The rows of a table by token. Of recordings and car poses only those of keyframes: one in
-        six.
+        """The rows of a table by token. Of recordings and car poses only those of keyframes are
+        kept, about one in six.
         """
         if table not in self._tables:
             self._tables[table] = self._read(table)
@@ -121,7 +121,7 @@ class Database:
         )
 
     def annotations(self, sample: str) -> Sequence[JsonRow]:
-        """The annotated boxes of a sample, one an instance."""
+        """The annotated boxes of a sample, one per instance."""
         boxes = self._boxes_of_samples[sample]
         for token, count in Counter(box["instance_token"] for box in boxes).items():
             if count > 1:
@@ -138,6 +138,7 @@ class Database:
         while token or not found:
             row = self.row("sample", token)
             _check_stamp(self.path("sample"), row)
+            # Ascending times also rule out a chain of samples that comes back to itself.
             if found and row["timestamp"] <= found[-1]["timestamp"]:
                 raise InvalidInput(
                     f"{self.path('sample')}: {token!r} is no later than the sample before it"
@@ -155,8 +156,8 @@ class Database:
         return found
 
     def _read(self, table: str) -> dict[str, JsonRow]:
-        """The rows and fields that are needed; whatever else a table holds is dropped while it is
-        parsed.
+        """The rows and fields that are needed. Whatever else a table holds is dropped while it is
+        parsed, to save memory.
         """
         kinds = {"token": str, **FIELDS[table]}
 
@@ -170,6 +171,8 @@ class Database:
         return _indexed(self.path(table), read_json(self.path(table), taken), kinds)
 
     def _is_needed(self, table: str, row: JsonRow) -> bool:
+        # What lacks the field stays, to be refused with its name. Poses are recorded for every
+        # sweep and picture; those of keyframes are needed.
         if table == "sample_data":
             return row.get("is_key_frame") is not False
         return table != "ego_pose" or "token" not in row or str(row["token"]) in self._poses_read
@@ -194,6 +197,7 @@ class Database:
     @cached_property
     def _boxes_of_samples(self) -> dict[str, list[JsonRow]]:
         boxes = self.rows("sample_annotation").values()
+        # A box of a sample that there is not would be missed in silence.
         for box in boxes:
             self.row("sample", box["sample_token"])
         return _grouped(boxes)
@@ -228,6 +232,7 @@ def _only_version(root: Path) -> Path:
 
 
 _DROPPED = object()
+"""Stands for a row that was not kept, so that rows are still counted as in the file."""
 
 
 def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str, JsonRow]:
@@ -240,6 +245,7 @@ def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str
         if not isinstance(row, dict):
             raise InvalidInput(f"{path}: row {number} must be a map of fields")
         for name, kind in kinds.items():
+            # Not isinstance: to Python true is an int.
             if type(row.get(name)) is not kind:
                 raise InvalidInput(f"{path}: {_what_is_wrong(row, number, name, kind)}")
     return _by_token(path, [row for row in content if row is not _DROPPED])

@@ -35,11 +35,13 @@ class Curve:
         s, d, heading = np.moveaxis(np.asarray(places, dtype=float), -1, 0)
         along = np.clip(s - self.bend_at, 0.0, self.bend_length)
         turn = self.curvature * along
+        # An arc of length `along` that turns by `turn` has the chord along * sin(turn/2) /
+        # (turn/2).
         chord = along * np.sinc(turn / (2 * np.pi))
-        before, after = (
-            np.minimum(s, self.bend_at),
-            np.maximum(s - self.bend_at - self.bend_length, 0.0),
-        )
+        before = np.minimum(s, self.bend_at)
+        after = np.maximum(s - self.bend_at - self.bend_length, 0.0)
+        # The straight before lies along x, and the chord turned by half the bend. The straight
+        # after it points along the whole turn, and d lies across that.
         x = before + chord * np.cos(turn / 2) + after * np.cos(turn) - d * np.sin(turn)
         y = chord * np.sin(turn / 2) + after * np.sin(turn) + d * np.cos(turn)
         world = turned(np.stack([x, y], axis=-1), self.start[2]) + self.start[:2]
@@ -50,8 +52,8 @@ class Curve:
 class Walked:
     """A way covered at constant `speed` (m/s): a person's or a cyclist's.
 
-    `corners` (k, 2) are s and d of the way's corners on `curve`; the walker is at its beginning at
-    `starts_s` and stands at either end before and after. Distances are measured in the world, so
+    `corners` (k, 2) are s and d of the way's corners on `curve`. The walker is at the beginning at
+    `starts_s`, and stands at either end before and after. Distances are measured in the world, so
     that the speed holds in a bend.
     """
 
@@ -66,8 +68,10 @@ class Walked:
         """World poses (t, 3) at `times` (t,)."""
         points = self._points()
         legs = np.diff(points, axis=0)
+        # Metres done at every point of the way, and by the walker at every time.
         covered = np.concatenate([[0.0], np.cumsum(np.hypot(*legs.T))])
         way = np.clip(self.speed * (times - self.starts_s), 0.0, covered[-1])
+        # Who stands at the end still faces along the last leg.
         leg = np.clip(np.searchsorted(covered, way, side="right") - 1, 0, len(legs) - 1)
         x, y = (np.interp(way, covered, points[:, axis]) for axis in (0, 1))
         return np.column_stack([x, y, np.arctan2(legs[leg, 1], legs[leg, 0])])

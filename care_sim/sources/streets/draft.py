@@ -11,8 +11,8 @@ from care_sim.core.frames import Floats
 from care_sim.world.bodies import CATALOGUE
 
 STEP_S = 0.1
-"""Between two samples of a way: at 30 km/h a car moves 0.8 m in it, so that nobody steps through a
-car unseen.
+"""Between two samples of a way. A car at 30 km/h moves 0.8 m meanwhile, so nobody can step through
+one between two samples.
 """
 STREET_KEYFRAME_S = 0.5
 KEYFRAMES = 40
@@ -33,6 +33,7 @@ def footprints_meet(
     `poses` (n, 3) and `others` (n, 3) are x, y, heading; `size` and `other_sizes` (n, 2) length and
     width.
     """
+    # Rectangles are apart if they are so along the direction of some side of either.
     meet = np.ones(len(poses), dtype=bool)
     for angle in (poses[:, 2], poses[:, 2] + np.pi / 2, others[:, 2], others[:, 2] + np.pi / 2):
         apart = np.abs(
@@ -71,9 +72,12 @@ class PlacedBodies:
             return False
         sizes = np.array(self.sizes)
         berths = np.array(self.berths)
+        # First by circles round both: they hold the rectangles with a berth along every axis, which
+        # reaches sqrt(2) times as far in a corner. Few pairs are left for the exact test.
         places = np.stack(self.ways)
         apart = np.hypot(places[..., 0] - way[:, 0], places[..., 1] - way[:, 1])
         reach = (np.hypot(*sizes.T) + np.hypot(*size)) / 2 + np.sqrt(2) * berths
+        # What stands has one pose, which holds at every time.
         who, when = np.nonzero(apart < reach[:, None])
         mine = way[when if len(way) > 1 else np.zeros_like(when)]
         theirs = places[who, when if places.shape[1] > 1 else np.zeros_like(when)]
@@ -112,7 +116,7 @@ class Draft:
         self._moving.add(way, size, berth)
 
     def stand(self, kind: str, pose: Floats) -> bool:
-        """Put a body at a pose (3,) if there is room; says whether there was."""
+        """Put a body at a pose (3,) if there is room. Says whether there was."""
         way = pose.reshape(1, 3)
         size = _footprint(kind)
         if (
@@ -126,10 +130,11 @@ class Draft:
         return True
 
     def move(self, kind: str, way: Floats, berth: float) -> bool:
-        """Let a body follow a way (t, 3) if nothing ever stands or passes there; says whether it
+        """Let a body follow a way (t, 3) if nothing ever stands or passes there. Says whether it
         could.
         """
         size = _footprint(kind)
+        # What stands must leave room on both sides. What moves has a berth of its own.
         if self._fixed.meets(
             way, (size[0] + 2 * SQUEEZE_M, size[1] + 2 * SQUEEZE_M)
         ) or self._moving.meets(way, size):

@@ -1,9 +1,9 @@
 """Who drives: the ego on its script, highway-env traffic on every road, and the flow that fills the
 lanes.
 
-Each road has a traffic of its own, unrolled onto a straight line and rolled back onto the road's
-curve; highway-env's cost grows with the square of the vehicles on a road. The lane of a bend that
-is not the reference line is a few per cent longer or shorter than its unrolled one.
+Each road has a traffic of its own, because highway-env's cost grows with the square of the vehicles
+on a road. It drives on a straight line, which is then laid along the road's curve. In a bend the
+lane beside the reference line is a few per cent longer or shorter than the straight one.
 """
 
 from dataclasses import dataclass
@@ -20,20 +20,26 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 EGO_CRUISE_MPS: Range = (3.5, SPEED_LIMIT_MPS)
-EGO_HALT_CHANCE, EGO_HALT_AT_S, EGO_HALT_S = 0.5, (3.0, 14.0), (3.0, 8.0)
+EGO_HALT_CHANCE = 0.5
+EGO_HALT_AT_S: Range = (3.0, 14.0)
+EGO_HALT_S: Range = (3.0, 8.0)
 """The ego cruises; in every other scene it comes to rest once, as before a light. Together with the
 cruising speeds that makes about 16 km/h on average, that of the drives of nuScenes (Caesar et al.
 2020, Sec. 2)."""
-EGO_BRAKING_MPS2, EGO_STARTING_MPS2 = 2.0, 1.5
+EGO_BRAKING_MPS2 = 2.0
+EGO_STARTING_MPS2 = 1.5
 """Comfortable: less than half of what the closed loop's controller brakes with, and a usual start
 in town.
 """
 
 FLOW_PER_H: Range = (200.0, 400.0)
-"""Vehicles an hour in a direction of the main road: half the 400 to 800 of both that RASt 06 gives
-for a collector street. Their spacing is exponential beyond HEADWAY_S (Cowan 1975)."""
+"""Vehicles per hour and direction of the main road: half of the 400 to 800 that RASt 06 gives for
+both directions of a collector street. Their spacing is exponential beyond HEADWAY_S (Cowan 1975).
+"""
 SIDE_FLOW_PER_H: Range = (50.0, 200.0)
-"""In a side street: up to the 400 an hour in both directions of a residential street (RASt 06)."""
+"""In a side street: up to half of the 400 per hour that RASt 06 gives for both directions of a
+residential street.
+"""
 HEADWAY_S = 3.0
 """Least time between vehicles: what the IDM drivers keep in equilibrium at 30 km/h, so that nobody
 brakes at once.
@@ -70,20 +76,20 @@ def ego_speeds(rng: np.random.Generator) -> Floats:
     cruise = draw(rng, EGO_CRUISE_MPS)
     halts = rng.random() < EGO_HALT_CHANCE
     begins = draw(rng, EGO_HALT_AT_S)
+    # All is drawn even if the ego does not halt, so that the draws after it stay the same.
     ends = begins + cruise / EGO_BRAKING_MPS2 + draw(rng, EGO_HALT_S)
     speeds = [cruise]
     for time in TIMES[:-1]:
         wanted = 0.0 if halts and begins <= time < ends else cruise
-        least, most = (
-            speeds[-1] - EGO_BRAKING_MPS2 * STEP_S,
-            speeds[-1] + EGO_STARTING_MPS2 * STEP_S,
-        )
+        least = speeds[-1] - EGO_BRAKING_MPS2 * STEP_S
+        most = speeds[-1] + EGO_STARTING_MPS2 * STEP_S
         speeds.append(float(np.clip(wanted, least, most)))
     return np.array(speeds)
 
 
 def drive_main(draft: Draft, plan: Plan) -> Drive:
     """Drive the ego and the main road's traffic; the ego's way is kept clear of walkers."""
+    # The order of the draws is part of what a seed means, here and below.
     speeds = ego_speeds(draft.rng)
     reach = float(speeds.sum() * STEP_S)
     traffic = Traffic(
@@ -102,10 +108,8 @@ def drive_main(draft: Draft, plan: Plan) -> Drive:
 
 
 def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
-    """Drive a side street's traffic: some leave along it, some come up to the main road and give
-    way.
-
-    They wait before its pavement.
+    """Drive a side street's traffic. Some leave along it. Some come up to the main road, give way
+    and wait before its pavement.
     """
     road = joining.road
     nearest = main.side(joining.sign).boundary_m
@@ -117,6 +121,7 @@ def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
     drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [
         _driver(draft, traffic, s, 1) for s in coming
     ]
+    # The line is where the middle of the first vehicle stops with its bumper before the pavement.
     if coming:
         first = CATALOGUE[drivers[len(leaving)][0]]
         traffic.add_stop_line(nearest + first.size[0] / 2, 1)
@@ -137,13 +142,14 @@ def _queue(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
 
 
 def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
-    """Those who come towards the ego, as far away as they may yet meet it."""
+    """Those who come towards the ego, from as far as they can still meet it."""
     farthest = reach + BEYOND_M + SPEED_LIMIT_MPS * float(TIMES[-1])
     return [_driver(draft, traffic, s, 1) for s in _places(draft, FLOW_PER_H, -BEYOND_M, farthest)]
 
 
 def _places(draft: Draft, flow_per_h: Range, first: float, last: float) -> list[float]:
     """Places along a lane, from `first` to `last`, of vehicles that flow at the speed limit."""
+    # Cowan's headway: a least one, and an exponential rest with the mean that the flow asks for.
     mean_s = 3600.0 / draw(draft.rng, flow_per_h)
     places = []
     place = first + draft.rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
@@ -168,6 +174,7 @@ def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | Non
     ways = np.empty((len(TIMES), len(vehicles), 3))
     for sample in range(len(TIMES)):
         ways[sample] = np.array([vehicle.pose for vehicle in vehicles]).reshape(-1, 3)
+        # The ego gets the acceleration that brings it to its next scripted speed.
         if ego_speeds is not None and sample + 1 < len(TIMES):
             vehicles[0].accelerate((ego_speeds[sample + 1] - ego_speeds[sample]) / STEP_S, STEP_S)
         traffic.step(STEP_S)
@@ -176,6 +183,7 @@ def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | Non
 
 def _drive(curve: Curve, way: Floats, speeds: Floats) -> Drive:
     along = way[:, 0]
+    # The ego keeps to the reference line, so its yaw rate is the line's curvature times its speed.
     rates = [
         speed * curve.curvature_at(s)
         for s, speed in zip(along.tolist(), speeds.tolist(), strict=True)

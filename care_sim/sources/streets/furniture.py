@@ -11,8 +11,8 @@ from care_sim.sources.streets.layouts import Joining, Plan, Road, Side
 from care_sim.world.bodies import CATALOGUE
 
 OCCUPANCY: Range = (0.1, 0.85)
-"""Share of a parking lane that is taken, drawn a side: from a nearly empty street up to the 85 % at
-which Shoup (2005, The High Cost of Free Parking) calls one full."""
+"""Share of a parking lane that is taken, drawn per side: from a nearly empty street up to the 85%
+at which Shoup (2005, The High Cost of Free Parking) calls one full."""
 PARKING_GAP_M: Range = (0.6, 1.6)
 """Between bumpers: with the mean car, the 5.7 m that RASt 06 gives a vehicle along the kerb."""
 PARKED_KINDS = {"car": 0.86, "van": 0.09, "truck": 0.05}
@@ -23,7 +23,8 @@ OFF_LINE: Range = (-0.03, 0.03)
 """How far a parked vehicle stands off the middle of its lane, metres, and off its direction,
 radians.
 """
-YARD_CHANCE, YARD_M = 0.2, (3.0, 7.0)
+YARD_CHANCE = 0.2
+YARD_M: Range = (3.0, 7.0)
 """Between two blocks of a closed front, now and then: an entrance to a yard."""
 HOUSE_GAP_M: Range = (6.0, 12.0)
 """Between detached houses: twice the 3 m that German building codes keep from a boundary, and a
@@ -35,7 +36,7 @@ GATE_CHANCE = 0.5
 CORNER_M = 5.0
 """Nobody parks nearer to a junction (StVO, Sec. 12)."""
 BUS_STOP_CHANCE = 0.25
-"""A stop every 400 m, as is usual in town, and some 100 m of street a scene."""
+"""A stop every 400 m, as is usual in town, and some 100 m of street per scene."""
 CLOSE_M = 0.02
 """Between things that touch."""
 START_M: Range = (0.0, 3.0)
@@ -50,6 +51,8 @@ Span = tuple[float, float]
 
 def furnish(draft: Draft, plan: Plan, span: Span) -> None:
     """Fill the main road over `span` (metres along it), and its side streets."""
+    # What must stay free comes first, then the bus, which is longer than most gaps between the
+    # rest.
     for joining in plan.joinings:
         _keep_mouth_clear(draft, joining, plan.main)
     if draft.rng.random() < BUS_STOP_CHANCE:
@@ -68,8 +71,11 @@ def furnish(draft: Draft, plan: Plan, span: Span) -> None:
 
 def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road) -> None:
     """Keep a side street's carriageway free, and the main road's parking lane at its corners."""
-    road, (right, left) = joining.road, joining.road.sides
+    road = joining.road
+    right, left = road.sides
     kerb = main.side(joining.sign).kerb_m
+    # A rectangle across the main road's half, as wide as the side street and two corners, and one
+    # along the side street's lanes.
     corners = right.kerb_m + left.kerb_m + 2 * CORNER_M
     draft.reserve(road.curve.to_world(np.array([kerb / 2, road.middle_d, 0.0])), (kerb, corners))
     middle = (left.lane_edge_m - right.lane_edge_m) / 2
@@ -87,9 +93,9 @@ def _stop_bus(draft: Draft, road: Road, span: Span) -> None:
 
 @dataclass(frozen=True)
 class _Row:
-    """Bodies one behind another at `d`, facing `heading`: draws of the next kind (None leaves a
-    car's room) and of the next gap; how far they stand `off` the row, metres, and `turned` off it,
-    radians.
+    """Bodies one behind another at `d`, facing `heading`. `next_kind` draws a kind (None leaves the
+    room of a car), `next_gap` a gap. They stand `off` the row by some metres, and are `turned` off
+    it by some radians.
     """
 
     d: float
@@ -100,10 +106,12 @@ class _Row:
     turned: Range = (0.0, 0.0)
 
     def fill(self, draft: Draft, road: Road, span: Span) -> None:
-        """Fill the row from end to end; what finds no room tries further on."""
+        """Fill the row from end to end. What finds no room is tried further on."""
         s = span[0] + draw(draft.rng, START_M)
         kind = self.next_kind()
         while s < span[1]:
+            # Metres along the line: beside it a bend makes them shorter or longer, so the length
+            # that is kept free is the larger.
             length = CATALOGUE[kind or "car"].size[0] * (
                 1 + abs(road.curve.curvature_at(s) * self.d)
             )
@@ -138,8 +146,8 @@ def _outside(edge_m: float, side: Side, kind: str, next_gap: Callable[[], float]
 
 
 def _park(draft: Draft, road: Road, side: Side, span: Span) -> None:
-    """Fill a parking lane; the taken share of it is drawn a side. Vehicles face as the nearest lane
-    leads.
+    """Fill a parking lane, of which a share is taken that is drawn per side. Vehicles face as the
+    nearest lane leads.
     """
     rng = draft.rng
     occupancy = draw(draft.rng, OCCUPANCY)
@@ -158,5 +166,5 @@ def _park(draft: Draft, road: Road, side: Side, span: Span) -> None:
 
 
 def _now_and_then(rng: np.random.Generator, chance: float, gap: Range) -> float:
-    """A gap by chance, else none to speak of."""
+    """A drawn gap with a `chance`, else the least there is."""
     return draw(rng, gap) if rng.random() < chance else CLOSE_M

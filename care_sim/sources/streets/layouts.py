@@ -1,5 +1,5 @@
-"""Road layouts: which roads a scene has and how they are divided. Drawn first; everything else is
-placed on them.
+"""Road layouts: which roads a scene has and how they are divided. They are drawn first, and
+everything else is placed on them.
 
 A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right.
 Widths follow the German RASt 06 (directives for urban streets), as in `care_sim.scenarios.base`.
@@ -165,6 +165,8 @@ LAYOUTS: dict[str, Callable[[np.random.Generator], Plan]] = {
 def _joining(rng: np.random.Generator, at: float, sign: int) -> Road:
     """A two-way side street; its carriageway meets the main line at `at`."""
     heading = sign * draw(rng, JUNCTION_ANGLE)
+    # The line is the middle of the right lane. Half a lane to the right of `at` it leaves the
+    # middle between both lanes at `at`.
     start: Pose = (
         at + LANE_WIDTH_M / 2 * float(np.sin(heading)),
         -LANE_WIDTH_M / 2 * float(np.cos(heading)),
@@ -181,6 +183,8 @@ def _road(
 ) -> Road:
     if cycles is None:
         cycles = (CYCLE_LANE_M,) * 2 if rng.random() < EVEN_CHANCE else (0.0, 0.0)
+    # The reference line is the middle of the rightmost lane: half a lane from the right edge. The
+    # draws go from right to left.
     right, left = (
         Side(
             sign,

@@ -13,28 +13,31 @@ from care_sim.sources.streets.draft import TIMES, Draft
 from care_sim.sources.streets.furniture import Span
 from care_sim.sources.streets.layouts import EVEN_CHANCE, Road, Side
 
-WALKING_MPS, WALKING_SPREAD_MPS = 1.34, 0.26
+WALKING_MPS = 1.34
+WALKING_SPREAD_MPS = 0.26
 """Speeds of people on foot: normal (Weidmann 1993, Transporttechnik der Fussgaenger), cut at two
 spreads.
 """
-CYCLING_MPS, CYCLING_SPREAD_MPS = 4.25, 0.9
+CYCLING_MPS = 4.25
+CYCLING_SPREAD_MPS = 0.9
 """15.3 km/h, the mean of conventional bicycles in the German Naturalistic Cycling Study (Schleinitz
 et al. 2017); the spread is a fifth of it, as that of people on foot. Cut at two spreads."""
 PEOPLE_PER_100M: Range = (1.0, 8.0)
-"""People on 100 m of one pavement, drawn a scene. nuScenes annotates 6.4 people a keyframe (218
+"""People on 100 m of one pavement, drawn per scene. nuScenes annotates 6.4 people per keyframe (218
 thousand in 34 thousand). Two pavements within 50 m are 200 m, and half of the people there are
 hidden, behind parked vehicles and each other: 6.4 on 100 m would make as many, and not all that
 nuScenes annotates are that near."""
 STANDING_SHARE = 0.28
 """Annotations of people in nuScenes with attribute standing or sitting: 60 of 218 thousand."""
-CROSSERS, EMERGING = 2.5, 2.5
-"""Mean number of people a scene who cross the main road, and who step out of a yard or a garden:
-chosen so that most scenes have a few of either. Poisson."""
+CROSSERS = 2.5
+EMERGING = 2.5
+"""Mean number of people per scene who cross the main road, and who step out of a yard or a garden:
+chosen so that most scenes have a few of either. Both are Poisson."""
 CYCLISTS_PER_H: Range = (20.0, 100.0)
-"""An hour on a cycle lane: from the 11 % of all trips (Mobilitaet in Deutschland 2017) beside a
-weak traffic to twice that beside a strong one."""
+"""Per hour on a cycle lane: from the 11% of all trips (Mobilitaet in Deutschland 2017) beside weak
+traffic to twice that beside strong traffic."""
 BICYCLES_PER_100M = 0.2
-"""Bicycles that stand on 100 m of pavement. nuScenes annotates 0.26 a keyframe without a rider
+"""Bicycles that stand on 100 m of pavement. nuScenes annotates 0.26 per keyframe without a rider
 (8,946 in 34 thousand) on 200 m of pavement, and a third of them are hidden."""
 PERSON_BERTH_M = 0.1
 PAVEMENT_MARGIN_M = 0.5
@@ -42,7 +45,8 @@ PAVEMENT_MARGIN_M = 0.5
 Manual).
 """
 TRIES = 40
-"""Ways drawn for one person until one is free; then the person stays at home."""
+"""Ways that are drawn for one person until one is free. Without a free one the person is left out.
+"""
 
 
 def populate(draft: Draft, road: Road, span: Span) -> None:
@@ -59,6 +63,7 @@ def _populate_side(
 ) -> None:
     hundreds = (span[1] - span[0]) / 100.0
     people = draft.rng.poisson(people_per_100m * hundreds)
+    # Those who stand come first: they need a place, and who walks can go round them.
     standing = draft.rng.binomial(people, STANDING_SHARE)
     for _ in range(standing):
         _stand(draft, "pedestrian", lambda: _waiting(draft, road, side, span))
@@ -79,6 +84,7 @@ def cross_and_emerge(draft: Draft, road: Road, span: Span) -> None:
 
 
 def _walk_about(draft: Draft, draw_way: Callable[[], Floats]) -> None:
+    # The first way that is free ends the tries.
     any(draft.move("pedestrian", draw_way(), PERSON_BERTH_M) for _ in range(TRIES))
 
 
@@ -93,6 +99,8 @@ def _speed(rng: np.random.Generator, mean: float, spread: float) -> float:
 def _walk(draft: Draft, road: Road, *corners: tuple[float, float], passes: float) -> Floats:
     """The path of a person past `corners`; at a random time `passes` metres of it are done."""
     speed = _speed(draft.rng, WALKING_MPS, WALKING_SPREAD_MPS)
+    # Back from the moment at which `passes` metres are done to that of the first one, which may lie
+    # before the scene.
     starts = draft.rng.uniform(0.0, float(TIMES[-1])) - passes / speed
     return Walked(road.curve, corners, speed, float(starts)).poses(TIMES)
 
@@ -105,7 +113,8 @@ def _waiting(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
 
 def _strolling(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
     """Along a pavement."""
-    s, d = draft.rng.uniform(*span), _pavement_d(draft, side)
+    s = draft.rng.uniform(*span)
+    d = _pavement_d(draft, side)
     ahead = float(draft.rng.choice((-1, 1))) * _far()
     return _walk(draft, road, (s - ahead, d), (s + ahead, d), passes=_far())
 
@@ -124,7 +133,8 @@ def _crossing(draft: Draft, road: Road, span: Span) -> Floats:
 def _emerging(draft: Draft, road: Road, span: Span) -> Floats:
     """From between the houses straight to the pavement, and on along it."""
     side = road.sides[int(draft.rng.integers(2))]
-    s, d = draft.rng.uniform(*span), _pavement_d(draft, side)
+    s = draft.rng.uniform(*span)
+    d = _pavement_d(draft, side)
     depth = side.sign * (side.front_m + 5.0)
     after = float(draft.rng.choice((-1, 1))) * _far()
     return _walk(draft, road, (s, depth), (s, d), (s + after, d), passes=abs(depth - d))
@@ -139,10 +149,13 @@ def _leaning(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
 
 
 def _cycle(draft: Draft, road: Road, side: Side, span: Span) -> None:
-    """Cyclists on one cycle lane, with the traffic on their right-hand side of the road."""
+    """Cyclists on one cycle lane. They keep right: along the line on its right side, against it on
+    its left.
+    """
     per_m = draw(draft.rng, CYCLISTS_PER_H) / 3600.0 / CYCLING_MPS
     along = -side.sign
     reach = along * 2 * CYCLING_MPS * float(TIMES[-1])
+    # Also those who come into the span during the scene: they start as far before it as they get.
     for _ in range(draft.rng.poisson(per_m * (span[1] - span[0] + abs(reach)))):
         s = draft.rng.uniform(min(span[0], span[0] - reach), max(span[1], span[1] - reach))
         speed = _speed(draft.rng, CYCLING_MPS, CYCLING_SPREAD_MPS)

@@ -35,9 +35,9 @@ def record(
     """The film of a street. `Cloud.objects` and `Annotations.objects` are the columns of
     `street.poses`.
 
-    An object is annotated at a keyframe where a return of the full sweep lies on it or a camera
-    shows it: nuScenes scores what has at least one LiDAR or radar point, and nobody could have seen
-    what is wholly hidden. The street knows what is wholly hidden as well: who is so at its first
+    An object is annotated at a keyframe if a return of the full sweep lies on it or a camera shows
+    it. So does nuScenes, which scores what has at least one LiDAR or radar point; nobody could have
+    seen what is wholly hidden. The street knows those too: who is wholly hidden at its first
     keyframe is in `Film.hidden`.
     """
     grid = grid or AngularGrid()
@@ -50,9 +50,9 @@ def record(
 
 
 def street_film(seed: int, secret: str = "") -> Film:
-    """The film of the street of a seed; the last one is kept, for policies that meet the same
-    street in turn. With a secret it is another street, of a seed that cannot be told; its name says
-    no more than that.
+    """The film of the street of a seed. The last one is kept, for policies that meet the same
+    street in turn. With a secret it is another street, whose seed cannot be guessed. Its name
+    tells the given seed, and not the layout.
     """
     return _street_film(seed, secret)
 
@@ -69,7 +69,7 @@ def _street_film(seed: int, secret: str) -> Film:
 
 
 class _Stage:
-    """The bodies of a street in a simulator: each enters when it first comes near, then follows its
+    """The bodies of a street in a simulator. Each enters when it first comes near, then follows its
     way.
     """
 
@@ -91,6 +91,7 @@ class _Stage:
         x, y, yaw = street.ego[keyframe].tolist()
         sensor = Frame.mounted((x, y, yaw), LIDAR_POSITION)
         near = self._set_up(keyframe, sensor)
+        # Everything near may hide something; what has a class is reported and annotated.
         everything = sensor.boxes_to_local(self._boxes(keyframe, near))
         reported = self._classes[near] != NOBODY
         labelled = near[reported]
@@ -101,6 +102,7 @@ class _Stage:
         swept = full_sweep(self._world, grid, sensor, everything, LIDAR_POSITION[2])
         identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
+        # Seen by the full sweep or by a camera, whatever a policy will fire later.
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
@@ -113,13 +115,16 @@ class _Stage:
         ), hidden
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Cells:
-        """Put every body that is near where it is now; returns their numbers, ascending."""
+        """Put every body that is near where it is now. Returns their numbers, ascending."""
         poses = self._street.poses[keyframe]
+        # From the sensor to the circle round the footprint, which holds it however it is turned.
         apart = (
             np.hypot(poses[:, 0] - sensor.x, poses[:, 1] - sensor.y)
             - np.hypot(*self._sizes[:, :2].T) / 2
         )
         (near,) = np.nonzero(apart < SIGHT_M)
+        # Bodies that were near once stay in the world and are moved on; those that stand need not
+        # be.
         placed = np.array([*self._bodies], np.int64)
         moved = placed[np.any(poses[placed] != self._street.poses[keyframe - 1, placed], axis=1)]
         self._world.move_all(

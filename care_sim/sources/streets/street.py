@@ -5,7 +5,7 @@ Every number stands with its reason where it is used, and all were fixed before 
 Counts of nuScenes are those of its annotations in trainval (34,149 keyframes), by class and
 attribute. On seeds 2000 to 2023, which belong to neither list below, a scene has 26 first sightings
 within 50 m, where nuScenes has 28 (31 with `presence="visible"` of
-`care_sim.evaluation.sightings`), and 22 annotated objects a keyframe within 50 m, where nuScenes
+`care_sim.evaluation.sightings`), and 22 annotated objects per keyframe within 50 m, where nuScenes
 has 24 of the five classes at all ranges.
 """
 
@@ -27,8 +27,8 @@ EVALUATION_SEEDS = tuple(range(150))
 among them.
 """
 CALIBRATION_SEEDS = tuple(range(1000, 1020))
-"""20 other scenes, for whatever is to be set before the evaluation; far away, so that neither list
-grows into the other."""
+"""20 other scenes, for whatever is to be set before the evaluation. They are far away, so that
+neither list grows into the other."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,13 @@ def street_name(seed: int) -> str:
 
 
 def make_street(seed: int) -> Street:
-    """The street of a seed. Layouts come in turn, everything else is drawn; nothing outside the
+    """The street of a seed. Layouts come in turn, everything else is drawn. Nothing outside the
     seed enters.
     """
     layout = _layout(seed)
+    # Each part has a stream of its own, so that a change in one does not draw the others anew. What
+    # drives comes before what stands and who walks: they find room round the traffic, not it round
+    # them.
     plans, traffic, furniture, people = (
         np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(4)
     )
@@ -85,6 +88,7 @@ def make_street(seed: int) -> Street:
         ),
     ):
         populate(draft, road, reach)
+    # Ways are sampled more often than keyframes come, for the tests of room.
     every = round(STREET_KEYFRAME_S / STEP_S)
     poses = np.stack(draft.ways, axis=1)[::every]
     return Street(
