@@ -17,6 +17,7 @@ IDS = CLOSED_LOOP | OPEN_LOOP
 
 def register_all() -> None:
     """Register every environment that is not registered yet."""
+    # As strings: an environment and what it needs are imported when one is made.
     for name, entry_point in IDS.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point=entry_point)

@@ -24,7 +24,7 @@ from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.world.world import WORLD_STEP_S, whole_steps
 
 LONGEST_KEYFRAME_S = 1.0
-"""A car at 30 km/h would be 8 m further on, past what it brakes for."""
+"""In a longer keyframe a car at 30 km/h drives more than 8 m, past what it brakes for."""
 
 
 class ClosedLoopEnv(SensingEnv[ClosedLoop]):
@@ -134,7 +134,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed.
 
-        `info` holds the seed that repeats the episode, unless `scoring_info` is off; there are no
+        `info` holds the seed that repeats the episode, unless `scoring_info` is off. There are no
         `options`.
         """
         super().reset(seed=seed)
@@ -155,11 +155,14 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """
         loop = self.loop
         fired = self.chosen(action)
+        # A scan of every cell costs rays, so it is cast only while the term counts and is unknown.
+        # It is cast before the keyframe, which moves the world on.
         measured = bool(self._weights["gain"]) and self._potential.bound_m is None
         detectable = measured and loop.detectable()
         frame = loop.keyframe(fired)
         self.keyframes.append(frame)
         terminated = frame.impact_speed_mps is not None
+        # Time is a sum of steps and may lack the last bits of the duration.
         truncated = loop.world.time >= self.scenario.duration_s - 1e-9
         self._over = terminated or truncated
         terms = self._terms(frame, detectable)
@@ -182,8 +185,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             self._running = None
 
     def _pool(self, entropy: int) -> BoxPool:
-        """Of false boxes, if there are any: another world of this scenario, of a stream of its own,
-        so that nothing of it tells of this episode's.
+        """The boxes that false ones are drawn from, if there are any: those of another drive
+        through this scenario. Its stream is its own, so that nothing in it tells of this episode.
         """
         if not self.conditions.false_positive_rate:
             return EMPTY_POOL

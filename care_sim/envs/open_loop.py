@@ -24,7 +24,7 @@ from care_sim.perception.detectors import PROXY, check_detector, make_detector
 from care_sim.viewer.pictures.scene_from_above import draw_plan
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
-"""Conditions that a film, once made, cannot take on."""
+"""Conditions that a film cannot take on once it is made."""
 
 
 class OpenLoopEnv(SensingEnv[OpenLoop]):
@@ -99,6 +99,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         super().__init__(
             conditions, cameras, sensor_height_m, budget, keyframe_s, secret, scoring_info
         )
+        # The proxy has a threshold that is a condition; other detectors have parameters of their
+        # own.
         own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
         if not isinstance(detector_parameters, Mapping | None):
             raise InvalidInput(
@@ -122,6 +124,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """Begin an episode over a film. Camera faults, noise and floor have independent streams,
         which the scene's name and the seed decide.
         """
+        # By name: recorded scenes are all played with one seed, and should not share their faults.
         camera, lidar, floor, odometry = self.streams(seed, crc32(film.name.encode()), count=4)
         self._sightings = _sightings(film, self.presence)
         self.keyframes = []
@@ -146,6 +149,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         info = self.told(own, {"objects": len(scored), "found": int(scored.sum())})
         if self._over:
             info["outcome"] = asdict(self.score.tally())
+        # Nobody to be found is nobody missed.
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
         return self.observed(), reward, False, self._over, info
 
@@ -163,8 +167,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
 
 class FilmEnv(OpenLoopEnv):
-    """The open loop over a film that is there already; `care_sim.study` plays all policies of a
-    scene so.
+    """The open loop over a film that is there already. `care_sim.study` plays all policies of a
+    scene in it.
     """
 
     def __init__(self, film: Film, **parameters: Any):
@@ -192,6 +196,7 @@ def check_film_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -
     check_arguments(kind.__name__, parameters, known)
 
 
+# All policies of a scene play one film, whose sightings are the same for all.
 @lru_cache(maxsize=1)
 def _sightings(film: Film, presence: str) -> Sightings:
     return Sightings.of(

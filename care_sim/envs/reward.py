@@ -19,10 +19,10 @@ REWARD_WEIGHTS: dict[str, float] = {
     "gain": 0.0,
 }
 """Default weight of every term. `gain` is off, since the reward of these environments was published
-without it; then it is not measured, which would cost rays, and reads 0."""
+without it. It is then not measured, which would cost rays, and reads 0."""
 
 HEAVIEST = 1e6
-"""A return stays far from where sums of floats lose the other terms."""
+"""Returns stay small enough that sums of floats do not lose the other terms."""
 
 
 def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
@@ -67,8 +67,8 @@ def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> 
 
 
 class Potential:
-    """The share of the full-scan bound that is lost so far, as a potential; one instance an
-    episode.
+    """The share of the full-scan bound that is lost so far, as a potential. One instance lives as
+    long as an episode.
 
     The bound is the distance at the first keyframe at which a scan of every cell would have
     detected the first-sighting actor. From then on, while it is undetected, 1 - distance / bound is
@@ -84,13 +84,14 @@ class Potential:
         self._found = False
 
     def lost(self, frame: Keyframe, detectable: bool, over: bool) -> float:
-        """By how much the potential grows at a keyframe, at which a scan of every cell would detect
-        the actor, or not; `over`: the episode ends with it.
+        """By how much the potential grows at a keyframe. `detectable` says whether a scan of every
+        cell would detect the actor, `over` whether the episode ends with this keyframe.
         """
         before = self._lost
         if self.bound_m is None and (detectable or frame.detected):
             self.bound_m = frame.distance_m
         if self.bound_m is not None and not self._found:
+            # A car that comes nearer loses more; one that moves away again wins nothing back.
             all_of_it = over and not frame.detected
             self._lost = 1.0 if all_of_it else max(before, 1.0 - frame.distance_m / self.bound_m)
         self._found |= frame.detected

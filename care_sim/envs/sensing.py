@@ -89,17 +89,15 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return EpisodeTruth(lambda: self.loop)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Begin the environment's own generator anew where there is a seed. Raises InvalidInput
-        unless it is a whole number of 0 to 2^63 - 1.
+        """Begin the environment's own generator anew if a seed is given. Raises InvalidInput unless
+        it is a whole number from 0 to 2^63 - 1.
         """
         if seed is not None:
             check_seed(seed)
             super().reset(seed=int(seed))
 
     def entropy(self, seed: int | None) -> int:
-        """The seed of an episode: the given one, else one that the environment's own generator
-        draws.
-        """
+        """The seed of an episode: the given one, or else a draw of the environment's own generator."""
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
@@ -107,8 +105,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return streams(entropy, count, self._secret)
 
     def told(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
-        """`info`: what the car itself knows, and, unless `scoring_info` is off, what only the
-        scoring may.
+        """`info`: what the car itself knows and, unless `scoring_info` is off, what only the
+        scoring may know.
         """
         return own | scoring if self.scoring_info else own
 
@@ -125,9 +123,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def belief(self) -> Belief:
-        """What the last observation said, for wrappers, whatever was made of it since; raises as
-        `loop` does.
-        """
+        """What the environment itself observes, without wrappers. Raises as `loop` does."""
         return Belief.from_observation(self.observed())
 
     def chosen(self, action: Action) -> Cells:
@@ -138,7 +134,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
+        # A copy, since the caller may write into an action once it is taken.
         self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
+        # Drawn at every keyframe, used or not: all policies then meet the same floor.
         floor = self._floor.next()
         return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
 
@@ -150,8 +148,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
 
 def conditions_of(parameters: dict[str, Any]) -> Conditions:
-    """The conditions among keyword arguments, which lose them. Raises InvalidInput for a value not
-    allowed.
+    """The conditions among keyword arguments, which are taken out of `parameters`. Raises
+    InvalidInput for a value that is not allowed.
     """
     names = [name for name in parameters if name in Conditions.__dataclass_fields__]
     return Conditions(**{name: parameters.pop(name) for name in names})
@@ -159,6 +157,7 @@ def conditions_of(parameters: dict[str, Any]) -> Conditions:
 
 def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
     """What an environment's class takes by name: its own arguments and the conditions."""
+    # Each class of the family names some arguments and hands the rest on.
     made = [
         vars(one)["__init__"]
         for one in kind.__mro__

@@ -38,6 +38,7 @@ def checked_scores(action: NDArray[np.floating], shape: tuple[int, int]) -> NDAr
         raise InvalidInput(f"action must have shape {shape} (rows, columns), got {scores.shape}")
     if scores.dtype.kind not in "biuf":
         raise InvalidInput(f"action must hold numbers, got {scores.dtype}")
+    # What overflows float32 becomes infinite, and is refused below.
     with np.errstate(over="ignore"):
         scores = scores.astype(np.float32, copy=False)
     if not np.isfinite(scores).all():

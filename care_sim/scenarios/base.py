@@ -10,7 +10,7 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
 Range = tuple[float, float]
-"""Low and high; the seed draws evenly between them."""
+"""Low and high. The seed draws uniformly between them."""
 
 LONGEST_EPISODE_S = 60.0
 """The longest episode: a car at 60 km/h then comes to the end of the road, and a delayed picture is
@@ -59,6 +59,7 @@ def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
     view.
     """
     length, depth, _ = CATALOGUE["terrace"].size
+    # They begin 30 m behind the ego's first position.
     middle = length / 2 - 30.0
     world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0), backdrop=True)
     world.add("terrace left", "terrace", (middle, left_y + depth / 2, 0.0), backdrop=True)

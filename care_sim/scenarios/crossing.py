@@ -34,7 +34,7 @@ OCCLUDERS = ("trailer", "truck", "van", "hoarding")
 
 @dataclass(frozen=True)
 class CrossingScenario(Scenario):
-    """A two-way street with a parking lane on each side. The occluder stands in the right one; the
+    """A two-way street with a parking lane on each side. The occluder stands in the right one. The
     person waits hidden behind its far end, then runs straight across to the far kerb.
 
     Perception does not report the occluder: a trailer or a hoarding is none of the five classes.
@@ -47,12 +47,12 @@ class CrossingScenario(Scenario):
     occluder_reported: bool = False
     ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     crossing_m: Range = bounded((37.0, 41.0), 5, 200)
-    """From the ego's first position to the person's line: four to five seconds of approach, so that
-    every track has settled."""
+    """From the ego's first position to the person's line. That is four to five seconds of approach,
+    in which every track settles."""
     gap_m: Range = bounded((0.8, 1.2), 0.05, 20)
     """From the end of the occluder to the person's line: about a step."""
     run_mps: Range = bounded((2.6, 2.8), 0.1, 12.5)
-    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050); no
+    """A run of 6 mph, the ten-minute mile (Compendium of Physical Activities 2011, code 12050). No
     sprinter exceeds 12.5."""
     run_up_mps2: float = bounded(5.0, 0.1, 20)
     """Full speed after half a second and 0.7 m, all of it in the occluder's shade."""
@@ -61,8 +61,8 @@ class CrossingScenario(Scenario):
     encroachment_s: Range = bounded((0.3, 0.6), -10, 10)
     """Post-encroachment time (Allen, Shin and Cooper 1978) of an ego that never brakes: a near
     miss. Above 0 nobody is hit by a car that does nothing, so a collision can only come from the
-    braking; below 0 is a collision course. Both bounds were picked, from geometry alone, so that a
-    full scan sees the person at about the distance of the paper's, 15 m.
+    braking. Below 0 is a collision course. Both bounds were picked, from geometry alone, so that a
+    full scan sees the person at about the paper's distance, 15 m.
     """
 
     def __post_init__(self) -> None:
@@ -76,12 +76,14 @@ class CrossingScenario(Scenario):
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
         # The order of the draws is part of what a seed means.
-        ego_speed, crossing_x = draw(rng, self.ego_speed_mps), draw(rng, self.crossing_m)
+        ego_speed = draw(rng, self.ego_speed_mps)
+        crossing_x = draw(rng, self.crossing_m)
         traffic = Traffic((1, -1), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, ego_speed)
         start_y = self._add_occluder(world, crossing_x, rng)
         self._add_person(world, start_y, crossing_x, ego_speed, rng)
         self.furnish(world, crossing_x, rng)
+        # Houses stand behind the pavements, as far from the street's middle on either side.
         front = LEFT_PARKING_Y + PARKING_WIDTH_M / 2 + PAVEMENT_WIDTH_M
         line_with_terraces(world, LANE_WIDTH_M - front, front)
         return world
@@ -91,7 +93,7 @@ class CrossingScenario(Scenario):
         """Add what else stands or drives in the street."""
 
     def _add_occluder(self, world: World, crossing_x: float, rng: np.random.Generator) -> float:
-        """Park the occluder; returns the y from which a person behind it is in its shade."""
+        """Park the occluder. Returns the y from which a person behind it is in its shade."""
         length, width, _ = CATALOGUE[self.occluder].size
         y = RIGHT_PARKING_Y + draw(rng, self.kerb_offset_m)
         x = crossing_x - draw(rng, self.gap_m) - length / 2
@@ -106,7 +108,8 @@ class CrossingScenario(Scenario):
         ego_speed: float,
         rng: np.random.Generator,
     ) -> None:
-        speed, encroachment = draw(rng, self.run_mps), draw(rng, self.encroachment_s)
+        speed = draw(rng, self.run_mps)
+        encroachment = draw(rng, self.encroachment_s)
         ego_length, ego_width, _ = world.ego_kind.size
         person_length, person_width, _ = CATALOGUE["pedestrian"].size
         # The way from the start until the person's back has left the ego's path, whose middle is 0.

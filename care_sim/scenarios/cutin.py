@@ -23,19 +23,17 @@ from care_sim.world.world import World
 @dataclass(frozen=True)
 class CutIn(Scenario):
     """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the
-    right lane; a car standing hidden before it pulls out (highway-env lane change, IDM) ahead of
-    the ego.
+    right lane. A car stands hidden before the bus and pulls out ahead of the ego (highway-env lane
+    change, IDM).
 
-    The bus is one of the five classes; with `occluder_reported=False` perception does not report
+    The bus is one of the five classes. With `occluder_reported=False` perception does not report
     it. Ranges are drawn uniformly by the seed.
     """
 
     occluder_reported: bool = True
     ego_speed_mps: Range = bounded(USUAL_EGO_SPEED_MPS, *EGO_SPEED_BOUNDS_MPS)
     stop_m: Range = bounded((42.0, 46.0), 5, 200)
-    """From the ego's first position to the front of the bus: far enough for the bus to hide the
-    car.
-    """
+    """From the ego's first position to the front of the bus: so far that the bus hides the car."""
     gap_m: Range = bounded((2.0, 3.0), 0.05, 50)
     """Between bus and car, as behind a bus that has closed up at its stop."""
     pull_out_s: Range = bounded((2.0, 2.5), -10, 20)
@@ -45,10 +43,12 @@ class CutIn(Scenario):
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
         # The order of the draws is part of what a seed means.
-        ego_speed, stop_x = draw(rng, self.ego_speed_mps), draw(rng, self.stop_m)
+        ego_speed = draw(rng, self.ego_speed_mps)
+        stop_x = draw(rng, self.stop_m)
         traffic = Traffic((1, 1), ego_lane=1, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
         world = World(traffic, ego_speed)
-        occluder, car = CATALOGUE["bus"], CATALOGUE["car"]
+        occluder = CATALOGUE["bus"]
+        car = CATALOGUE["car"]
         stop = (stop_x - occluder.size[0] / 2, -LANE_WIDTH_M, 0.0)
         world.add("occluder", "bus", stop, reported=self.occluder_reported)
 

@@ -53,14 +53,15 @@ view at the encounter: a parked row with a gap to walk through, and a double-par
 go on beside and behind the ego, where only the LiDAR sees them. The first `vehicles` are taken."""
 
 FOLLOWER_M = -22.5
-"""A driver follows the ego at the distance that highway-env's IDM keeps at 30 km/h: 10 m and 1.5 s.
+"""A driver follows the ego at the distance that highway-env's IDM keeps at 30 km/h: 10 m plus 1.5
+s.
 """
 
 
 @dataclass(frozen=True)
 class Dense(CrossingScenario):
-    """The street of `CrossingScenario` lined with `vehicles` standing ones, five of which the
-    camera sees when the person appears, and a driver who follows the ego.
+    """The street of `CrossingScenario` lined with `vehicles` standing vehicles, and a driver who
+    follows the ego. The camera sees five of the vehicles when the person appears.
     """
 
     vehicles: int = bounded(7, 0, len(VEHICLE_PLACES))
@@ -69,6 +70,7 @@ class Dense(CrossingScenario):
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
         """Line the street."""
+        # Both jitters of every vehicle are drawn, in this order, as part of what a seed means.
         for number, (kind, kerb, beyond) in enumerate(VEHICLE_PLACES[: self.vehicles]):
             along = draw(rng, self.place_jitter_m)
             across = draw(rng, self.place_jitter_m) / 4

@@ -11,7 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.base.json_text import MOST_BYTES, MOST_LEVELS, json_content, parsed_json
 from care_sim.policies.learned.weights import load_weights
 from care_sim.reports.page.provenance import CONFIG, _description
-from care_sim.sources.nuscenes.tables import LARGEST_TABLE, read_json
+from care_sim.sources.nuscenes.table_files import LARGEST_TABLE, read_json
 from care_sim.study.journal import LARGEST_JOURNAL, Journal
 from care_sim.training.folder import read_config, read_curve
 

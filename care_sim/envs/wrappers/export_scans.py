@@ -35,7 +35,7 @@ UNITS_NOTE = (
     "world frame."
 )
 POINT_BYTES = 4 * 3 + 4 + 1
-"""Of a point in a cloud: three coordinates, cell and share."""
+"""Bytes per point of a cloud: three coordinates, cell and share."""
 
 
 class ExportScans(Watching):

@@ -43,7 +43,7 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; the one before, if it was not played to its end, is closed as it is."""
+        """Begin an episode. One that was left before its end is closed as it is."""
         self._leave(None)
         answer = super().reset(seed=seed, options=options)
         self._watcher = EpisodeWatcher(
@@ -56,10 +56,12 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         if self._watcher is None:
             return super().step(action)
         loop = self._closed_loop.loop
+        # Not at the reset: one that is followed by another reset leaves no empty file.
         if not self._begun:
             self.begin(loop, self._episodes)
             self._begun = True
             self._episodes = self._episodes + 1
+        # Where everything stands is asked before the step, which moves the world on.
         situation = self._watcher.situation()
         self.look(loop)
         answer = super().step(action)
@@ -111,5 +113,6 @@ def numbered(path: Path, episode: int) -> Path:
     """
     if not episode:
         return path
+    # A path such as ".." has no name to number.
     path = path if path.stem.strip(".") else path.resolve()
     return path.with_stem(f"{path.stem}-{episode}")

@@ -22,7 +22,8 @@ from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import NOBODY, Annotations, IdentifiedDetections
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
-from care_sim.sources.nuscenes.tables import Database, JsonRow, read_json
+from care_sim.sources.nuscenes.table_files import JsonRow, read_json
+from care_sim.sources.nuscenes.tables import Database
 
 COCO = {1: "pedestrian", 2: "bicycle", 3: "car", 6: "bus", 8: "truck"}
 """The categories of COCO that the five classes hold."""

@@ -30,7 +30,8 @@ from care_sim.sources.nuscenes.cameras import (
 from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
-from care_sim.sources.nuscenes.tables import Database, JsonRow
+from care_sim.sources.nuscenes.table_files import JsonRow
+from care_sim.sources.nuscenes.tables import Database
 from care_sim.sources.plausible import AWAY_M, MAP_M, MOUNT_M, SIZES_M, quaternion_fault
 
 NUSCENES_KEYFRAME_S = 0.5

@@ -11,7 +11,7 @@ from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.frames import Floats, turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.loops.film import Shot
-from care_sim.sources.nuscenes.tables import JsonRow
+from care_sim.sources.nuscenes.table_files import JsonRow
 
 MODALITIES = {
     "use_camera": True,

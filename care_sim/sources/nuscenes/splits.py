@@ -4,7 +4,8 @@ from pathlib import Path
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
-from care_sim.sources.nuscenes.tables import Database, JsonRow, read_json
+from care_sim.sources.nuscenes.table_files import JsonRow, read_json
+from care_sim.sources.nuscenes.tables import Database
 
 _VAL_NUMBERS = (
     (3, 3),

@@ -1,26 +1,19 @@
 """The JSON tables of a nuScenes v1.0 database. Errors name the file and the token."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import json_content
 from care_sim.core.frames import Floats
+from care_sim.sources.nuscenes.table_files import DROPPED, JsonRow, indexed_rows, read_json
 from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 
-JsonRow = dict[str, Any]
-
 UNBOUNDED: ValueRange = (float("-inf"), float("inf"))
-LARGEST_TABLE = 2**33
-"""Bytes of a file: several times the largest table of all of nuScenes (2.6 million recordings of
-half a kilobyte).
-"""
 
 FIELDS: dict[str, dict[str, type]] = {
     "scene": {"name": str, "first_sample_token": str, "last_sample_token": str},
@@ -165,10 +158,10 @@ class Database:
             return (
                 {name: row[name] for name in kinds if name in row}
                 if self._is_needed(table, row)
-                else _DROPPED
+                else DROPPED
             )
 
-        return _indexed(self.path(table), read_json(self.path(table), taken), kinds)
+        return indexed_rows(self.path(table), read_json(self.path(table), taken), kinds)
 
     def _is_needed(self, table: str, row: JsonRow) -> bool:
         # What lacks the field stays, to be refused with its name. Poses are recorded for every
@@ -203,19 +196,6 @@ class Database:
         return _grouped(boxes)
 
 
-def read_json(path: Path, taken: Callable[[JsonRow], object] | None = None) -> Any:
-    """The content of a JSON file, every map in it replaced by what is `taken` of it.
-
-    Raises InvalidInput for a file that is missing, truncated or larger than `LARGEST_TABLE`.
-    """
-    try:
-        return json_content(path, LARGEST_TABLE, taken)
-    except FileNotFoundError:
-        raise InvalidInput(f"{path}: no such file") from None
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
-
-
 def _check_stamp(path: Path, sample: JsonRow) -> None:
     least, most = (nanoseconds // 1000 for nanoseconds in STAMPS_NS)
     check_whole(f"{path}: timestamp of {sample['token']!r}", sample["timestamp"], least, most)
@@ -229,47 +209,6 @@ def _only_version(root: Path) -> Path:
             f"{root}: must hold one folder v1.0-*, or the version must be named; found: {found}"
         )
     return versions[0]
-
-
-_DROPPED = object()
-"""Stands for a row that was not kept, so that rows are still counted as in the file."""
-
-
-def _indexed(path: Path, content: object, kinds: Mapping[str, type]) -> dict[str, JsonRow]:
-    """The rows by token, once every field is of its kind."""
-    if not isinstance(content, list):
-        raise InvalidInput(f"{path}: must hold a list of rows")
-    for number, row in enumerate(content):
-        if row is _DROPPED:
-            continue
-        if not isinstance(row, dict):
-            raise InvalidInput(f"{path}: row {number} must be a map of fields")
-        for name, kind in kinds.items():
-            # Not isinstance: to Python true is an int.
-            if type(row.get(name)) is not kind:
-                raise InvalidInput(f"{path}: {_what_is_wrong(row, number, name, kind)}")
-    return _by_token(path, [row for row in content if row is not _DROPPED])
-
-
-def _what_is_wrong(row: JsonRow, number: int, name: str, kind: type) -> str:
-    which = f"row {row.get('token') or number}"
-    return (
-        f"{which}: {name} must be {KIND_WORDS[kind]}, got {row[name]!r}"
-        if name in row
-        else f"{which} lacks {name!r}"
-    )
-
-
-KIND_WORDS = {str: "text", int: "a whole number", bool: "true or false", list: "a list"}
-"""What the kinds of values are called."""
-
-
-def _by_token(path: Path, rows: list[JsonRow]) -> dict[str, JsonRow]:
-    indexed = {row["token"]: row for row in rows}
-    if len(indexed) < len(rows):
-        (token, count), *_ = Counter(row["token"] for row in rows).most_common(1)
-        raise InvalidInput(f"{path}: {count} rows with the token {token!r}")
-    return indexed
 
 
 def _grouped(rows: Iterable[JsonRow]) -> dict[str, list[JsonRow]]:
