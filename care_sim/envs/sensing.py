@@ -97,7 +97,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             super().reset(seed=int(seed))
 
     def entropy(self, seed: int | None) -> int:
-        """The seed of an episode: the given one, or else a draw of the environment's own generator."""
+        """The seed of an episode: the given one, or else a draw of the own generator."""
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
     def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
