@@ -15,7 +15,8 @@ from rich.text import Text
 
 from care_sim.base.errors import InvalidInput, printable, report_problems
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
-from care_sim.commands.shared.running import DONE, FAILED, console, playable
+from care_sim.commands.shared.selection import playable
+from care_sim.commands.shared.study_command import DONE, FAILED, console
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.timeline import text

@@ -6,7 +6,8 @@ from pathlib import Path
 from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.play_options import PlayOptions
-from care_sim.commands.shared.running import Running, in_turn, playable
+from care_sim.commands.shared.selection import in_turn, playable
+from care_sim.commands.shared.study_command import StudyCommand
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.play_config import play_grid
 
@@ -25,7 +26,7 @@ _PAPER_POLICIES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Protocol(Running, PlayOptions):
+class Protocol(StudyCommand, PlayOptions):
     """Play the paper's first-sighting protocol: every policy over the same keyframes, on streets or
     recordings.
     """
@@ -69,4 +70,4 @@ class Protocol(Running, PlayOptions):
             raise InvalidInput("none of the policies can be played")
         floors = range(first, first + self.floor_seeds)
         configs = play_grid(source, scenes, policies, self.budgets, floors, latencies, **common)
-        return self.conduct("protocol", configs, self.out, left_out)
+        return self.run_study("protocol", configs, self.out, left_out)

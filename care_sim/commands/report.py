@@ -10,7 +10,7 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import counted, report_problems
 from care_sim.base.extras import check_page
-from care_sim.commands.shared.running import console
+from care_sim.commands.shared.study_command import console
 from care_sim.reports.report import print_report, reported, write_report
 from care_sim.study.executors import CORES, MOST_WORKERS
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options
-from care_sim.commands.shared.running import console
+from care_sim.commands.shared.study_command import console
 from care_sim.envs.wrappers.export_scans import ExportScans
 from care_sim.envs.wrappers.record_rerun import RecordRerun
 from care_sim.policies.base import Policy

@@ -9,8 +9,7 @@ import tyro
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.episode_studies import EpisodeStudy
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options, seeds_of
-from care_sim.commands.shared.running import in_turn, playable
-from care_sim.commands.shared.selection import expanded
+from care_sim.commands.shared.selection import expanded, in_turn, playable
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import grid
 
@@ -53,4 +52,4 @@ class Sweep(EpisodeStudy):
         configs = grid(
             scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common
         )
-        return self.conduct("sweep", configs, self.out, left_out)
+        return self.run_study("sweep", configs, self.out, left_out)

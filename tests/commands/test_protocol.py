@@ -12,7 +12,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.commands.shared.conduct import conduct
+from care_sim.commands.shared.run_study import run_study
 from care_sim.core.conditions import Conditions
 from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_by_setting
@@ -82,7 +82,7 @@ def test_one_policy_alone_is_read_again(source, tmp_path):
     """What differs from the reference is known of no row then: a column of nothing, which is still
     one of counts.
     """
-    assert not conduct(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
+    assert not run_study(small(source, ["care"]), tmp_path / "out", 1, study=PROTOCOL)
     counts = pq.read_table(tmp_path / "out" / PLAYS.file).select(
         ["differing_keyframes", "differing_cells"]
     )
@@ -177,7 +177,7 @@ def test_the_presence_is_part_of_the_digest_and_a_column_where_it_is_not_the_rul
 
 def test_a_damaged_scene_is_named_left_out_and_the_rest_goes_on(source, tmp_path, folder):
     configs = small(source, scenes=("torn", "a", "b"))
-    failures = conduct(configs, tmp_path / "out", workers=1, study=PROTOCOL)
+    failures = run_study(configs, tmp_path / "out", workers=1, study=PROTOCOL)
     assert [failure.config.scene.name for failure in failures] == ["torn", "torn"]
     assert str(folder / "torn" / "annotations.feather") in failures[0].reason
     rows, study, left_out = reported(tmp_path / "out")
@@ -195,7 +195,7 @@ def test_a_damaged_scene_is_named_left_out_and_the_rest_goes_on(source, tmp_path
 
 def test_the_events_are_kept_one_by_one(source, tmp_path):
     assert (
-        conduct(
+        run_study(
             small(source, floors=(0, 1), scenes=("a", "b")), tmp_path, workers=1, study=PROTOCOL
         )
         == []
@@ -213,9 +213,9 @@ def test_the_events_are_kept_one_by_one(source, tmp_path):
 
 def test_a_policy_that_joins_later_is_all_that_is_played(source, tmp_path):
     before = small(source, scenes=("a", "b"))
-    conduct(before, tmp_path, workers=1, study=PROTOCOL)
+    run_study(before, tmp_path, workers=1, study=PROTOCOL)
     lines = (tmp_path / JOURNAL).read_text().splitlines()
-    conduct(
+    run_study(
         [*before, *small(source, ["random"], scenes=("a", "b"))],
         tmp_path,
         workers=1,
@@ -397,4 +397,4 @@ def test_a_folder_of_another_kind_of_study_is_refused(source, tmp_path):
     with pytest.raises(
         InvalidInput, match="holds episodes of another study; the plays of the study protocol need"
     ):
-        conduct(small(source), tmp_path, workers=1, study=PROTOCOL, force=True)
+        run_study(small(source), tmp_path, workers=1, study=PROTOCOL, force=True)

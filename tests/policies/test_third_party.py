@@ -7,7 +7,7 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.commands.shared.selection import made
+from care_sim.commands.shared.selection import makeable
 from care_sim.policies import BUILT_IN, policy_names, tags_of
 from care_sim.study.episode_config import grid
 
@@ -205,7 +205,7 @@ def test_a_policy_that_cannot_be_made_is_named_with_the_reason(broken, env, name
 
 def test_broken_policies_do_not_stop_the_others(broken, installed, env):
     assert set(BUILT_IN) | set(REASONS) | {"horizon", "leaving"} <= set(policy_names())
-    sound, reasons = made(
+    sound, reasons = makeable(
         ["care", "torn", "horizon", "exploding", "leaving", "deaf"],
         lambda name: grid(["dartout", "dense"], [name], [0.1], [0]),
     )
@@ -230,7 +230,7 @@ def test_broken_policies_do_not_stop_the_others(broken, installed, env):
 )
 def test_what_a_user_got_wrong_stops_all(policies, common, complaint):
     with pytest.raises(InvalidInput, match=complaint):
-        made(policies, lambda name: grid(["dartout"], [name], [0.1], [0], **common))
+        makeable(policies, lambda name: grid(["dartout"], [name], [0.1], [0], **common))
 
 
 def test_a_function_that_makes_a_policy_is_one(broken, env):

@@ -5,7 +5,7 @@ import pytest
 from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.shared.conduct import conduct
+from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import ablations, crowding, faults, paper
@@ -92,7 +92,7 @@ def test_only_the_papers_study_quotes_the_paper_on_collisions():
 def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
     short = (("vehicles", 1), ("duration_s", 0.2))
     configs = grid(["dense"], ["random", "full"], [0.1], [0], scenario_parameters=short)
-    assert conduct(configs, tmp_path, workers=1, study=STUDIES["crowding"]) == []
+    assert run_study(configs, tmp_path, workers=1, study=STUDIES["crowding"]) == []
     assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
     assert study_of(tmp_path / "episodes.parquet").name == "crowding"
     assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / "episodes.parquet")[0])

@@ -7,7 +7,7 @@ import pytest
 
 from care_sim.base.named_files import files_named_in, paths_in
 from care_sim.base.package_files import shipped_files
-from care_sim.commands.shared.conduct import conduct
+from care_sim.commands.shared.run_study import run_study
 from care_sim.policies import POLICIES
 from care_sim.sources.scenes import source_of
 from care_sim.study.episode_config import EpisodeConfig
@@ -88,7 +88,7 @@ def test_the_same_command_plays_again_with_new_weights(site, tmp_path, capsys):
     hashes = []
     for stride in (1, 3, 3):
         write(folder, stride)
-        assert conduct([config], out, workers=1) == []
+        assert run_study([config], out, workers=1) == []
         hashes.append(read_rows(out / EPISODES.file)[0]["digest"])
     assert hashes[0] != hashes[1] == hashes[2]
     assert len((out / JOURNAL).read_text().splitlines()) == 2

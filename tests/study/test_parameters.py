@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.shared.conduct import conduct
-from care_sim.commands.shared.takeover import check_results
+from care_sim.commands.shared.folder_checks import check_results
+from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.studies import SWEEP
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.journal import Journal
@@ -138,7 +138,7 @@ def test_an_odd_policy_is_played_and_known_again(anything, tmp_path):
         scenario_parameters=(("duration_s", 0.1),),
     )
     for _ in range(2):
-        assert conduct(configs, tmp_path, workers=1) == []
+        assert run_study(configs, tmp_path, workers=1) == []
     (row,) = read_rows(tmp_path / "episodes.parquet")
     assert (row["policy.nest"], row["policy.label"], row["policy.on"]) == (
         ((1, 2), (3, 4)),
@@ -161,5 +161,5 @@ def test_values_that_share_no_column_are_refused_before_anything_is_played(anyth
         InvalidInput,
         match=r"one column of results must hold all values of policy\.x, got 'text' and 3",
     ):
-        conduct(configs, tmp_path / "out", workers=1)
+        run_study(configs, tmp_path / "out", workers=1)
     assert not (tmp_path / "out").exists()

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.commands.shared.conduct import conduct
+from care_sim.commands.shared.run_study import run_study
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.episode_play import answer, run_episode, trace
@@ -55,7 +55,7 @@ def test_the_hash_tells_episodes_apart_and_repeats():
 
 def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path):
     configs = short(["history", "full"], budgets=(0.05, 0.1))
-    assert conduct(configs, tmp_path, workers=2) == []
+    assert run_study(configs, tmp_path, workers=2) == []
     rows = read_rows(tmp_path / EPISODES.file)
     assert [row["digest"] for row in rows] == [config.digest() for config in configs]
     assert rows[0]["episode_hash"] == run_episode(configs[0])["episode_hash"]
@@ -65,11 +65,11 @@ def test_a_study_writes_its_files_and_equals_the_same_episodes_at_home(tmp_path)
 
 def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
     configs = short(["history", "care", "random"])
-    conduct(configs[:2], tmp_path, workers=1)
+    run_study(configs[:2], tmp_path, workers=1)
     path = tmp_path / JOURNAL
     first, second = path.read_text().splitlines()
     path.write_text(f"{first}\n{second[:40]}")
-    assert conduct(configs, tmp_path, workers=1) == []
+    assert run_study(configs, tmp_path, workers=1) == []
     lines = path.read_text().splitlines()
     assert lines[0] == first
     assert len(lines) == 4
@@ -78,11 +78,11 @@ def test_an_interrupted_study_loses_and_repeats_nothing(tmp_path):
 
 def test_what_an_earlier_study_left_is_said_and_its_figures_go(tmp_path, capsys):
     first, second = short(["history"], budgets=(0.05, 0.1)), short(["history", "random"])
-    conduct(first, tmp_path, workers=1)
+    run_study(first, tmp_path, workers=1)
     assert "found" not in capsys.readouterr().err
     (tmp_path / "dartout-budget.png").touch()
     (tmp_path / "my-budget.png").touch()
-    conduct(second, tmp_path, workers=1, force=True)
+    run_study(second, tmp_path, workers=1, force=True)
     line = f"1 of 2 episodes found in {tmp_path}; 1 of other options or code stay in its journal\n"
     assert line in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir() if path.suffix in (".png", ".svg")} == {
@@ -134,7 +134,7 @@ def test_any_executor_will_do(tmp_path):
 
 def test_episodes_are_played_seed_by_seed_and_written_in_the_order_asked(tmp_path):
     configs = short(["history", "random"], seeds=(0, 1, 2))
-    conduct(configs, tmp_path, workers=1)
+    run_study(configs, tmp_path, workers=1)
     played = [json.loads(line)["seed"] for line in (tmp_path / JOURNAL).read_text().splitlines()]
     assert played == [0, 0, 1, 1, 2, 2]
     assert [row["digest"] for row in read_rows(tmp_path / EPISODES.file)] == [
@@ -190,7 +190,7 @@ class BusyServer(ThreadPoolExecutor):
 def test_a_fork_server_that_fails_once_costs_nothing(tmp_path, error):
     server = type("Server", (BusyServer,), {"error": error})
     configs = short(["history"])
-    assert conduct(configs, tmp_path, workers=1, make_executor=server) == []
+    assert run_study(configs, tmp_path, workers=1, make_executor=server) == []
     assert len(read_rows(tmp_path / EPISODES.file)) == 1
 
 
@@ -203,10 +203,10 @@ def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
 
 
 def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):
-    (failure,) = conduct(short(["history", "raises", "care"]), tmp_path, workers=1)
+    (failure,) = run_study(short(["history", "raises", "care"]), tmp_path, workers=1)
     assert failure.config.policy == "raises"
     assert [row["policy"] for row in read_rows(tmp_path / EPISODES.file)] == ["history", "care"]
-    assert conduct(short(["history", "care"]), tmp_path, workers=1) == []
+    assert run_study(short(["history", "care"]), tmp_path, workers=1) == []
 
 
 def test_a_worker_imports_nothing_of_tables_and_commands():

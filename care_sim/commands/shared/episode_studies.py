@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from care_sim.commands.shared.options import seeds_of
-from care_sim.commands.shared.running import Running, playable
+from care_sim.commands.shared.selection import playable
+from care_sim.commands.shared.study_command import StudyCommand
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 
@@ -14,7 +15,7 @@ _Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfi
 
 
 @dataclass(frozen=True, kw_only=True)
-class EpisodeStudy(Running):
+class EpisodeStudy(StudyCommand):
     """A study of the closed loop."""
 
     seeds: tuple[int, ...] = (5,)
@@ -33,4 +34,5 @@ class FixedStudy(EpisodeStudy):
         # Which of them can be played is tried on one task in every scenario.
         seeds = seeds_of(self.seeds)
         also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
-        return self.conduct(study, of_seeds(configurations(seeds[:1], also), seeds), out, left_out)
+        configs = of_seeds(configurations(seeds[:1], also), seeds)
+        return self.run_study(study, configs, out, left_out)

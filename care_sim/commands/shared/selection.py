@@ -1,8 +1,11 @@
-"""Which of the named scenarios and policies a sweep plays."""
+"""What a command plays of what is named: scenarios, policies, values of a condition."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import Any
 
-from care_sim.base.errors import BrokenPolicy, MissingExtra
+from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, report_problems
+from care_sim.commands.shared.options import DEFAULT_OPTIONS
+from care_sim.policies import contenders
 
 ALL_NAMES = "all"
 """The name that stands for every known one."""
@@ -15,7 +18,7 @@ def expanded(names: Sequence[str], known: Collection[str]) -> list[str]:
     )
 
 
-def made(
+def makeable(
     policies: Iterable[str], make: Callable[[str], object]
 ) -> tuple[list[str], dict[str, str]]:
     """The policies of which `make` can make tasks, and for each of the others the reason why it
@@ -32,3 +35,25 @@ def made(
         except (BrokenPolicy, MissingExtra) as error:
             broken[policy] = str(error)
     return sound, broken
+
+
+def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[str], list[str]]:
+    """The policies whose tasks `make` can make, and a line for each that cannot be made, which is
+    printed too.
+
+    Raises InvalidInput where something else is wrong.
+    """
+    policies, broken = makeable(expanded(names, contenders() if ALL_NAMES in names else ()), make)
+    left_out = [f"left out: {reason}" for reason in broken.values()]
+    report_problems(left_out)
+    return policies, left_out
+
+
+def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
+    """The values of a condition that a sweep plays in turn: `several`, or else the one in `common`,
+    which loses it.
+    """
+    one = common.pop(name)
+    if several and one != getattr(DEFAULT_OPTIONS, name):
+        raise InvalidInput(f"give {name} one value or several, not both")
+    return several or (one,)

@@ -19,7 +19,9 @@ from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
 from care_sim.study.episode_config import EpisodeConfig
 
-POLICY, REST, WHOLE = "policy + allocation", "the rest", "whole keyframe"
+POLICY = "policy + allocation"
+REST = "the rest"
+WHOLE = "whole keyframe"
 KEYFRAME_STAGES = (
     "camera",
     "cast",

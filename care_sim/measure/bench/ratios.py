@@ -14,10 +14,8 @@ from care_sim.measure.bench.steps import DRIVING, REACHING
 BenchReport = dict[str, Any]
 FAST = "fast"
 
-OVER_DRIVING, OVER_REACHING = (
-    f"steps a CPU second over {DRIVING}",
-    f"steps a CPU second over {REACHING}",
-)
+OVER_DRIVING = f"steps a CPU second over {DRIVING}"
+OVER_REACHING = f"steps a CPU second over {REACHING}"
 TWO_OVER_ONE = "steps/s, two processes over one"
 
 

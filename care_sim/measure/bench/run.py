@@ -56,7 +56,7 @@ def bench_report(
 
     `config`, `machine`, `versions`, `main` (the environment in question), the figures of every
     measure by its name, `ratios`, `targets`, and `skipped`: what is left out, in one line each.
-    `tell` hears what is measured next.
+    `tell` is called with the name of what is measured next.
     """
     made, skipped = makers(config)
     # An episode that nobody times comes first: no figure holds the time of compiling.

@@ -19,7 +19,8 @@ from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import ENVIRONMENT_IDS
 from care_sim.study.episode_play import GymEnv
 
-DRIVING, REACHING = "highway-fast-v0", "PandaReach-v3"
+DRIVING = "highway-fast-v0"
+REACHING = "PandaReach-v3"
 """Known environments, under random actions: highway-env's driving without sensors, and panda-gym's
 arm, also over PyBullet.
 """

@@ -65,7 +65,9 @@ def trails_of(
     show: Callable[[int], None] = lambda _done: None,
     make_executor: ExecutorFactory = processes,
 ) -> Trails:
-    """Play episodes; `show` is told how many are done. An interrupt waits for none of them."""
+    """Play episodes; `show` is called with the number of those done. An interrupt waits for none of
+    them.
+    """
     found: Trails = {}
     with TemporaryDirectory(prefix="care-sim-certify-") as folder:
         source = write_drive(Path(folder))

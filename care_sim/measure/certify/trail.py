@@ -17,7 +17,8 @@ from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.measure.certify.design import Drawn
 
-CONFIGURATION, OUTCOME = "configuration", "outcome"
+CONFIGURATION = "configuration"
+OUTCOME = "outcome"
 TRAIL_STAGES = (
     "scenario and poses",
     "camera detections",

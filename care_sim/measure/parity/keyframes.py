@@ -75,7 +75,9 @@ class KeyframeAgreement:
 
 
 def keyframes(scenario: str, episodes: int, done: Callable[[int], None]) -> KeyframeAgreement:
-    """All keyframes of the first seeds; `done` hears how many episodes are compared."""
+    """All keyframes of the first seeds; `done` is called with the number of episodes compared so
+    far.
+    """
     compared = KeyframeAgreement()
     for seed in range(episodes):
         compare_episode(EpisodeConfig(scenario, _POLICY, _BUDGET, seed), compared)

@@ -48,7 +48,9 @@ class Outcomes:
 
 
 def outcomes(seeds: int, done: Callable[[int], None]) -> Outcomes:
-    """The paper's 49 configurations with seeds from 0; `done` hears how many seeds are compared."""
+    """The paper's 49 configurations with seeds from 0; `done` is called with the
+    number of seeds compared so far.
+    """
     compared = Outcomes()
     for seed in range(seeds):
         for config in paper_study([seed]):

@@ -12,8 +12,8 @@ from care_sim.world.bullet import BulletWorld
 
 
 def random_scenes(seed: int, number: int, done: Callable[[int], None]) -> AgreementCounts:
-    """Verdicts on the rays of the first `number` scenes of a seed; `done` hears how many are
-    compared.
+    """Verdicts on the rays of the first `number` scenes of a seed; `done` is called with
+    the number compared so far.
     """
     tally = AgreementCounts()
     for first in range(0, number, SCENES_PER_CAST):

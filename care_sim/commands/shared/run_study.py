@@ -8,7 +8,7 @@ from pathlib import Path
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, counted
 from care_sim.base.files import write_text
-from care_sim.commands.shared.takeover import check_journal, check_kind, check_results, lost
+from care_sim.commands.shared.folder_checks import check_journal, check_kind, check_results, lost
 from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import SWEEP, Study
 from care_sim.study.executors import ExecutorFactory, processes
@@ -20,7 +20,7 @@ from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure
 
 
-def conduct(
+def run_study(
     configs: Sequence[RunConfig],
     folder: Path,
     workers: int,

@@ -1,19 +1,15 @@
 """How a command plays a study: over workers, into a folder, and naming what is left out."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput, report_problems
-from care_sim.commands.shared.conduct import conduct, summary
-from care_sim.commands.shared.options import DEFAULT_OPTIONS
-from care_sim.commands.shared.selection import ALL_NAMES, expanded, made
-from care_sim.policies import contenders
+from care_sim.base.errors import report_problems
+from care_sim.commands.shared.run_study import run_study, summary
 from care_sim.reports.report import print_report, reported
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
@@ -27,7 +23,7 @@ _PIPE_WIDTH = 180
 
 
 @dataclass(frozen=True, kw_only=True)
-class Running:
+class StudyCommand:
     """Options of every command that plays a study."""
 
     workers: int = bounded(CORES, 1, MOST_WORKERS)
@@ -46,14 +42,14 @@ class Running:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def conduct(
+    def run_study(
         self, study: str, configs: Sequence[RunConfig], out: Path, left_out: Sequence[str] = ()
     ) -> int:
         """Play the tasks and print their tables, the tasks that failed and the policies that were
         left out.
         """
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
-        failures = conduct(configs, out, self.workers, make_executor, STUDIES[study], self.force)
+        failures = run_study(configs, out, self.workers, make_executor, STUDIES[study], self.force)
         if len(failures) < len(configs):
             rows, _, missing = reported(out)
             print_report(rows, console(), STUDIES[study], missing)
@@ -65,28 +61,6 @@ class Running:
             ]
         )
         return FAILED if failures or left_out else DONE
-
-
-def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[str], list[str]]:
-    """The policies whose tasks `make` can make, and a line for each that cannot be made, which is
-    printed too.
-
-    Raises InvalidInput where something else is wrong.
-    """
-    policies, broken = made(expanded(names, contenders() if ALL_NAMES in names else ()), make)
-    left_out = [f"left out: {reason}" for reason in broken.values()]
-    report_problems(left_out)
-    return policies, left_out
-
-
-def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
-    """The values of a condition that a sweep plays in turn: `several`, or else the one in `common`,
-    which loses it.
-    """
-    one = common.pop(name)
-    if several and one != getattr(DEFAULT_OPTIONS, name):
-        raise InvalidInput(f"give {name} one value or several, not both")
-    return several or (one,)
 
 
 def console() -> Console:

@@ -1,4 +1,4 @@
-"""A folder of results is taken over by nobody who was not told to."""
+"""No study replaces the results of another unless it is told to."""
 
 import json
 from dataclasses import replace
@@ -7,8 +7,8 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.commands.shared.conduct import conduct
-from care_sim.commands.shared.takeover import check_results
+from care_sim.commands.shared.folder_checks import check_results
+from care_sim.commands.shared.run_study import run_study
 from care_sim.evaluation.sightings import PRESENCES
 from care_sim.reports.report import write_report
 from care_sim.reports.studies import STUDIES
@@ -45,7 +45,7 @@ def test_another_study_is_refused_in_a_line_that_names_both_and_touches_nothing(
     before = held(folder)
     assert any(name.endswith(".png") for name in before)
     with pytest.raises(InvalidInput) as refused:
-        conduct(short(), folder, workers=1)
+        run_study(short(), folder, workers=1)
     assert str(refused.value) == (
         f"{folder} holds the study paper, 20 episodes, which the study sweep, 1 episode, would "
         "replace: "
@@ -86,9 +86,9 @@ def test_rows_that_nobody_asks_for_now_are_named(folder):
 def test_the_same_command_goes_on_with_more_seeds_policies_and_after_changes_of_the_code(
     tmp_path, monkeypatch
 ):
-    assert conduct(short(lidar_dead_rows=(3, 4)), tmp_path, workers=1) == []
+    assert run_study(short(lidar_dead_rows=(3, 4)), tmp_path, workers=1) == []
     assert (
-        conduct(short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), tmp_path, workers=1)
+        run_study(short(("history", "care"), (0, 1), lidar_dead_rows=(3, 4)), tmp_path, workers=1)
         == []
     )
     monkeypatch.setattr("care_sim.study.run_config.code_digest", lambda: "edited")
@@ -132,10 +132,10 @@ def test_a_study_that_cannot_be_shown_replaces_nothing(folder, monkeypatch):
         raise InvalidInput("two films")
 
     with pytest.raises(InvalidInput, match="two films"):
-        conduct(short(), folder, 1, study=replace(SWEEP, figures=broken), force=True)
+        run_study(short(), folder, 1, study=replace(SWEEP, figures=broken), force=True)
     assert {name: content for name, content in held(folder).items() if name != JOURNAL} == before
     with pytest.raises(InvalidInput, match="holds the study paper"):
-        conduct(short(), folder, 1)
+        run_study(short(), folder, 1)
 
 
 MOODY = """
@@ -156,12 +156,12 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
     mood, out = tmp_path / "moody_policy" / "mood.txt", tmp_path / "out"
     mood.write_text("good")
     configs = short(("history", "moody"))
-    assert conduct(configs, out, workers=1) == []
+    assert run_study(configs, out, workers=1) == []
     before = held(out)
     del before[JOURNAL]
     mood.write_text("bad")
     capsys.readouterr()
-    (failure,) = conduct(short(("history", "moody")), out, workers=1)
+    (failure,) = run_study(short(("history", "moody")), out, workers=1)
     assert failure.config.policy == "moody"
     assert [
         line for line in capsys.readouterr().err.splitlines() if "stay as they were" in line
@@ -173,7 +173,7 @@ def test_where_tasks_fail_fewer_rows_replace_no_more(install, tmp_path, capsys):
         "--force to replace them"
     ]
     assert {name: content for name, content in held(out).items() if name != JOURNAL} == before
-    conduct(short(("history", "moody")), out, workers=1, force=True)
+    run_study(short(("history", "moody")), out, workers=1, force=True)
     assert [row["policy"] for row in read_rows(out / EPISODES.file)] == ["history"]
 
 
@@ -183,9 +183,9 @@ def test_an_interrupted_study_is_known_by_its_journal(tmp_path):
     with pytest.raises(
         InvalidInput, match="holds the unfinished study faults, 1 row, beside which the study sweep"
     ):
-        conduct(short(), tmp_path, workers=1)
-    assert conduct(short(), tmp_path, workers=1, force=True) == []
-    assert conduct(short(), tmp_path, workers=1) == []
+        run_study(short(), tmp_path, workers=1)
+    assert run_study(short(), tmp_path, workers=1, force=True) == []
+    assert run_study(short(), tmp_path, workers=1) == []
 
 
 def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
@@ -204,7 +204,7 @@ def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
         ),
     ):
         with pytest.raises(InvalidInput) as refused:
-            conduct(other, tmp_path, workers=1)
+            run_study(other, tmp_path, workers=1)
         told = str(refused.value)
         assert (
             f"holds the unfinished study sweep, 4 rows; {gone} of them, "
@@ -216,14 +216,14 @@ def test_an_interrupted_study_of_other_options_keeps_its_folder(tmp_path):
             "to play beside them"
         )
     assert held(tmp_path) == before
-    assert conduct(short(("history", "care"), range(4)), tmp_path, workers=1) == []
+    assert run_study(short(("history", "care"), range(4)), tmp_path, workers=1) == []
 
 
 def test_force_plays_beside_an_interrupted_study(tmp_path):
     with Journal(tmp_path / JOURNAL, "sweep") as journal:
         journal.append(short()[0].row() | {"digest": "a"})
-    assert conduct(short(seeds=(1,)), tmp_path, workers=1, force=True) == []
-    assert conduct(short(seeds=(1,)), tmp_path, workers=1) == []
+    assert run_study(short(seeds=(1,)), tmp_path, workers=1, force=True) == []
+    assert run_study(short(seeds=(1,)), tmp_path, workers=1) == []
 
 
 def test_the_folder_is_locked_until_its_results_are_written(tmp_path, monkeypatch):
@@ -235,19 +235,19 @@ def test_the_folder_is_locked_until_its_results_are_written(tmp_path, monkeypatc
         locked.append(path.name)
         write_rows(rows, path, *more)
 
-    monkeypatch.setattr("care_sim.commands.shared.conduct.write_rows", write)
-    conduct(short(), tmp_path, workers=1)
+    monkeypatch.setattr("care_sim.commands.shared.run_study.write_rows", write)
+    run_study(short(), tmp_path, workers=1)
     assert locked == [EPISODES.file]
 
 
 def test_a_damaged_line_is_played_again_and_said(tmp_path, capsys):
-    conduct(short(seeds=(0, 1)), tmp_path, workers=1)
+    run_study(short(seeds=(0, 1)), tmp_path, workers=1)
     path = tmp_path / JOURNAL
     first, second = path.read_text().splitlines()
     seed = json.loads(second)["rays_fired"]
     path.write_text(f"{first}\n{second.replace(str(seed), str(seed + 1))}\n")
     capsys.readouterr()
-    assert conduct(short(seeds=(0, 1)), tmp_path, workers=1) == []
+    assert run_study(short(seeds=(0, 1)), tmp_path, workers=1) == []
     said = capsys.readouterr().err
     assert f"1 line of {path} passed over, damaged or of a version that wrote no checksums" in said
     assert "1 of 2 episodes found" in said
