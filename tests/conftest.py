@@ -2,6 +2,7 @@
 test.
 """
 
+import os
 import sys
 
 import numpy as np
@@ -21,6 +22,10 @@ settings.register_profile(
     "repeatable", deadline=None, derandomize=True, database=None, max_examples=60
 )
 settings.load_profile("repeatable")
+
+# PyTorch is imported later and reads this then. Its threads wait for each other in busy loops: two
+# of them beside another worker's tests take three to six times the processor time of one.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 @pytest.fixture(scope="session")
