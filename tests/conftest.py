@@ -17,6 +17,7 @@ from care_sim.world.bullet import BulletWorld
 from tests.helpers.av2_log import at, box, write
 from tests.helpers.misbehaving import ENTRY_POINTS, THIRD_PARTY
 from tests.helpers.recordings import Read
+from tests.helpers.short_streets import few_and_short
 
 settings.register_profile(
     "repeatable", deadline=None, derandomize=True, database=None, max_examples=60
@@ -87,6 +88,13 @@ def drive(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("logs") / "drive"
     return write(folder, [seen(n) for n in range(50)], [at(0.5 * n) for n in range(50)])
+
+
+@pytest.fixture(scope="module")
+def short_streets():
+    """Environments of the open loop meet four streets of 10 keyframes."""
+    with few_and_short():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,7 @@ from care_sim.study.episode_play import run_episode
 from care_sim.study.scene_play import film_hash
 from tests.helpers.places import ROOT
 from tests.helpers.processor_features import reduced
+from tests.helpers.short_streets import part_of
 
 EPISODES = [("cutin", "care", 0), ("dense", "history", 3)]
 """The car that cuts in is turned by an arctangent."""
@@ -33,10 +34,7 @@ def hashes():
 
 
 def some_keyframes(street):
-    part = slice(14, 17)
-    return record(
-        replace(street, poses=street.poses[part], ego=street.ego[part], motion=street.motion[part])
-    )
+    return record(part_of(street, slice(14, 17)))
 
 
 def test_fewer_features_of_the_processor_give_the_same_hashes():

@@ -134,6 +134,7 @@ def test_a_secret_makes_another_street_whose_name_does_not_tell_its_seed(make):
     env = make("CARE-Street-v0", secret=SECRET)
     _, info = env.reset(seed=7)
     film = env.unwrapped.loop.film
+    assert len(film.shots) == 40
     assert film.name == info["scene"] == "street-0007-secret"
     assert {shot.token.partition("/")[0] for shot in film.shots} == {film.name}
     ways = [[(shot.sensor.x, shot.sensor.y) for shot in film.shots], make_street(7).ego[:, :2]]

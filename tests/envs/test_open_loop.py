@@ -17,6 +17,7 @@ from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.recall import score_scene
 from care_sim.evaluation.sightings import Sightings
 from care_sim.loops.film import Film
+from care_sim.sources.streets import recording
 from care_sim.sources.streets.recording import street_film
 from tests.helpers.av2_log import at, box, write
 
@@ -24,9 +25,11 @@ EXPLAINED = ("symmetric and normalized Box action space", "unconventional shape"
 NOTHING = np.zeros((32, 512), np.float32)
 
 
-@pytest.fixture(params=OPEN_LOOP)
+@pytest.fixture(params=OPEN_LOOP, scope="module")
 def make(request, drive):
-    """Makes an environment of the open loop."""
+    """Makes an environment of the open loop; its streets are short."""
+    if request.param == "CARE-Street-v0":
+        request.getfixturevalue("short_streets")
     place = {"source": f"argoverse2:{drive}"} if request.param == "CARE-Replay-v0" else {}
     return lambda **arguments: gymnasium.make(
         request.param, disable_env_checker=True, **place, **arguments
@@ -211,12 +214,24 @@ def test_a_camera_one_keyframe_old_shows_the_keyframe_before(replay):
     assert set(delayed["detections"][delayed["detections"][:, 0] >= 0, 7]) == {0.5}
 
 
-def test_a_street_is_drawn_by_the_seed_and_filmed_once():
-    env = gymnasium.make("CARE-Street-v0", disable_env_checker=True)
-    _, info = env.reset(seed=7)
-    assert (info["seed"], info["scene"]) == (7, env.unwrapped.loop.film.name)
-    assert len(env.unwrapped.loop.film.shots) == 40
+def test_a_street_is_drawn_by_the_seed_and_filmed_once(monkeypatch, short_streets):
+    drawn = []
+    filmed = []
+    make_street = recording.make_street
+    record = recording.record
+    monkeypatch.setattr(
+        recording, "make_street", lambda seed: drawn.append(seed) or make_street(seed)
+    )
+    monkeypatch.setattr(
+        recording, "record", lambda street: filmed.append(street.name) or record(street)
+    )
+    recording._street_film.cache_clear()
+    for budget in (0.1, 0.2):
+        env = gymnasium.make("CARE-Street-v0", disable_env_checker=True, budget=budget)
+        _, info = env.reset(seed=7)
+        assert (info["seed"], info["scene"]) == (7, env.unwrapped.loop.film.name)
     assert env.unwrapped.loop.film is street_film(7)
+    assert (drawn, filmed) == ([7], [info["scene"]])
 
 
 def test_an_oracle_is_handed_where_tracked_objects_are_now(replay):

@@ -53,7 +53,7 @@ def played(env, policy):
 
 
 @pytest.fixture(scope="module", params=product(BEFORE, BUILT_IN), ids="-".join)
-def case(request):
+def case(request, short_streets):
     """An environment, and the name of the policy for it."""
     environment, name = request.param
     if name == "farthest-points":

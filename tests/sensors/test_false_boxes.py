@@ -29,6 +29,7 @@ from care_sim.sources.streets.recording import record
 from care_sim.sources.streets.street import make_street
 from care_sim.world import bullet_clients as clients
 from tests.helpers.nuscenes_drive import write_drive
+from tests.helpers.short_streets import part_of
 from tests.helpers.telling_apart import CHANCE, areas_under_the_curve
 
 PEDESTRIAN, CAR = CLASSES.index("pedestrian"), CLASSES.index("car")
@@ -258,16 +259,7 @@ def streets():
     """The same of the first twelve seconds of two generated streets."""
     episodes = []
     for seed in (3000, 3001):
-        street = make_street(seed)
-        first = slice(0, 24)
-        film = record(
-            replace(
-                street,
-                poses=street.poses[first],
-                ego=street.ego[first],
-                motion=street.motion[first],
-            )
-        )
+        film = record(part_of(make_street(seed), slice(24)))
         episodes.append(played(FilmEnv(film, budget=1.0, false_positive_rate=3.0), 0))
     return episodes
 

@@ -25,7 +25,7 @@ ORDERS = [
 
 
 @pytest.fixture(params=NAMES)
-def env(request):
+def env(request, short_streets):
     place = (
         {"source": f"argoverse2:{request.getfixturevalue('drive')}"}
         if request.param == "CARE-Replay-v0"

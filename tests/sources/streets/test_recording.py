@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,23 +11,15 @@ from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.streets.recording import SIGHT_M, record
 from care_sim.sources.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
+from tests.helpers.short_streets import part_of
 
 KEYFRAMES = slice(10, 14)
 LABELLED = ("car", "van", "truck", "bus", "bicycle", "pedestrian")
 
 
-def cut(street, keyframes):
-    return replace(
-        street,
-        poses=street.poses[keyframes],
-        ego=street.ego[keyframes],
-        motion=street.motion[keyframes],
-    )
-
-
 @pytest.fixture(scope="module", params=[1, 2])
 def street(request):
-    return cut(make_street(request.param), KEYFRAMES)
+    return part_of(make_street(request.param), KEYFRAMES)
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +133,7 @@ def test_the_same_street_gives_the_same_film_to_the_last_bit(street, film):
 
 
 def test_a_shot_does_not_depend_on_the_keyframes_before_it(street, film):
-    alone = record(cut(street, slice(3, 4))).shots[0]
+    alone = record(part_of(street, slice(3, 4))).shots[0]
     assert np.array_equal(alone.annotations.objects, film.shots[3].annotations.objects)
     assert np.array_equal(alone.cloud.cells, film.shots[3].cloud.cells)
     assert alone.cloud.points == pytest.approx(film.shots[3].cloud.points, abs=1e-6)

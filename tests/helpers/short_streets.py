@@ -1,0 +1,50 @@
+"""A few streets of a few keyframes, for tests that meet streets but neither their number nor their
+length.
+"""
+
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+from unittest import mock
+
+from care_sim.sources.streets import recording
+from care_sim.sources.streets.layouts import LAYOUTS
+from care_sim.sources.streets.recording import record
+from care_sim.sources.streets.street import make_street
+
+KEYFRAMES = 10
+_films = {}
+
+
+def part_of(street, keyframes):
+    """A street for some of its keyframes, a slice."""
+    return replace(
+        street,
+        poses=street.poses[keyframes],
+        ego=street.ego[keyframes],
+        motion=street.motion[keyframes],
+    )
+
+
+@contextmanager
+def few_and_short():
+    """While it lasts, a seed gives an environment one of four streets, one of each layout, which
+    ends after 10 keyframes in the place of 40. A whole film takes three seconds, and the checkers
+    of Gymnasium and Stable-Baselines3 ask for ten to thirty of them.
+    """
+    with mock.patch.multiple(recording, make_street=_short_street, record=_filmed):
+        recording._street_film.cache_clear()
+        yield
+    recording._street_film.cache_clear()
+
+
+@cache
+def _short_street(seed):
+    # Layouts take turns by seed, so this one has the layout of the street that it stands for.
+    return part_of(make_street(seed % len(LAYOUTS)), slice(KEYFRAMES))
+
+
+def _filmed(street):
+    if street.name not in _films:
+        _films[street.name] = record(street)
+    return _films[street.name]
