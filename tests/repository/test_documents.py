@@ -19,6 +19,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import IDS
 from care_sim.viewer.recording.entities import ENTITIES
+from tests.helpers.forked import Forked
 from tests.helpers.places import ROOT
 
 SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
@@ -50,22 +51,20 @@ LINES = [
 ]
 
 
+@pytest.fixture(scope="module")
+def forked():
+    with Forked(ROOT) as forked:
+        yield forked
+
+
 @pytest.mark.parametrize("block", BLOCKS)
-def test_a_block_runs_on_its_own(block, tmp_path, drive):
+def test_a_block_runs_on_its_own(block, tmp_path, drive, forked):
     """In an empty folder, with an Argoverse 2 log in `logs`."""
     for wrapper, library in (("RecordVideo", "moviepy"), ("RecordRerun", "rerun")):
         if wrapper in block:
             pytest.importorskip(library)
     (tmp_path / "logs").symlink_to(drive.parent)
-    paths = {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
-    done = subprocess.run(
-        [sys.executable, "-c", block],
-        cwd=tmp_path,
-        env=os.environ | paths,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = forked.run(block, tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
 
