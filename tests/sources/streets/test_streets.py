@@ -1,4 +1,5 @@
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -59,11 +60,18 @@ def test_150_scenes_are_evaluated_and_20_others_calibrate():
     assert min(layouts.count(name) for name in LAYOUTS) >= 37
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("part", range(10))
-def test_the_scenes_are_those_that_were_published(part):
+def test_every_scene_has_a_published_digest():
     assert set(DIGESTS) == {str(seed) for seed in (*EVALUATION_SEEDS, *CALIBRATION_SEEDS)}
-    for seed in sorted(map(int, DIGESTS))[part::10]:
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(4))
+def test_the_scenes_are_those_that_were_published(part):
+    """Every third one, unless CARE_SIM_STREETS=all: a street takes 0.2 s. Five of the 170 go
+    through every line of the code, and no step from line to line is taken by fewer than 13.
+    """
+    every = 1 if os.environ.get("CARE_SIM_STREETS") == "all" else 3
+    for seed in sorted(map(int, DIGESTS))[::every][part::4]:
         assert make_street(seed).digest() == DIGESTS[str(seed)], seed
 
 
