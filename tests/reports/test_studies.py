@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pyarrow.parquet as pq
 import pytest
@@ -44,8 +45,13 @@ EPISODES = {"sweep": STUDY, "paper": STUDY, "crowding": CROWD, "ablate": STUDY, 
 @pytest.mark.parametrize(("name", "rows"), EPISODES.items())
 def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys):
     study = STUDIES[name]
-    assert set(study.figures(rows)) <= set(study.figure_names)
+    figures = study.figures(rows)
+    assert set(figures) <= set(study.figure_names)
+    # To write a figure takes a second; one of them shows that they are, the others have own tests.
+    first = dict([*figures.items()][:1])
+    study = replace(study, figures=lambda rows: first)
     write_report(rows, tmp_path, study)
+    assert all((tmp_path / f"{figure}.png").is_file() for figure in first)
     print_report(rows, Console(width=80), study)
     printed, markdown, latex = (
         capsys.readouterr().out,
