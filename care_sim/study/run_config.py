@@ -142,13 +142,13 @@ def felt_by(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str,
     check_policy(policy)
     felt = conditions | {"budget": budget}
     if parameters := conditions.get("policy_parameters"):
-        felt["policy_parameters"] = parameters_of(policy, parameters)
+        felt["policy_parameters"] = parameters_for(policy, parameters)
     if policy == FULL:
         felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNUSED_BY_FULL_SCAN}
     return felt
 
 
-def parameters_of(policy: str, parameters: Parameters) -> Parameters:
+def parameters_for(policy: str, parameters: Parameters) -> Parameters:
     """Those of a policy among parameters for several: NAME is for all, POLICY.NAME for that policy
     alone.
 

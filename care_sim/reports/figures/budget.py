@@ -11,19 +11,13 @@ from matplotlib.transforms import ScaledTranslation
 
 from care_sim.base.errors import percent
 from care_sim.reports.cells import Cell, summarise
-from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
+from care_sim.reports.figures.styles import CLOSED_LOOP_DODGE, FULL_STYLE, Style, bare_axes, styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.run_config import Row
 
 BUDGET_FIGURES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
 """Every figure that a sweep can draw."""
-DODGE = 0.03
-"""Share of a budget by which neighbouring policies are moved apart, so that equal curves stay
-visible.
-"""
-SPREAD = 0.24
-"""The same share from the first policy to the last, at most."""
 _FEW = 5
 """Policies up to which their quartiles are drawn in full strength."""
 
@@ -73,9 +67,7 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
         "\n".join(["budget (share of cells fired)", *tag_notes(tags for _, tags in policies)])
     )
     axes.set_ylabel("first detection (m, median and quartiles)")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis="y", color="0.92")
-    axes.set_axisbelow(True)
+    bare_axes(axes, "0.92")
     return figure
 
 
@@ -87,7 +79,7 @@ def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[_N
     ]
     for number, (policy, style) in enumerate(drawn.items()):
         own = [cell for cell in cells if cell.policy == policy]
-        shift = 1 + min(DODGE, SPREAD / len(drawn)) * (number - (len(drawn) - 1) / 2)
+        shift = CLOSED_LOOP_DODGE.factor(number, len(drawn))
         curves.append(_curve(axes, own, shift, style, 1.0 if len(drawn) <= _FEW else 0.4))
     axes.set_ylim(bottom=0.0)
     _undetected(axes, cells, drawn)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.reports.cells import Cell, StudyCells
-from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
+from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, styles
 from care_sim.reports.tables.faults import policies_of
 from care_sim.study.designs.faults import FAULT_PLACES, FAULTS, Fault
 from care_sim.study.designs.variants import Place
@@ -101,9 +101,7 @@ class _FaultPanels:
         axes.set_xlabel(fault.unit, fontsize=8)
         axes.set_xticks(range(len(fault.levels)), [level.label for level in fault.levels])
         axes.tick_params(labelsize=8)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(axis="y", color="0.92")
-        axes.set_axisbelow(True)
+        bare_axes(axes, "0.92")
 
     def _curve(
         self, axes: Axes, policy: str, style: Style, heights: Sequence[float | None]

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.reports.figures.styles import FULL_STYLE, Style, styles
+from care_sim.reports.figures.styles import FULL_STYLE, OPEN_LOOP_DODGE, Style, bare_axes, styles
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
@@ -100,9 +100,7 @@ def _draw_recalls(
     _staircase(
         axes, {policy: point for policy, point in points.items() if not _marks(plays.tags[policy])}
     )
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(color="0.94")
-    axes.set_axisbelow(True)
+    bare_axes(axes, "0.94", "both")
 
 
 def _marks(tags: tuple[str, ...]) -> bool:
@@ -140,12 +138,6 @@ def _name_markers(figure: Figure, axes: Axes, plays: SettingPlays) -> None:
     )
 
 
-DODGE = 0.025
-"""Share of a budget by which neighbouring policies are moved apart, so that equal lines stay
-visible.
-"""
-SPREAD = 0.1
-"""The same share from the first policy to the last, at most."""
 APART = "policies are drawn a little apart sideways, so that equal points stay visible"
 
 
@@ -163,9 +155,7 @@ def levels_figure(plays: SettingPlays) -> Figure:
         axes.set_xticks(plays.budgets, [percent(budget) for budget in plays.budgets])
         axes.minorticks_off()
         axes.set_ylabel(f"{ratio.name} (%)")
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(axis="y", color="0.93")
-        axes.set_axisbelow(True)
+        bare_axes(axes, "0.93")
     figure.suptitle(
         f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
     )
@@ -189,7 +179,7 @@ def _draw_levels(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
             label="full scan",
         )
     for number, (policy, look) in enumerate(styles(plays.tags.items()).items()):
-        shift = 1 + min(DODGE, SPREAD / len(plays.tags)) * (number - (len(plays.tags) - 1) / 2)
+        shift = OPEN_LOOP_DODGE.factor(number, len(plays.tags))
         levels = {budget: plays.level(ratio, policy, budget).by_event for budget in plays.budgets}
         known = {budget * shift: value for budget, value in levels.items() if value is not None}
         order = 4 if policy == REFERENCE else 3

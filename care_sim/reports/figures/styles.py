@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import cycle
+from typing import Literal, NamedTuple
+
+from matplotlib.axes import Axes
 
 from care_sim.reports.formatting import MARKS
 
@@ -35,6 +38,32 @@ _SPARE = ("#6699CC", "#44AA99", "#CC6677", "#88CCEE", "#DDCC77")
 _GREYS = ("0.3", "0.45", "0.6")
 _MARKERS = ("d", "H", "8", "1", "2")
 FULL_STYLE = Style("0.35", "_", "--")
+
+
+class Dodge(NamedTuple):
+    """How far the curves of policies are moved apart sideways, so that equal ones stay visible.
+
+    Shares of a budget: between `neighbours`, and from the first policy to the last at most `total`.
+    """
+
+    neighbours: float
+    total: float
+
+    def factor(self, number: int, count: int) -> float:
+        """The factor on the budgets of policy `number` of `count`; 1 for the one in the middle."""
+        # Budgets stand on a logarithmic axis, where equal factors are equal distances.
+        return 1 + min(self.neighbours, self.total / count) * (number - (count - 1) / 2)
+
+
+CLOSED_LOOP_DODGE = Dodge(0.03, 0.24)
+OPEN_LOOP_DODGE = Dodge(0.025, 0.1)
+
+
+def bare_axes(axes: Axes, grid: str, lines: Literal["both", "y"] = "y") -> None:
+    """Axes without a frame above and on the right, with a pale grid behind what is drawn."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis=lines, color=grid)
+    axes.set_axisbelow(True)
 
 
 def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:

@@ -7,13 +7,12 @@ import altair as alt
 
 from care_sim.base.errors import counted, percent
 from care_sim.reports.cells import Cell, summarise
-from care_sim.reports.figures.budget import DODGE, SPREAD
+from care_sim.reports.figures.styles import CLOSED_LOOP_DODGE
 from care_sim.reports.formatting import marked, spread, tag_notes
 from care_sim.reports.page.chart import (
     FULL_SCAN,
     Chart,
     Encoding,
-    apart,
     budget_axis,
     budgets_text,
     inline,
@@ -87,7 +86,8 @@ def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, An
         {
             "policy": marked(cell.policy, cell.tags),
             "budget": percent(cell.budget),
-            "place": cell.budget * apart(policies.index(cell.policy), len(policies), DODGE, SPREAD),
+            "place": cell.budget
+            * CLOSED_LOOP_DODGE.factor(policies.index(cell.policy), len(policies)),
             "median": cell.detection.median,
             "low": cell.detection.low or 0.0,
             "high": cell.detection.high or 0.0,

@@ -107,13 +107,6 @@ def budget_axis(budgets: Sequence[float], column: str = "place") -> alt.X:
     )
 
 
-def apart(number: int, count: int, least: float, spread: float) -> float:
-    """The factor by which the budgets of one policy of many are moved, so that equal values stay
-    visible.
-    """
-    return 1 + min(least, spread / count) * (number - (count - 1) / 2)
-
-
 def budgets_text(budgets: Sequence[float]) -> str:
     """Budgets from the least to the most, as text."""
     return f"{percent(min(budgets))} to {percent(max(budgets))}"

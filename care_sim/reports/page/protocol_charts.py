@@ -7,14 +7,14 @@ import altair as alt
 
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.reports.figures.protocol import APART, DODGE, SPREAD, Point, frontier, recalls
+from care_sim.reports.figures.protocol import APART, Point, frontier, recalls
+from care_sim.reports.figures.styles import OPEN_LOOP_DODGE
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.page.chart import (
     FULL_SCAN,
     PANEL_WIDTH,
     Chart,
     Encoding,
-    apart,
     budget_axis,
     inline,
     specification,
@@ -177,7 +177,7 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
     """Our levels, moved apart, and the paper's; without a place the full scan."""
     values: _Values = []
     for number, (policy, tags) in enumerate(plays.tags.items()):
-        shift = apart(number, len(plays.tags), DODGE, SPREAD)
+        shift = OPEN_LOOP_DODGE.factor(number, len(plays.tags))
         for budget in plays.budgets:
             about = {"policy": marked(policy, tags), "budget": percent(budget), "panel": ratio.name}
             here = plays.level(ratio, policy, budget).by_event

@@ -9,7 +9,13 @@ from care_sim.base.errors import percent
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import RATIOS, MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper
-from care_sim.reports.protocol.notes import UNITS_NOTE, left_out, on_intervals, papers, played
+from care_sim.reports.protocol.notes import (
+    UNITS_OF_DIFFERENCES,
+    left_out,
+    on_intervals,
+    papers,
+    played,
+)
 from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
@@ -52,7 +58,7 @@ def _table(plays: SettingPlays, base: str, equal_scenes: bool) -> Table:
         (_HEADS[base], *map(percent, plays.budgets)),
         tuple(_lines(plays, contrasts)),
         (
-            f"{UNITS_NOTE} {played(plays)}",
+            f"{UNITS_OF_DIFFERENCES} {played(plays)}",
             *intervals,
             *left_out(plays),
             *tag_notes(plays.tags.values()),

@@ -12,7 +12,7 @@ from care_sim.reports.protocol.differences import OVER_EVENTS, MeasuredDifferenc
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import FULL, Row
 
-UNITS_NOTE = "Recall in points; TTFD in keyframes, where less is better."
+UNITS_OF_DIFFERENCES = "Recall in points; TTFD in keyframes, where less is better."
 BY_EVENTS = (
     f"{OVER_EVENTS}: fewer than {FEWEST_PAIRS} scenes have events and plays of both policies, too "
     "few for an interval over scenes. This one comes from resampling events, paired and averaged "

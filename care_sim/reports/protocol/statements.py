@@ -7,7 +7,7 @@ from care_sim.base.errors import percent
 from care_sim.reports.formatting import ends
 from care_sim.reports.protocol.differences import Comparison, MeasuredDifference, SceneThird
 from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, judged, verdict
-from care_sim.reports.protocol.notes import UNITS_NOTE, on_intervals, papers
+from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, on_intervals, papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS, Claims, claims_about
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.reports.table import Table
@@ -52,7 +52,7 @@ def statements_tables(plays: SettingPlays) -> list[Table]:
             tuple(_lines(measured, said)),
             (
                 _count(measured, said),
-                f"{UNITS_NOTE} {_RULE}",
+                f"{UNITS_OF_DIFFERENCES} {_RULE}",
                 *_asides(measured),
                 *on_intervals(
                     difference

@@ -17,7 +17,7 @@ from care_sim.reports.protocol.differences import (
     SceneThird,
 )
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded, written
-from care_sim.reports.protocol.notes import UNITS_NOTE, papers
+from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, papers
 from care_sim.reports.protocol.paper import (
     ALLOCATION_SOURCE,
     PUBLISHED_ALLOCATIONS,
@@ -116,7 +116,7 @@ def thirds_tables(plays: SettingPlays) -> list[Table]:
             f"{plays.setting.label}: care minus all-camera in thirds of the scenes",
             ("third", *map(percent, plays.budgets)),
             tuple(line for column in RANKINGS for line in _ranking_lines(plays, column)),
-            (f"{UNITS_NOTE} {_RANKED}",),
+            (f"{UNITS_OF_DIFFERENCES} {_RANKED}",),
             papers(
                 claims.source
                 for each, claims in said.items()
