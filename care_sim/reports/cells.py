@@ -52,6 +52,7 @@ def summarise(rows: Sequence[Row]) -> list[Cell]:
     groups = grouped(rows)
     settings = list(dict.fromkeys(setting for setting, _, _ in groups))
     cells = [_cell(key, groups) for key in groups]
+    # The sort is stable, so that the policies of a budget keep the order of their rows.
     return sorted(cells, key=lambda cell: (settings.index(cell.setting), cell.budget))
 
 
@@ -61,6 +62,7 @@ def _cell(key: Key, groups: Groups) -> Cell:
     detections = quartiles([detection(row) for row in rows])
     assert detections is not None
     full = None if policy == "full" else full_of(groups, setting)
+    # Full minus policy: a policy that detects later than the full scan has positive regret.
     regret = contrast(DETECTION, full, rows)
     return Cell(
         setting=setting,
@@ -80,6 +82,7 @@ def _cell(key: Key, groups: Groups) -> Cell:
 
 
 def _quartiles(rows: Sequence[Row], column: str) -> Quartiles | None:
+    # An actor that never came into view was never passed: the episode has no value and is left out.
     return quartiles([Reading(row[column]) for row in rows if row[column] is not None])
 
 
@@ -87,7 +90,9 @@ def _no_later(rows: Sequence[Row], full: Sequence[Row]) -> int:
     bounds = {row["seed"]: detection(row).value for row in full}
     found = {row["seed"]: detection(row) for row in rows if row["seed"] in bounds}
     return sum(
-        not reading.censored and reading.value >= bounds[seed] for seed, reading in found.items()
+        # An actor that neither detected is no success: a censored reading does not count.
+        not reading.censored and reading.value >= bounds[seed]
+        for seed, reading in found.items()
     )
 
 

@@ -59,7 +59,7 @@ class Contrast:
 
     @property
     def decimals(self) -> int:
-        """Those of the measure."""
+        """Decimals of the measure."""
         return self.measure.decimals
 
     @property
@@ -74,7 +74,7 @@ class Contrast:
 
     @property
     def suffix(self) -> str:
-        """Nothing: the intervals of the closed loop all rest on seeds."""
+        """Empty: the intervals of the closed loop all rest on seeds."""
         return ""
 
     @property
@@ -87,6 +87,8 @@ class Contrast:
         """Whether the interval excludes zero and the mean difference reaches the gate, whatever the
         censored were.
         """
+        # The cautious mean puts every censored distance where it speaks most against the
+        # difference.
         return self.excludes_zero and abs(self.difference.cautious.mean) >= self.measure.gate
 
 
@@ -95,6 +97,8 @@ def contrast(
 ) -> Contrast | None:
     """`ours` minus `theirs`, paired by seed; None without shared seeds."""
     a, b = ({row["seed"]: measure.read(row) for row in rows or ()} for rows in (ours, theirs))
+    # Only seeds that both have played are pairs. Sorted, they give the same resamples whatever the
+    # order of the rows.
     seeds = sorted(set(a) & set(b))
     return (
         Contrast(measure, difference([a[s] for s in seeds], [b[s] for s in seeds]))

@@ -38,17 +38,17 @@ class ShownDifference(Protocol):
 
     @property
     def bound(self) -> str:
-        """Stands before the mean: on which side of it the true difference may lie."""
+        """Stands before the mean, and says on which side of it the true difference may lie."""
         ...
 
     @property
     def asterisk(self) -> str:
-        """Stands after the mean: whether the difference reaches its gate."""
+        """Stands after the mean where the difference reaches its gate."""
         ...
 
     @property
     def suffix(self) -> str:
-        """Stands at the end: what the interval rests on, where that is not the usual."""
+        """Stands at the end, and says what the interval rests on where that is not the usual."""
         ...
 
     @property
@@ -80,6 +80,8 @@ def quarters(values: Quartiles) -> str:
     """The quartiles around a median detection distance; empty where all three are not detected."""
     if values.high is None:
         return ""
+    # Ranks grow with distance, and what was not detected ranks lowest. If the upper quartile is not
+    # detected, neither are the other two.
     low, high = ("n.d." if value is None else f"{value:.1f}" for value in (values.low, values.high))
     return f"[{low}, {high}]"
 
@@ -105,6 +107,7 @@ def interval(difference: ShownDifference | None) -> str:
 
 def unsigned(contrast: Contrast | None) -> str:
     """A mean difference that is zero at best."""
+    # A z in the format turns a negative zero into 0.0.
     return f"{contrast.bound}{contrast.mean:z.1f}" if contrast else ""
 
 
@@ -132,5 +135,6 @@ def bounds(interval: Interval, decimals: int) -> str:
 
 
 def _end(end: float, decimals: int) -> str:
+    # An end at 0.04 printed as 0.0 would look as if the interval held zero.
     hidden = round(end, decimals) == 0 != round(end, decimals + 1)
     return f"{end:z.{decimals + hidden}f}"

@@ -28,7 +28,8 @@ _MINUS = re.compile(r"(?<!\w)-(?=\d)")
 
 
 def escaped(text: str) -> str:
-    """Text as LaTeX prints it; a hyphen before a number becomes a minus."""
+    """Text as LaTeX prints it; a hyphen before a number is a minus, but not one within a word."""
+    # Quotation marks after the escapes, which know none of the signs that they become.
     quoted = re.sub(r'"([^"]*)"', r"``\1''", text.translate(_ESCAPES))
     return _MINUS.sub("$-$", quoted)
 
@@ -51,6 +52,7 @@ def latex(table: Table) -> str:
         "\\toprule",
         _line(table.columns),
         "\\midrule",
+        # A row of one entry is a heading over all columns.
         *(_heading(row[0], columns) if len(row) == 1 else _line(row) for row in table.rows),
         "\\bottomrule",
         "\\end{tabular}",

@@ -20,16 +20,20 @@ from care_sim.study.run_config import Row
 
 
 def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
-    """The rows in a folder of results, their study, and what is missing. Raises InvalidInput where
-    there are none.
+    """The rows in a folder of results, their study, and what is missing of it.
+
+    Raises InvalidInput where there are no rows of a study.
     """
     kind = results_format_in(folder)
+    # Rows are written when a study ends, and its journal is removed then. A journal alone is a
+    # study that was stopped.
     if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
         raise InvalidInput(
             f"{folder} holds an unfinished study; the command that began it goes on there"
         )
     path = folder / kind.file
     study = study_of(path)
+    # A study of plays among episodes, or the other way round, is a file with a wrong name.
     if study.results is not kind:
         raise InvalidInput(
             f"{path} holds no rows of the study {study.name}, which are in {study.results.file}"
@@ -62,6 +66,8 @@ class StudyReport:
 
     def write(self, folder: Path) -> None:
         """Write tables and figures into a folder; then figures of an earlier study are removed."""
+        # New files first, then what is no longer of this study: whoever stops it in between keeps
+        # both.
         for name, text in self.texts.items():
             write_text(folder / name, text)
         for name, figure in self.figures.items():

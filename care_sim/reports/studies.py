@@ -30,11 +30,12 @@ from care_sim.study.run_config import Row
 
 @dataclass(frozen=True)
 class Study:
-    """How the rows of a study are shown: all pure functions of them.
+    """How the rows of a study are shown; all functions are pure functions of the rows.
 
-    `title` names it to readers; `closing` are sentences after the tables; `figure_names` every
-    figure that the study can draw, as patterns in which a * stands for any text; `caption` says how
-    to read its tables; `results` is what it plays; `columns` are further ones that its tables need.
+    `title` names it to readers. `closing` are sentences after the tables. `figure_names` are all
+    figures that the study can draw, as patterns in which a * stands for any text. `caption` says
+    how to read its tables. `results` is what it plays. `columns` are further columns that its
+    tables need.
     """
 
     name: str
@@ -135,6 +136,7 @@ def study_of(path: Path) -> Study:
 
     Raises InvalidInput for the name of a study that this version does not know.
     """
+    # Files of before the name was written hold sweeps.
     name = read_notes(path)[0] or SWEEP.name
     if name not in STUDIES:
         raise unknown(f"study in {path}", name, STUDIES)

@@ -13,7 +13,7 @@ from care_sim.base.errors import printable
 
 TableRow = tuple[str, ...]
 _MARKS = re.compile(r"[\\`*|~]|(?<!\w)_|_(?!\w)|<(?=[A-Za-z/!?])|&(?=#?\w+;)|(?<=\])\(")
-"""What Markdown reads as marks, tags, entities or links."""
+"""What Markdown reads as marks, tags, entities or links. An underscore within a word is none."""
 
 
 class Bold(str):
@@ -42,6 +42,8 @@ class Table:
     terminal: bool = True
 
     def __post_init__(self) -> None:
+        # A frozen dataclass sets its fields this way. Every text is made printable here, once, so
+        # that no output can forget it.
         object.__setattr__(self, "title", printable(self.title))
         object.__setattr__(self, "rows", tuple(map(_shown, self.rows)))
         for name in ("columns", "notes", "quotes", "files_only", "whole"):
@@ -57,11 +59,13 @@ class Table:
         ]
         for n in shown:
             name = self.columns[n]
+            # One word per line keeps columns narrow whose entries must not break.
             heading = name.replace(" ", "\n") if name in self.whole else name
             table.add_column(
                 Text(heading), no_wrap=name in self.whole, overflow="fold", vertical="bottom"
             )
         for row in self.rows:
+            # A heading stands in the first column alone.
             entries = row if len(row) == 1 else [row[n] for n in shown]
             table.add_row(*(_styled(entry, heading=len(row) == 1) for entry in entries))
         return Group(
@@ -103,6 +107,7 @@ def unmarked(text: str) -> str:
 
 
 def _shown(texts: TableRow) -> TableRow:
+    # The type of the text is kept, because Bold is a type.
     return tuple(text if text.isprintable() else type(text)(printable(text)) for text in texts)
 
 

@@ -11,19 +11,21 @@ from care_sim.reports.formatting import interval
 from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.formatting import MET, NOT_MET
 from care_sim.reports.protocol.notes import by_both_counts, counts, on_intervals
-from care_sim.reports.protocol.paper import GATE, PAPER_BUDGETS
+from care_sim.reports.protocol.paper import PAPER_BUDGETS
+from care_sim.reports.protocol.quotes import GATE
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays, plays_by_setting
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import REFERENCE, Row
 
 
 def protocol_closing(rows: Sequence[Row]) -> list[str]:
-    """Size of the study, and CARE over history against the gate of five points in every plain
-    setting.
+    """Size of the study, and CARE over history against the gate of five points in every setting
+    without conditions.
     """
     gains = {
         plays.setting: _gains(plays)
         for plays in plays_by_setting(rows)
+        # The gate was fixed for the plain setting, so that no fault is judged by it.
         if not plays.setting.conditions
     }
     gates = [_gate(setting, differences) for setting, differences in gains.items() if differences]
@@ -37,6 +39,8 @@ def protocol_closing(rows: Sequence[Row]) -> list[str]:
 
 
 def _size(rows: Sequence[Row]) -> str:
+    # Events and object frames belong to the film. Any row of a scene tells them, so that one is
+    # enough.
     scenes = {(row["source"], row["scene"]): row for row in rows}
     total = counts(scenes.values())
     keyframes = sum(row["keyframes"] for row in scenes.values())
@@ -66,4 +70,5 @@ def _gate(setting: Setting, differences: Mapping[float, MeasuredDifference]) -> 
 
 
 def _met_or_not(difference: MeasuredDifference) -> str:
+    # Both are asked for: an effect that is sure, and one that is large enough to matter.
     return MET if difference.sign > 0 and difference.mean >= GATE_POINTS else NOT_MET

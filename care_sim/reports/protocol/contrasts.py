@@ -1,5 +1,5 @@
-"""The paper's Table 1, CARE less every policy, and every policy less history: what a new idea adds
-to either.
+"""The paper's Table 1: CARE less every policy, and every policy less history, which shows what a
+new idea adds to either.
 """
 
 from collections.abc import Iterable, Iterator
@@ -40,6 +40,8 @@ def protocol_contrast_tables(plays: SettingPlays) -> list[Table]:
     """CARE less every other policy, every policy less history, and CARE's with equal weight to
     every scene; none of a base that was not played, or alone.
     """
+    # CARE first, as in the paper; then history, the base without a camera. Equal scene weights
+    # answer whether a few rich scenes drive the result, and go to the files alone.
     wanted = ((REFERENCE, False), (HISTORY, False), (REFERENCE, True))
     return [
         _table(plays, base, equal_scenes) for base, equal_scenes in wanted if plays.other_than(base)
@@ -76,6 +78,8 @@ def _contrasts(plays: SettingPlays, base: str, equal_scenes: bool) -> Iterator[_
     """CARE stands first in its pairs, history last."""
     for ratio in RATIOS:
         for policy in plays.other_than(base):
+            # A positive difference speaks for the policy under test: for CARE against the others,
+            # for the others against history.
             first, second = (base, policy) if base == REFERENCE else (policy, base)
             pair = PolicyPair(first, second, ratio, equal_scenes=equal_scenes)
             yield _ContrastLine(
@@ -92,6 +96,8 @@ def _lines(plays: SettingPlays, contrasts: Iterable[_ContrastLine]) -> Iterator[
         if pair.heading != heading:
             heading = pair.heading
             yield (heading,)
+        # A policy without any difference in this measure has no line, and no line of the paper
+        # under it.
         if any(differences):
             yield (marked(policy, plays.tags[policy]), *map(interval, differences))
             said = claims_about(plays.setting).get(pair)

@@ -1,5 +1,5 @@
-"""How much more one policy found than another, and how sure that is: by scenes, or where they are
-few by events.
+"""How much more one policy found than another, and how sure that is: by scenes, or by events where
+scenes are few.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,12 +27,12 @@ from care_sim.study.run_config import REFERENCE
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
 _HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
 RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
-"""What the columns by which scenes are ranked count, a keyframe."""
+"""What the columns count by which scenes are ranked, per keyframe."""
 FEWEST_SCENES = 9
-"""Three in each third: of fewer, a third says nothing of crowded scenes but of one or two."""
+"""Three in each third: a smaller third would speak of one or two scenes, not of crowded ones."""
 DENSE_LESS_SPARSE = "dense minus sparse"
 OVER_EVENTS = "°"
-"""Ends what rests on an interval over events."""
+"""Stands behind a difference whose interval comes from events."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,8 @@ class MeasuredDifference:
     def sign(self) -> int:
         """1 or -1 where the interval excludes zero, else 0."""
         return (
+            # The difference of two truth values: 1 where both ends are above zero, -1 where both
+            # are below. An interval that ends at zero holds it.
             0 if self.interval is None else int(self.interval.low > 0) - int(self.interval.high < 0)
         )
 
@@ -62,22 +64,22 @@ class MeasuredDifference:
 
     @property
     def decimals(self) -> int:
-        """Those of the measure."""
+        """Decimals of the measure."""
         return decimals_of(self.ratio)
 
     @property
     def bound(self) -> str:
-        """Nothing: recall has no censored values."""
+        """Empty: recall has no censored values."""
         return ""
 
     @property
     def asterisk(self) -> str:
-        """Nothing: the gate of the protocol is told in its closing sentences."""
+        """Empty: the gate of the protocol is told in its closing sentences."""
         return ""
 
     @property
     def suffix(self) -> str:
-        """Whether the interval is over events."""
+        """The mark of an interval over events."""
         return OVER_EVENTS if self.over_events else ""
 
 
@@ -103,7 +105,7 @@ class Comparison(Protocol):
 
     @property
     def policies(self) -> tuple[str, ...]:
-        """The policies that it takes."""
+        """The policies that must have been played."""
         ...
 
     def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
@@ -147,6 +149,9 @@ class PolicyPair:
         if found is None:
             return None
         by = found.by_scene if self.equal_scenes else found.by_event
+        # Scenes are the unit that is resampled, because the events of one scene are not
+        # independent. Of fewer scenes no interval is printed, and events stand in for them where
+        # they can.
         if found.scenes >= FEWEST_PAIRS:
             return MeasuredDifference(self.ratio, by.mean, by)
         by_events = None if self.within or self.equal_scenes else _by_events(self, plays, budget)
@@ -181,11 +186,13 @@ class SceneThird:
         return self.which if self.which == DENSE_LESS_SPARSE else f"{self.which} third"
 
     def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
-        """None with fewer than three scenes a third."""
+        """None with fewer than three scenes per third."""
         groups = plays.thirds(self.ranked_by, budget)
         if sum(map(len, groups.values())) < FEWEST_SCENES:
             return None
         ours, theirs = (plays.tallies(policy, budget) for policy in self.policies)
+        # The thirds are those of CARE at this budget for both policies, so that each scene is
+        # compared with itself.
         if self.which != DENSE_LESS_SPARSE:
             return _among(self.ratio, {name: ours[name] for name in groups[self.which]}, theirs)
         return _dense_less_sparse(self.ratio, ours, theirs, groups)
@@ -206,6 +213,8 @@ def _dense_less_sparse(
     interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
     if interval is None:
         return None
+    # The interval of the gap says nothing where one of the two ends has too few scenes for an
+    # interval of its own.
     ends = [
         _among(ratio, {name: ours[name] for name in groups[which]}, theirs)
         for which in ("dense", "sparse")
@@ -220,6 +229,8 @@ def _by_events(pair: PolicyPair, plays: SettingPlays, budget: float) -> Interval
     """
     if pair.ratio is OVERALL:
         return None
+    # Both policies have the same events in a scene, in the same order, so that the joined arrays
+    # are paired event by event.
     scenes = sorted(
         set(plays.tallies(pair.first, budget)) & set(plays.tallies(pair.second, budget))
     )
@@ -234,5 +245,7 @@ def _by_events(pair: PolicyPair, plays: SettingPlays, budget: float) -> Interval
 
 def _of_events(ratio: Ratio, delays: Floats) -> Floats:
     """(e,) the measure of every event, from (floor seeds, e) TTFD."""
+    # An event counts as found at first sight where its TTFD is 0. The mean over floor seeds comes
+    # first: the seeds of an event are no further events.
     means: Floats = np.mean(delays if ratio is TTFD else ratio.scale * (delays == 0), axis=0)
     return means

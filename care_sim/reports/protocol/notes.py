@@ -30,7 +30,10 @@ def played(plays: SettingPlays) -> str:
     """Scenes, events, object frames and floor seeds."""
     total = counts(plays.scenes.values())
     seeds = {
-        len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets
+        # The most that any policy has at a budget: some may have been played with fewer.
+        len(plays.seeds(policy, budget))
+        for policy in plays.policies
+        for budget in plays.budgets
     }
     return (
         f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} "
@@ -43,6 +46,7 @@ def by_both_counts(scenes: Collection[Row]) -> str:
     """How many events there are by the other presence, given one row of every scene; nothing where
     rows do not tell.
     """
+    # Rows of earlier versions lack the column.
     if any(row.get("emerging") is None for row in scenes):
         return ""
     emerging = sum(row["emerging"] for row in scenes)

@@ -1,4 +1,4 @@
-"""The rows of the first-sighting protocol, one a play: setting by setting what each policy found of
+"""The rows of the first-sighting protocol, one per play: for each setting what each policy found in
 every scene.
 """
 
@@ -18,7 +18,7 @@ from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 HISTORY = "history"
-"""The policy that every other is held against."""
+"""The policy that every other is compared with."""
 _COLUMNS = tuple(field.name for field in fields(Tally))
 
 
@@ -34,6 +34,7 @@ class SettingPlays:
         self.setting = setting
         self.scenes = {row["scene"]: row for row in rows}
         self.full = tuple(row for row in full if row["scene"] in self.scenes)
+        # The full scan feels no budget. It is kept aside as the ceiling of all budgets.
         budgeted = [row for row in rows if row["policy"] != FULL]
         self.tags = {policy_of(row): tags_of_row(row) for row in budgeted}
         self.budgets = sorted({row["budget"] for row in budgeted})
@@ -62,6 +63,7 @@ class SettingPlays:
 
     def seeds(self, policy: str, budget: float, within: str = "") -> list[Tallies]:
         """The tallies of every floor seed, of all or of one stratum ("range/below 20 m")."""
+        # Columns of a stratum are named KIND/STRATUM/FIELD, those of all events by the field alone.
         prefix = f"{within}/" if within else ""
         seeds: dict[int, dict[str, Tally]] = {}
         for row in self.rows(policy, budget):
@@ -72,6 +74,7 @@ class SettingPlays:
     def tallies(self, policy: str, budget: float, within: str = "") -> Tallies:
         """The mean tally over floor seeds of every scene that was played with all of them."""
         key = (policy, budget, within)
+        # Every table asks for the same tallies again.
         if key not in self._tallies:
             self._tallies[key] = averaged(self.seeds(*key))
         return self._tallies[key]
@@ -94,6 +97,7 @@ class SettingPlays:
         """A column of the reference by scene, averaged over floor seeds."""
         values: dict[str, list[float]] = {scene: [] for scene in self.tallies(REFERENCE, budget)}
         for row in self.rows(REFERENCE, budget):
+            # A scene that not all floor seeds have played is in no tally, and is left out here too.
             if row["scene"] in values:
                 values[row["scene"]].append(row[column])
         return {scene: float(np.mean(seeds)) for scene, seeds in values.items()}
@@ -103,6 +107,8 @@ class SettingPlays:
         known.
         """
         columns = ("keyframes", "differing_keyframes", "differing_cells")
+        # Not known of the reference itself, of the full scan, and of rows that older versions
+        # wrote.
         known = [
             row
             for row in self.rows(policy, budget)
@@ -130,12 +136,16 @@ def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
     for row in rows:
         groups.setdefault(setting_of(row), []).append(row)
     full = {
-        setting: [row for row in own if row["policy"] == FULL] for setting, own in groups.items()
+        # A fault that the full scan does not feel puts its rows under the plain setting, where they
+        # serve as the ceiling of every setting that has none of its own.
+        setting: [row for row in own if row["policy"] == FULL]
+        for setting, own in groups.items()
     }
     plays = [
         SettingPlays(setting, own, full[setting] or full.get(setting.for_full(), ()))
         for setting, own in groups.items()
     ]
+    # The full scans alone are no setting to report, unless nothing else was played.
     return [each for each in plays if each.tags] or plays
 
 
@@ -143,6 +153,7 @@ def _check_films(rows: Sequence[Row]) -> None:
     """The data of a source may have changed between two runs into one folder."""
     films: dict[tuple[str, ...], str] = {}
     for row in rows:
+        # Camera detections from a file make another film of the same scene.
         scene = (row["source"], row["scene"], row.get("camera_detections") or "")
         if len(row["ttfds"]) != row["events"]:
             raise InvalidInput(

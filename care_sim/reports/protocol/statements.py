@@ -29,10 +29,11 @@ _UNIFORM = (
 
 
 def statements_tables(plays: SettingPlays) -> list[Table]:
-    """One line a statement, at the paper's budgets; none where the paper says nothing of such
+    """One line per statement, at the paper's budgets; none where the paper says nothing of such
     plays.
     """
     said = claims_about(plays.setting)
+    # Only the budgets of which the paper speaks: a verdict needs a claim.
     budgets = [budget for budget in plays.budgets if budget in PAPER_BUDGETS]
     found = {
         each: {budget: each.measured(plays, budget) for budget in budgets}
@@ -73,6 +74,7 @@ def _is_played(statement: Comparison, plays: SettingPlays) -> bool:
 
 
 def _lines(measured: _Measured, said: Mapping[Comparison, Claims]) -> Iterator[tuple[str, ...]]:
+    # Statements come measure by measure. A heading opens each measure.
     heading = ""
     for each, differences in measured.items():
         if each.heading != heading:
@@ -100,6 +102,7 @@ def _count(measured: _Measured, said: Mapping[Comparison, Claims]) -> str:
         verdict(difference, claim.sign)
         for each, differences in measured.items()
         for budget, difference in differences.items()
+        # A budget that was not played, or of which the paper says nothing, is no verdict.
         if difference and (claim := said[each].at(budget))
     )
     listed = ", ".join(f"{verdicts[each]} {each}" for each in (MET, NOT_MET, UNDECIDED))

@@ -28,7 +28,7 @@ from care_sim.reports.table import Table
 from care_sim.study.run_config import REFERENCE
 
 _BASES = (HISTORY, "all-camera")
-"""The policies that strata compare CARE with."""
+"""The policies with which strata compare CARE."""
 _RANKED = (
     "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. "
     f"No interval of fewer than {FEWEST_PAIRS} scenes."
@@ -54,6 +54,8 @@ def strata_tables(plays: SettingPlays) -> list[Table]:
         *(pair.label for pair in _pairs(plays)),
     )
     notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
+    # The tables of thirds would follow. A note in the last table before them says why they are
+    # missing.
     without = (_NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
     return [
         Table(
@@ -93,6 +95,7 @@ def _strata_lines(plays: SettingPlays, ratio: Ratio) -> Iterator[tuple[str, ...]
 
 
 def _stratum_line(plays: SettingPlays, ratio: Ratio, within: str, budget: float) -> tuple[str, ...]:
+    # First sightings are counted in events, overall recall in object frames.
     column = "events" if ratio is FIRST_SIGHTING else "frames"
     levels = (plays.level(ratio, policy, budget, within).by_event for policy in plays.policies)
     return (
@@ -105,7 +108,7 @@ def _stratum_line(plays: SettingPlays, ratio: Ratio, within: str, budget: float)
 
 
 def thirds_tables(plays: SettingPlays) -> list[Table]:
-    """CARE less all-camera in sparse and dense scenes; none without three scenes a third at every
+    """CARE less all-camera in sparse and dense scenes; none without three scenes per third at every
     budget.
     """
     if not _has_thirds(plays):
@@ -128,6 +131,7 @@ def thirds_tables(plays: SettingPlays) -> list[Table]:
 
 
 def _has_thirds(plays: SettingPlays) -> bool:
+    # The gap between dense and sparse needs both other thirds, so that it stands for all of them.
     third = SceneThird(DENSE_LESS_SPARSE, "tracks", OVERALL)
     played = {*third.policies} <= {*plays.policies}
     return played and all(third.measured(plays, budget) for budget in plays.budgets)
@@ -135,6 +139,7 @@ def _has_thirds(plays: SettingPlays) -> bool:
 
 def _ranking_lines(plays: SettingPlays, column: str) -> Iterator[tuple[str, ...]]:
     yield (f"{RANKINGS[column]} a keyframe",)
+    # What a third means in numbers comes before what differs in it. Dense first, as in the paper.
     for name in reversed(SCENE_THIRDS):
         yield (
             f"{name} third",

@@ -56,7 +56,8 @@ def protocol_tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def levels_tables(plays: SettingPlays) -> list[Table]:
-    """Recall and TTFD of every policy and of the full scan, one line a policy and budget."""
+    """Recall and TTFD of every policy and of the full scan, one line per policy and budget."""
+    # The full scan comes last, under its own budget of all cells.
     ceiling = ((FULL, 1.0),) if plays.full else ()
     budgeted = ((policy, budget) for budget in plays.budgets for policy in plays.policies)
     keys = [key for key in (*budgeted, *ceiling) if plays.rows(*key)]
@@ -100,6 +101,7 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
 
 def _of_full(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
     """Share of the ceiling in %, of the scenes that the policy and the full scan have."""
+    # A ratio of two recalls is one of the same objects only where both have played the same scenes.
     ours = plays.tallies(policy, budget)
     full = plays.tallies(FULL, 1.0)
     value, ceiling = (_over(ratio, tallies, set(ours) & set(full)) for tallies in (ours, full))
@@ -113,6 +115,7 @@ def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | No
 def _deviation(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
     """The most by which one floor seed differs from the mean, of the scenes that all seeds have."""
     mean = plays.tallies(policy, budget)
+    # On the scenes that every seed has, else a missing scene would pass for the spread of seeds.
     seeds = [_over(ratio, seed, mean) for seed in plays.seeds(policy, budget)]
     middle = _over(ratio, mean, mean)
     off = [abs(value - middle) for value in seeds if value is not None and middle is not None]

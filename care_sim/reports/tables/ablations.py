@@ -16,7 +16,7 @@ _MOST_SHOWN = 2
 
 
 def ablation_tables(rows: Sequence[Row]) -> list[Table]:
-    """A table an ablation: levels and paired differences, place by place."""
+    """One table per ablation: levels and paired differences, place by place."""
     study = StudyCells(rows)
     return [_table(ablation, study) for ablation in ABLATIONS]
 
@@ -29,6 +29,8 @@ def _table(ablation: Ablation, study: StudyCells) -> Table:
         *(f"minus {study.marked(policy)}" for policy in beside),
     )
     lines = [line for place in ABLATION_PLACES for line in _block(ablation, place, beside, study)]
+    # The files show every column. A terminal lacks the room for quartiles, braking and further
+    # policies.
     hidden = (*_LEVEL_COLUMNS[2:], *columns[len(_LEVEL_COLUMNS) + 1 + _MOST_SHOWN :])
     notes = (*ablation.notes, *study.notes(beside))
     return Table(
@@ -49,7 +51,10 @@ def _block(
     usual = USUAL_VARIANT.key(place, ablation.policy)
     for level in ablation.levels:
         ours = level.key(place, ablation.policy)
+        # The others feel the conditions of a level and not its parameters, which are the own ones
+        # of the policy.
         others = (level.for_others().key(place, policy) for policy in beside)
+        # The usual level is played once and stands in every ablation, compared with nothing.
         name = f"{level.label} (usual)" if ours == usual else level.label
         change = "" if ours == usual else interval(study.difference(ours, usual))
         yield (
@@ -61,9 +66,11 @@ def _block(
 
 
 def _beside(ablation: Ablation, study: StudyCells) -> list[str]:
-    """The references, and the further policies that were played where the conditions depart from
-    the usual.
+    """The references, and the further policies that were played where conditions depart from the
+    usual.
     """
+    # A policy that was played under usual conditions alone belongs to no ablation. One that was
+    # played where some condition departs was asked for.
     known = (ablation.policy, *ablation.references, "full")
     usual = USUAL_VARIANT.key(ABLATION_PLACES[0], "care")
     levels = [

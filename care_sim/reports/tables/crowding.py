@@ -57,13 +57,15 @@ class Crowd:
         return [
             n
             for n, gap in gaps.items()
+            # The cautious mean: a collapse is claimed only if it holds wherever the censored
+            # distances lie.
             if gap and gap.excludes_zero and gap.difference.cautious.mean <= -COLLAPSE_M
         ]
 
 
 def crowding_tables(rows: Sequence[Row]) -> list[Table]:
-    """What all-camera, and every further policy, has less than CARE by standing vehicles and
-    budget: differences, intervals, and the medians behind them.
+    """Tables of how much less all-camera, and every further policy, has than CARE, by standing
+    vehicles and budget: differences, intervals, and the medians behind them.
     """
     crowd = Crowd(rows)
     gaps = [
@@ -83,6 +85,7 @@ def _gaps_table(crowd: Crowd, other: str, intervals: bool) -> Table:
     title = f"{_TITLE}first detection of {crowd.study.marked(other)} minus care, m{more}"
     notes = (
         (_collapse_note(crowd),)
+        # The note on collapses belongs to the one table that shows them.
         if other == "all-camera" and not intervals
         else crowd.study.notes([other])
     )
@@ -118,6 +121,7 @@ def _medians_table(crowd: Crowd) -> Table:
 
 def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:
     medians = (crowd.median(vehicles, policy, budget) for policy in policies)
+    # Three medians share an entry, which has no room for words.
     return "/".join(medians).replace("not detected", "n.d.")
 
 

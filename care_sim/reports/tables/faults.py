@@ -35,17 +35,19 @@ def policies_of(study: StudyCells) -> list[str]:
 
 
 def fault_tables(rows: Sequence[Row]) -> list[Table]:
-    """Where the order changes, then a table a fault with levels and paired differences."""
+    """Where the order changes, then one table per fault with levels and paired differences."""
     study = StudyCells(rows)
     return [_order_table(study), *(_fault_table(fault, study) for fault in FAULTS)]
 
 
 def order(pair: tuple[str, str], fault: Fault, place: Place, study: StudyCells) -> str:
-    """How two policies stand as the fault grows: '>' where the first detects earlier by a
-    difference that counts, '<' where the second does, '=' elsewhere; bold when it changes.
-    Strengths that were not played are passed over.
+    """How two policies stand as the fault grows, bold when that changes.
+
+    '>' where the first detects earlier by a difference that counts, '<' where the second does, '='
+    elsewhere. Strengths that were not played are passed over.
     """
     found = [(level.label, _difference(pair, level, place, study)) for level in fault.levels]
+    # The sign of the first strength that was played, then each strength at which it turns.
     signs = [(label, _sign(difference)) for label, difference in found if difference]
     changes = [
         f"{sign} from {label}" for (_, before), (label, sign) in pairwise(signs) if sign != before
@@ -62,6 +64,7 @@ def _difference(
 
 
 def _sign(difference: Contrast) -> str:
+    # By the gate, not by the interval alone: a sure difference of a few centimetres is no order.
     return "=" if not difference.counts else ">" if difference.mean > 0 else "<"
 
 
@@ -91,6 +94,7 @@ def _fault_table(fault: Fault, study: StudyCells) -> Table:
 
 def _blocks(fault: Fault, place: Place, study: StudyCells) -> Iterator[tuple[str, ...]]:
     """A block of policies for each measure, and one of paired differences."""
+    # All measures of a place before the next place: they are read together.
     for name, entry in (
         ("first detection, m", _detection),
         ("braked", _braked),

@@ -1,8 +1,8 @@
 """Every statement of the paper's Sec. 5.6 beside what a study measured, as pure functions of its
 rows.
 
-Numbers are medians in metres; a median that is not detected ranks below every other. Statements
-that the paper makes in words are put as a bound, which they name.
+Numbers are medians in metres; a median that is not detected ranks below every other. What the paper
+says in words is put as a bound, which the statement names.
 """
 
 import math
@@ -44,6 +44,7 @@ class Statement:
 def statements(rows: Sequence[Row]) -> list[Statement]:
     """All statements, when the rows cover every cell of the paper's study; else none."""
     found = {cell.key: cell for cell in summarise(rows)}
+    # A part of the study would agree with a part of the statements, and pass for all of them.
     if not paper_cells() <= set(found):
         return []
     cells = {_key(cell): cell for key, cell in found.items() if key in paper_cells()}
@@ -67,6 +68,8 @@ def _dartout(cells: _CellsByName) -> list[Statement]:
     full = cells["dartout", "full", 1.0, ""]
     gaps = [_gap(cell, full) for cell in camera]
     passes = [_pass(cell) for cell in camera]
+    # The shortest distance is the latest detection. The worst of the camera policies is held
+    # against history.
     latest = min(camera, key=_median)
     at = "dart-out 10%: "
     about = f"about {DARTOUT_CAMERA.detection_m:.0f}"
@@ -162,6 +165,8 @@ def _faults(cells: _CellsByName) -> list[Statement]:
             fault for _, policy, _, fault in cells if fault.startswith(name) and policy == "care"
         ]
         pairs = [
+            # History has no rows under latency, which it does not feel: its faultless rows stand
+            # for them.
             (_slowest(cells, f), cells.get(("dartout", "history", 0.1, f), _history(cells)))
             for f in faults
         ]
@@ -188,12 +193,15 @@ def _collisions(cells: Sequence[Cell]) -> Statement:
 
 
 def _median(cell: Cell) -> float:
+    # Rounded as the tables show it, so that a verdict can be checked by eye.
     return -math.inf if cell.detection.median is None else round(cell.detection.median, 1)
 
 
 def _gap(ours: Cell, theirs: Cell) -> float:
     """Distance between two medians; no gap is known where one is not detected."""
     gap = abs(_median(ours) - _median(theirs))
+    # The difference of two rounded medians has an error in its last bits, which rounding takes away
+    # again. Two that are both not detected differ by nan, which is no agreement.
     return round(gap, 1) if math.isfinite(gap) else math.inf
 
 

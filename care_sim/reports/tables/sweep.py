@@ -1,5 +1,5 @@
 """Tables of a sweep: in every setting the levels of all policies, then what CARE and the learned
-have over each.
+policies have over each.
 """
 
 from collections.abc import Sequence
@@ -51,13 +51,15 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def levels_table(title: str, cells: Sequence[Cell]) -> Table:
-    """Medians, counts and regret, one row a cell."""
+    """Medians, counts and regret, one row per cell."""
     published = [_published(cell) for cell in cells]
     sentences = dict.fromkeys(f'Paper: "{result.sentence}"' for result in published if result)
     lines = (_line(cell, result) for cell, result in zip(cells, published, strict=True))
+    # A table of full scans alone lacks no regret.
     regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
     missing = [] if regretted else ["Regret: full not run."]
     notes = [*tag_notes(cell.tags for cell in cells), *missing]
+    # Without censored episodes the column holds zeros, and a terminal has no room for them.
     hidden = _FILES_ONLY if any(cell.never for cell in cells) else (*_FILES_ONLY, "never")
     return Table(title, SWEEP_COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, _WHOLE)
 
@@ -66,6 +68,7 @@ def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Group
     """CARE minus every other policy, then the same of every learned one; none for a policy that ran
     alone.
     """
+    # The full scan of the same worlds may stand in another setting, of which it feels the same.
     tags = {cell.policy: cell.tags for cell in cells} | (
         {FULL: ()} if full_of(groups, setting) else {}
     )
@@ -81,7 +84,8 @@ def _contrast_table(
     groups: Groups,
     tags: dict[str, tuple[str, ...]],
 ) -> Table:
-    """The reference minus the others, policies by budgets, a block a measure."""
+    """The reference minus the others: policies by budgets, one block per measure."""
+    # The budgets of the reference: at others there is nothing to compare with.
     budgets = sorted({cell.budget for cell in cells if cell.policy == reference})
     lines: list[tuple[str, ...]] = []
     for measure in (DETECTION, BRAKED, *([DETECTED] if any(cell.never for cell in cells) else [])):
@@ -109,11 +113,14 @@ def _ahead(measure: Measure, ours: Key, theirs: Key, groups: Groups) -> Contrast
     return contrast(
         measure,
         groups.get(ours),
+        # The full scan has one budget, and is held against every budget of the others.
         full_of(groups, setting) if policy == FULL else groups.get(theirs),
     )
 
 
 def _published(cell: Cell) -> PublishedResult | None:
+    # Other physics or conditions than the paper's are no cell of its study, even where the
+    # scenario, policy and budget are.
     if (cell.setting, cell.policy, cell.budget) not in paper_cells():
         return None
     return published_result(cell.setting.world, cell.policy, cell.budget, cell.setting.faults)
@@ -153,6 +160,7 @@ def _share(count: int, cell: Cell) -> str:
 def _median(values: Quartiles | None, cell: Cell) -> str:
     if values is None:
         return "never in view"
+    # Fewer values than episodes: the actor never came into view in the others.
     return f"{values.median:.1f}" + (
         f" (of {values.count})" if values.count < cell.episodes else ""
     )
