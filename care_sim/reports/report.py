@@ -25,8 +25,7 @@ def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
     Raises InvalidInput where there are no rows of a study.
     """
     kind = results_format_in(folder)
-    # Rows are written when a study ends, and its journal is removed then. A journal alone is a
-    # study that was stopped.
+    # Rows are written when a study ends. A journal without them is of a study that was stopped.
     if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
         raise InvalidInput(
             f"{folder} holds an unfinished study; the command that began it goes on there"

@@ -117,7 +117,7 @@ _PLAIN: dict[Comparison, Claims] = {
         Claim(0, at_most=0.2), quotes.PRIORITY
     ),
     PolicyPair("care", "history", FIRST_SIGHTING, equal_scenes=True): _by_budget(
-        _difference(5.3), _difference(5.2), _difference(4.2), source=_ALIKE
+        _difference(5.3), _difference(5.2), _difference(4.2), source=quotes.EQUAL_SCENES
     ),
     PolicyPair("care", "history", OVERALL): _by_budget(
         _difference(-0.8), _difference(-0.5), _difference(0.6), source=quotes.HISTORY
