@@ -1,4 +1,6 @@
-"""What an episode is made of: checked when written down."""
+"""The configuration of an episode of the closed loop: everything that decides it, checked when it
+is written down.
+"""
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -51,13 +53,15 @@ class EpisodeConfig(Conditions, RunConfig):
         self.check_parameters("scenario_parameters", "policy_parameters")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
         check_known("environment of the scenario", self.scenario, ENVIRONMENT_IDS)
+        # Making the environment and the policy is the check of all other fields: they alone know
+        # what they accept.
         with self.make_env() as env:
             self.make_policy(env)
         super().__post_init__()
 
     def with_seed(self, seed: int) -> Self:
-        """The same of another seed; what is sound for one is for all, so that only the seed is
-        checked.
+        """The same with another seed. What is sound for one seed is sound for all, so that only the
+        seed is checked.
         """
         check_seed(seed)
         return self.changed(seed=int(seed))
@@ -94,7 +98,7 @@ class EpisodeConfig(Conditions, RunConfig):
 
     @property
     def order(self) -> int:
-        """Seed by seed, so that an interrupted study leaves whole pairs."""
+        """The seed: an interrupted study leaves whole pairs of policies."""
         return self.seed
 
     @property
@@ -104,7 +108,7 @@ class EpisodeConfig(Conditions, RunConfig):
 
     @property
     def similarity_keys(self) -> tuple[SimilarityKey, ...]:
-        """All but the seed; scenario, policy and budget; the policy; nothing."""
+        """Everything but the seed; scenario, policy and budget; the policy; nothing."""
         all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
         return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
 
@@ -133,6 +137,7 @@ def grid(
         false_negative_rates,
         camera_latencies,
     ]
+    # Before the configurations are made: each one makes an environment.
     check_size(prod(map(len, axes)))
     configs = (
         _config(
@@ -143,6 +148,7 @@ def grid(
         )
         for scenario, policy, budget, rate, latency in product(*axes)
     )
+    # Without repeats: for the full scan all budgets give the same configuration.
     return of_seeds([*dict.fromkeys(configs)], seeds)
 
 

@@ -1,6 +1,6 @@
-"""The journal of a study: a line for every finished task, so that nothing computed is lost.
+"""The journal of a study: one line for every finished task, so that nothing computed is lost.
 
-A line is a row as JSON, the name of its study, and last a checksum of all before it.
+A line is a row as JSON, the name of its study, and at the end a checksum of all before it.
 """
 
 import fcntl
@@ -27,10 +27,11 @@ class Journal:
     """Finished rows by digest, in a file of JSON lines that only ever grows.
 
     Opening it reads the rows of earlier runs. A line that was torn by a crash, or whose checksum is
-    not that of its text, is passed over, so that its task runs again; `damaged` counts them.
-    `studies` are those of the rows, `study` is the one whose rows are added. Raises OSError when
-    the folder cannot be written, InvalidInput while another study writes there, and for a journal
-    larger than `LARGEST_JOURNAL`.
+    not that of its text, is passed over, so that its task runs again; `damaged` counts such lines.
+    `studies` are those of the rows; `study` is the one whose rows are added.
+
+    Raises OSError when the folder cannot be written, and InvalidInput while another study writes
+    there and for a journal larger than `LARGEST_JOURNAL`.
     """
 
     def __init__(self, path: Path, study: str = "sweep"):
@@ -39,14 +40,17 @@ class Journal:
         if path.exists():
             _check_journal(path)
         self._file = path.open("a+", encoding="utf-8", errors="replace")
+        # Locked before it is read: another process may be adding lines.
         self._lock(path.parent)
         self._file.seek(0)
         text = self._file.read()
+        # Not splitlines: a text in a row may hold other line separators.
         lines = [line for line in text.split("\n") if line]
         sound = [row for line in lines if (row := _read(line)) is not None]
         self.damaged = len(lines) - len(sound)
         self.studies = {row.pop(_STUDY) for row in sound}
         self._rows = {row["digest"]: row for row in sound}
+        # A torn last line is closed, so that the next row does not continue it.
         if text and not text.endswith("\n"):
             self._write("\n")
 
@@ -76,12 +80,14 @@ class Journal:
         self._file.close()
 
     def append(self, row: Row) -> None:
-        """Keep a finished episode; with the operating system when this returns."""
+        """Keep a finished row. When this returns, the operating system has it, and it outlives this
+        process.
+        """
         self._write(_line(row | {_STUDY: self._study}))
         self._rows[row["digest"]] = row
 
     def _lock(self, folder: Path) -> None:
-        """Keep others out until the file is closed, however this process ends."""
+        """Keep other processes out until the file is closed, however this process ends."""
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -97,6 +103,7 @@ class Journal:
             self._file.write(text)
             self._file.flush()
         except OSError as error:
+            # With the name of the file, which errors of write lack.
             raise OSError(error.errno, error.strerror, self._file.name) from error
 
 

@@ -1,5 +1,5 @@
-"""The parameters of a task: what values they may have, so that journals and columns hold them as
-they are.
+"""The parameters of a task: which values they may have, so that journals and columns of results
+give them back as they were.
 """
 
 import ast
@@ -58,25 +58,33 @@ def _plain(value: Any, levels: int = _DEEPEST) -> Any:
         value = value.tolist()
     if isinstance(value, list | tuple) and levels:
         return tuple(_plain(each, levels - 1) for each in value)
+    # Before int, of which bool is a subclass.
     if isinstance(value, bool):
         return value
     if isinstance(value, int) and -_WHOLE <= value < _WHOLE:
         return int(value)
+    # NaN is no value: no row with it would be equal to itself.
     if isinstance(value, float) and value == value:
         return float(value)
+    # Texts pass through fspath unchanged. Anything else that is no path raises TypeError.
     return _text(os.fspath(value))
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise TypeError
+    # Halves of surrogate pairs, which no file can hold, raise here.
     value.encode()
+    # A subclass of str, such as an enum, becomes a plain str.
     return str.__str__(value)
 
 
 def _kind(value: Any) -> Any:
-    """What a column of such values is called. Raises ValueError for a list of several kinds."""
+    """The kind of values that a column of such values holds. Raises ValueError for a list of
+    several kinds.
+    """
     if not isinstance(value, tuple):
+        # A column of numbers may mix whole ones with others.
         return float if type(value) is int else type(value)
     kinds = {_kind(each) for each in value}
     if len(kinds) > 1:
@@ -107,6 +115,7 @@ def _pair(text: str) -> tuple[str, Any]:
         raise InvalidInput(
             f"a parameter must be at most {_LONGEST} characters long, got {shown(text)}"
         )
+    # A Windows path holds backslashes that Python warns of as escapes.
     with warnings.catch_warnings(action="ignore", category=SyntaxWarning):
         try:
             literal = ast.literal_eval(value)

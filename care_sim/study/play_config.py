@@ -1,4 +1,4 @@
-"""What a play is made of: a policy in a scene whose film is the same for all."""
+"""The configuration of a play of the open loop: a policy in a scene whose film is the same for all."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -39,7 +39,7 @@ class PlayConfig(Conditions, RunConfig):
     """Everything that decides a play: the scene of a source, the policy, the detector, who counts
     as present at scene start (`care_sim.evaluation.sightings`), the conditions.
 
-    Raises InvalidInput for anything that environment, detector or policy does not accept; whether
+    Raises InvalidInput for anything that environment, detector or policy does not accept. Whether
     the scene can be read shows when it is played.
     """
 
@@ -60,7 +60,10 @@ class PlayConfig(Conditions, RunConfig):
                     f"{name} cannot be changed in the open loop: its films are made without"
                 )
         with gymnasium.make(
-            "care_sim:CARE-Street-v0", disable_env_checker=True, **self._arguments()
+            # Any film will do for this check, and a generated street needs no data.
+            "care_sim:CARE-Street-v0",
+            disable_env_checker=True,
+            **self._arguments(),
         ) as env:
             self.make_policy(env)
         super().__post_init__()
@@ -75,15 +78,19 @@ class PlayConfig(Conditions, RunConfig):
 
     def row(self) -> Row:
         """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`.
-        `presence` is a column where it is not the rule.
+        `presence` is a column only where it is not the default.
         """
         plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
         own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
+        # Without the column the rows, and the digests made of them, stay as they were before there
+        # was a choice.
         other = {} if self.presence == ANNOTATED else {"presence": self.presence}
         return self.source.row(self.scene) | {"scene": self.scene.name} | plain | other | own
 
     def installed(self) -> list[str | None]:
-        """Of the detector too, and of the files that it is given."""
+        """Those of the base, the hash of the detector, and those of the files that its parameters
+        name.
+        """
         return [
             *super().installed(),
             detector_digest(self.detector),
@@ -106,7 +113,7 @@ class PlayConfig(Conditions, RunConfig):
 
     @property
     def order(self) -> int:
-        """Scene by scene; they come in order."""
+        """Zero for all: plays come scene by scene, and that is their order."""
         return 0
 
     @property
@@ -160,6 +167,7 @@ def play_grid(
         config.of_scene(scene, floor_seed)
         for scene in scenes
         for config, own in floors.items()
+        # The full scan fires every cell, and a seed of the floor changes nothing in it.
         for floor_seed in own
     ]
 
@@ -175,6 +183,7 @@ def listed_plays(configs: Sequence[PlayConfig]) -> dict[str, Any]:
     with the list of its floor seeds.
     """
     scenes = list(dict.fromkeys(config.scene for config in configs))
+    # All scenes have the same configurations, so that those of the first tell all.
     plain = [_plain(config) for config in configs if config.scene == scenes[0]]
     return {
         "scenes": [scene.name for scene in scenes],

@@ -1,4 +1,4 @@
-"""How far a study has come: a bar on a terminal, a line from time to time elsewhere."""
+"""How far a study has come: a bar on a terminal, lines from time to time elsewhere."""
 
 import math
 import sys
@@ -18,7 +18,7 @@ from care_sim.study.run_config import Row, RunConfig
 from care_sim.study.runner import Failure, RunListener, run_all
 
 _EARLY = 0.05
-"""Share of the tasks after which the prediction is kept, and after which a line is due."""
+"""Share of the tasks after which the prediction is noted, and after which a line is due."""
 _FIRST_LINE_S = 10.0
 _LINE_S = 60.0
 
@@ -85,6 +85,7 @@ class ProgressReporter(RunListener):
         self._predict()
         if (
             math.isnan(self._predicted_s)
+            # One prediction is noted early and kept, so that the summary can say how good it was.
             and self._new - self._remaining.waiting >= _EARLY * self._new
         ):
             self._predicted_s = self._end - self._started
@@ -98,6 +99,7 @@ class ProgressReporter(RunListener):
     def summary(self, unit: str) -> str:
         """How long it took, and how long it should have."""
         took = f"{self._new} {unit} took {_exact(self._clock() - self._started)}"
+        # Of fewer tasks than twenty, one is more than the share after which a prediction counts.
         many = self._new >= 1 / _EARLY
         return f"{took}; {_exact(self._predicted_s)} predicted after {_EARLY:.0%}" if many else took
 
@@ -105,11 +107,8 @@ class ProgressReporter(RunListener):
         self._end = self._clock() + self._remaining.remaining_s(self._workers)
 
     def _tell(self) -> None:
-        left = (
-            ""
-            if math.isnan(self._end)
-            else f"{rounded_duration(max(self._end - self._clock(), 0.0))} left"
-        )
+        left_s = max(self._end - self._clock(), 0.0)
+        left = "" if math.isnan(self._end) else f"{rounded_duration(left_s)} left"
         waits = self._workers == 0 and self._remaining.waiting > 0
         self._show(
             self._total - self._remaining.waiting, "no worker is connected" if waits else left
@@ -120,6 +119,8 @@ class ProgressReporter(RunListener):
 def progress_bar(total: int, unit: str) -> Iterator[Show]:
     """A bar on a terminal."""
     columns = (TextColumn(unit), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    # What is printed meanwhile goes above the bar where both share the terminal. A stdout that goes
+    # to a file must not pass through it.
     shared = sys.stdout.isatty()
     left = TextColumn("{task.fields[left]}")
     with Progress(*columns, left, console=Console(stderr=True), redirect_stdout=shared) as progress:
@@ -135,6 +136,7 @@ class ProgressLines:
         self._unit = unit
         self._clock = clock
         self._last_s = clock()
+        # So that the first line is due by time alone.
         self._last_done = -total
 
     def __call__(self, done: int, left: str) -> None:

@@ -1,4 +1,4 @@
-"""How long the rest of a study will take, from what its tasks took so far."""
+"""How long the rest of a study will take, judged by what its tasks took so far."""
 
 import math
 from collections import Counter
@@ -35,16 +35,20 @@ class RemainingTime:
         self._now.add(task.similarity_keys, seconds)
 
     def remaining_s(self, workers: int) -> float:
-        """Seconds until the last task ends, with so many workers; NaN while nothing is known."""
+        """Seconds until the last task ends with so many workers; NaN while nothing is known."""
         expected = {
             kind: self._expected_s(kind) for kind, number in self._waiting.items() if number > 0
         }
         if not expected:
             return 0.0
         total = sum(self._waiting[kind] * seconds for kind, seconds in expected.items())
+        # The work shared evenly, but never less than the longest task, which no second worker
+        # shortens.
         return max(total / max(workers, 1), max(expected.values()))
 
     def _expected_s(self, kind: tuple[SimilarityKey, ...]) -> float:
+        # The closest likeness first, and for each what this run has measured before what an earlier
+        # one did.
         candidates = (means.get(key) for key in kind for means in (self._now, self._earlier))
         return next((seconds for seconds in candidates if seconds is not None), math.nan)
 

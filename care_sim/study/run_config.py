@@ -1,4 +1,8 @@
-"""What a study hands to its workers: a policy, and the world that it meets, named by a digest."""
+"""What a study hands to its workers: a policy, and the world that it meets, named by a digest.
+
+The configurations of the closed loop (`care_sim.study.episode_config`) and of the open loop
+(`care_sim.study.play_config`) have this base.
+"""
 
 import hashlib
 import json
@@ -23,7 +27,7 @@ from care_sim.study.provenance import SESSION, code_digest, policy_digest
 Row = dict[str, Any]
 
 SimilarityKey = tuple[object, ...]
-"""What tasks have in common."""
+"""What tasks have in common that take about as long."""
 
 MOST_TASKS = 100_000
 """Tasks of a study, whose rows it holds in memory: 10 to 20 kB each, 1 to 2 GB in all."""
@@ -64,19 +68,19 @@ class RunConfig(ABC):
     @property
     @abstractmethod
     def similarity_keys(self) -> tuple[SimilarityKey, ...]:
-        """What it shares with tasks that take as long, the closest key first."""
+        """What it shares with tasks that take about as long, the closest first."""
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
-        """The policy for the environment; its files are looked at before it plays, which may load
-        more of its code.
+        """The policy for the environment. Its files are looked at before it plays, because making
+        it may load more of its code.
         """
         policy = make_policy(self.policy, env, **dict(self.policy_parameters))
         self.installed()
         return policy
 
     def digest(self) -> str:
-        """Hash of the effective configuration; package version, code and what is installed beside
-        it included.
+        """Hash of the effective configuration, with the version and code of the package and what is
+        installed beside it.
 
         It never repeats in another run when an installed policy has no source to read.
         """
@@ -84,23 +88,26 @@ class RunConfig(ABC):
             code_digest(),
             *(self._session if digest is None else digest for digest in self.installed()),
         ]
+        # Sorted, so that the order of the columns does not matter.
         effective = [sorted(self.row().items()), care_sim.__version__, *code]
         return hashlib.sha256(json.dumps(effective).encode()).hexdigest()[:16]
 
     def installed(self) -> list[str | None]:
-        """Hashes of what decides the row beside the package and the parameters: code of others, and
-        the files that parameters name; None of code that has no source to read.
+        """Hashes of what else decides the row: code of other packages, and the files that
+        parameters name. None stands for code that has no source to read.
         """
         return [policy_digest(self.policy), *files_in(self.policy_parameters)]
 
     @cached_property
     def key(self) -> str:
-        """The digest when this process first asked for it: what a study files the row under,
-        whatever changes while it runs. A worker works out its own.
+        """The digest when this process first asked for it. A study files the row under it, whatever
+        changes while it runs. A worker works out its own.
         """
         return self.digest()
 
     def __getstate__(self) -> dict[str, Any]:
+        # The key is not sent to workers. Each computes its own, and a row whose digest differs from
+        # the key shows a worker with other code.
         return {name: value for name, value in vars(self).items() if name != "key"}
 
     @cached_property
@@ -110,14 +117,16 @@ class RunConfig(ABC):
 
     def changed(self, **values: object) -> Self:
         """The same with other values of fields that need no check."""
+        # dataclasses.replace would run every check again, and make an environment for each task of
+        # a large study.
         other = copy(self)
         for name, value in values.items():
             object.__setattr__(other, name, value)
         return other
 
     def check_parameters(self, *names: str) -> None:
-        """Make the parameters in these fields what files can hold. Raises InvalidInput for those
-        that none does.
+        """Bring the parameters in these fields into the form in which files hold them. Raises
+        InvalidInput for values that no file holds.
         """
         for name in names:
             pairs = getattr(self, name)
@@ -136,7 +145,7 @@ def departures(task: RunConfig, without: Sequence[str]) -> list[str]:
 
 
 def felt_by(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
-    """Budget and conditions as a policy feels them: the full scan has one budget, and asks neither
+    """Budget and conditions as a policy feels them. The full scan has one budget, and asks neither
     camera nor allocator.
     """
     check_policy(policy)
@@ -144,16 +153,19 @@ def felt_by(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str,
     if parameters := conditions.get("policy_parameters"):
         felt["policy_parameters"] = parameters_for(policy, parameters)
     if policy == FULL:
+        # Whatever it does not feel takes the default, so that equal full scans are one
+        # configuration and run once.
         felt |= {"budget": 1.0} | {name: DEFAULTS[name] for name in UNUSED_BY_FULL_SCAN}
     return felt
 
 
 def parameters_for(policy: str, parameters: Parameters) -> Parameters:
-    """Those of a policy among parameters for several: NAME is for all, POLICY.NAME for that policy
-    alone.
+    """The parameters of one policy among those for several: NAME is for all, POLICY.NAME for that
+    policy alone.
 
     Raises InvalidInput for a name before the point that is no policy.
     """
+    # rpartition leaves everything in the last part where there is no point.
     parted = [(*name.rpartition("."), value) for name, value in parameters]
     for owner, point, _, _ in parted:
         if point:
@@ -185,8 +197,9 @@ def check_size(tasks: int) -> None:
 
 
 def in_batches(tasks: Sequence[RunConfig]) -> list[list[RunConfig]]:
-    """The tasks in the order in which they are played, those of a batch together."""
+    """The tasks in the order in which they are played; tasks of one batch stand together."""
     together: dict[Hashable, list[RunConfig]] = {}
+    # The sort is stable and a dict keeps its order: a batch is played when its first task is due.
     for task in sorted(tasks, key=lambda task: task.order):
         together.setdefault(task.batch, []).append(task)
     return list(together.values())

@@ -10,7 +10,9 @@ HISTORY = (
     "+0.6 points at 10%, 20%, and 35%, a budget-dependent Pareto choice that we report as such "
     "rather than as a uniform win."
 )
-EQUAL_SCENES = "Equal scene weights give 5.3, 5.2, and 4.2 points, so event-rich scenes do not drive it."
+EQUAL_SCENES = (
+    "Equal scene weights give 5.3, 5.2, and 4.2 points, so event-rich scenes do not drive it."
+)
 TTFD = (
     "Descriptively, on a single seed CARE lowers the mean censored TTFD of the history policy from "
     "3.76 to 3.64, 3.60 to 3.47, and 3.45 to 3.33 keyframes, a shift of about 0.12 keyframes (60 "
