@@ -30,18 +30,21 @@ _KIB_MB = 1024 / 1e6
 
 
 def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
-    """What a worker does: play episodes; of each its row, or in one line why there is none."""
+    """What a worker does: play episodes, and give for each its row, or in one line why there is
+    none.
+    """
     return [answer(run_episode, config) for config in batch]
 
 
 def answer(play: Callable[..., _Answer], *arguments: object) -> _Answer | str:
-    """What `play` returns, or in one line why it returns nothing: an exception stays in the worker,
+    """What `play` returns, or in one line why it returns nothing. No exception leaves the worker,
     which alone may know its class.
     """
     try:
         return play(*arguments)
     except InvalidInput as error:
         return one_line(str(error))
+    # A policy that calls sys.exit ends its episode, not the worker.
     except (Exception, SystemExit) as error:
         return one_line(f"{type(error).__name__}: {error}").removesuffix(":") + _place(error)
 
@@ -62,14 +65,16 @@ def trace(
     begin: Callable[[ClosedLoop], None] = lambda _loop: None,
     wrap: Callable[[GymEnv, Policy], GymEnv] = lambda env, _policy: env,
 ) -> tuple[Row, list[Keyframe]]:
-    """Play an episode; its row and the record of every keyframe (scoring only: it holds truth).
+    """Play an episode; gives its row and the record of every keyframe (for scoring only: it holds
+    truth).
 
-    `begin` is called before the first keyframe, `watchers` after every one; `wrap` puts wrappers
-    that watch around the environment.
+    `begin` is called before the first keyframe, `watchers` after each; `wrap` puts wrappers that
+    watch around the environment.
     """
     started = time.perf_counter()
     digest = EpisodeHash()
     inner = config.make_env()
+    # Made for the environment within the wrappers: the policy takes nothing from them.
     policy = config.make_policy(inner)
     with wrap(inner, policy) as env:
         observation, info = env.reset(seed=config.seed)
@@ -115,19 +120,19 @@ class EpisodeHash:
 
 
 def _place(error: BaseException) -> str:
-    """Where it was raised, for whoever has to find it in a file of their own."""
+    """File and line where it was raised, for whoever has to find it in a file of their own."""
     frames = extract_tb(error.__traceback__)
     return f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
 
 
 def peak_rss_mb() -> float:
     """The most memory this process has held, in MB."""
-    status = Path(
-        "/proc/self/status"
-    )  # getrusage would count what the parent held when it started this process
+    # getrusage would count what the parent held when it started this process.
+    status = Path("/proc/self/status")
     lines = status.read_text().splitlines() if status.exists() else []
     peaks = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
     if peaks:
         return peaks[0] * _KIB_MB
+    # In bytes on macOS, in KiB elsewhere.
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return held / (1e6 if sys.platform == "darwin" else 1e3)

@@ -1,4 +1,4 @@
-"""Who plays the episodes: processes of this machine, or the workers of a dask cluster."""
+"""Where tasks are played: in processes of this machine, or on the workers of a dask cluster."""
 
 import asyncio
 import logging
@@ -41,6 +41,8 @@ def processes(workers: int) -> Executor:
     """Worker processes on this machine, forked from a clean server that has imported the simulator.
     They and the server end with this process.
     """
+    # A fork of this process would carry its threads' locks along, and a spawned one would import
+    # everything again. The fork server imports once and has no threads.
     context = get_context("forkserver")
     context.set_forkserver_preload(
         ["care_sim.study.episode_play", "care_sim.envs.closed_loop", "care_sim.study.scene_play"]
@@ -84,9 +86,9 @@ class Processes(ProcessPoolExecutor):
 
 
 class ClusterExecutor(Executor):
-    """Dask's own executor, which ends in the terms of `concurrent.futures`.
+    """Dask's own executor, with the errors of `concurrent.futures`.
 
-    Dask runs the episodes of a killed worker again elsewhere. One whose workers keep dying ends in
+    Dask runs the tasks of a killed worker again elsewhere. A task whose workers keep dying ends in
     BrokenExecutor; when the scheduler is gone, all end in ClusterLost.
     """
 
@@ -122,6 +124,7 @@ class ClusterExecutor(Executor):
             raise self._lost() from error
 
     def _hand_on(self, ours: Future[Any], theirs: Future[Any]) -> None:
+        # Dask cancels what a client waits for when its scheduler is gone.
         error = self._lost() if theirs.cancelled() else theirs.exception()
         if error is None:
             ours.set_result(theirs.result())
@@ -142,9 +145,12 @@ def _connect(address: str) -> "Client":
         raise MissingExtra(
             "a cluster needs the extra 'cluster': pip install 'care-sim[cluster]'"
         ) from error
+    # They print tracebacks of the same trouble that is told in one line below.
     for logger in ("distributed", "distributed.client"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
+        # In a thread of its own: a caller that is itself asynchronous has a running loop in this
+        # one.
         with ThreadPoolExecutor(1) as aside:
             aside.submit(asyncio.run, _try_connection(address)).result()
         return Client(address, timeout=_ANSWER_TIMEOUT_S)
@@ -158,8 +164,8 @@ def _connect(address: str) -> "Client":
 
 
 async def _try_connection(address: str) -> None:
-    """Raise what speaks against a connection: a client that fails at it leaves a thread that nobody
-    can end.
+    """Raise what speaks against a connection, before there is a client: one that fails leaves a
+    thread that nobody can end.
     """
     from dask.distributed import Security
     from distributed.comm import connect
@@ -177,7 +183,7 @@ def _is_death(error: BaseException) -> bool:
 
 
 MOST_WORKERS = 1024
-"""A process each takes 100 MB."""
+"""Most worker processes; each takes about 100 MB."""
 
 
 CORES = min(os.cpu_count() or 1, MOST_WORKERS)

@@ -1,4 +1,4 @@
-"""The configuration of a play of the open loop: a policy in a scene whose film is the same for all."""
+"""The configuration of a play of the open loop: a policy in a scene whose film they all share."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass

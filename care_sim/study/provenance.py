@@ -26,12 +26,12 @@ _LIBRARIES = (
     "scipy",
 )
 _EXTRAS = ("mujoco-core", "open3d", "open3d-cpu", "panda-gym", "torch")
-"""Libraries of detectors, policies and measurements that may be there."""
+"""Libraries of detectors, policies and measurements, recorded where they are installed."""
 
 SHIPPED = Path(care_sim.__file__).parent / "policies" / "learned" / "shipped"
 """Where the weights lie that come with the package."""
 _CODE = (".py", ".so", ".pyd")
-"""Endings of what a process loads once."""
+"""Endings of files that a process loads once."""
 
 SESSION = uuid4().hex
 """Names this run of the program; no other run has it."""
@@ -55,7 +55,7 @@ def policy_digest(policy: str) -> str | None:
 
 
 def detector_digest(detector: str) -> str | None:
-    """The same of a detector."""
+    """The same as `policy_digest`, of a detector."""
     return "" if detector in DETECTORS.built_in else _entry_digest(DETECTORS.entries()[detector])
 
 
@@ -64,11 +64,14 @@ def _entry_digest(entry: EntryPoint) -> str | None:
     if files is None:
         return None
     shipped = [
+        # An edit of code that is loaded changes nothing in this process. Weights and tables are
+        # read again for every episode, and so is their hash.
         f"{name} {_loaded(file) if file.suffix in _CODE else content_digest(file)}"
         for name, file in files.items()
     ]
     further = files_named_by(entry) | files_named_in(files.values())
     named = [(name, file_digest(path)) for name, path in further.items()]
+    # A folder with too many files to read: nothing can be promised about it.
     if any(digest is None for _, digest in named):
         return None
     return combined_digest([*sorted(shipped), *(f"{name} {digest}" for name, digest in named)])
@@ -76,13 +79,13 @@ def _entry_digest(entry: EntryPoint) -> str | None:
 
 @cache
 def _loaded(path: Path) -> str:
-    """The hash of a file of code, once a process, which has it loaded."""
+    """The hash of a file of code, computed once per process, which has the file loaded."""
     return content_digest(path)
 
 
 @cache
 def _sources_digest(root: Path) -> str:
-    """The hash of all code below a folder, once a process, which has it loaded."""
+    """The hash of all code below a folder, computed once per process, which has it loaded."""
     return combined_digest(
         f"{file.relative_to(root)} {content_digest(file)}" for file in sorted(root.rglob("*.py"))
     )

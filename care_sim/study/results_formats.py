@@ -1,5 +1,5 @@
-"""What a study plays: episodes of the closed loop, or plays of the open loop. How both run and are
-kept.
+"""The two kinds of results: episodes of the closed loop and plays of the open loop, how each is
+played and how it is kept.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,10 +33,12 @@ from care_sim.study.scene_play import SUMS, event_columns, play_scene, without_e
 
 @dataclass(frozen=True)
 class ResultsFormat:
-    """`unit` is what its tasks are called. `play_batch` plays a batch; `finish` makes rows side by
-    side into those that are kept; `file` holds them, in columns of the `schema`; `listed` are
-    configurations as plain data. `aside` are further files, as columns by name, made of the rows as
-    they were played.
+    """How one kind of results is played and kept.
+
+    `unit` is what its tasks are called. `play_batch` plays a batch. `finish` makes rows side by
+    side into those that are kept. `file` holds them, in columns of the `schema`. `listed` gives
+    configurations as plain data. `aside` gives further files, as columns by file name, made of the
+    rows as they were played.
     """
 
     unit: str
@@ -48,12 +50,14 @@ class ResultsFormat:
     aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
 
 
+# Added when a study is written. Older files and those of others may lack them.
 _WRITER_COLUMNS = dict.fromkeys(("version", "digest", "episode_hash", "tags"), as_optional(TEXT))
 _EPISODES = Schema(
     {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS}
     | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
     | {
         name: as_optional(SUM)
+        # Every outcome that may be None: distances and speeds of what did not happen.
         for name, kind in Outcome.__annotations__.items()
         if kind == float | None
     },
@@ -69,6 +73,7 @@ _PLAYS = Schema(
     }
     | dict.fromkeys(SUMS, TALLY)
     | dict.fromkeys(("tracks", "explained"), SUM)
+    # Nothing for the reference, which differs from itself in nothing, and for the full scan.
     | dict.fromkeys(("differing_keyframes", "differing_cells"), as_optional(COUNT)),
     _WRITER_COLUMNS
     | dict.fromkeys(("recording", "camera_detections", "presence"), as_optional(TEXT))
@@ -86,6 +91,7 @@ EPISODES = ResultsFormat(
 PLAYS = ResultsFormat(
     "plays",
     play_scene,
+    # The events have a file of their own, one row per event and play.
     lambda rows: [without_events(row) for row in tagged(rows)],
     "plays.parquet",
     _PLAYS,
@@ -96,7 +102,7 @@ RESULTS_FORMATS = (EPISODES, PLAYS)
 
 
 def results_format_in(folder: Path) -> ResultsFormat:
-    """The kind of the results in a folder; episodes where there are none."""
+    """The format of the results in a folder; that of episodes where there are none."""
     return next((kind for kind in RESULTS_FORMATS if (folder / kind.file).is_file()), EPISODES)
 
 

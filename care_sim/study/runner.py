@@ -14,9 +14,9 @@ from care_sim.study.run_config import Row, RunConfig, in_batches
 
 Batch = Sequence[RunConfig]
 PlayBatch = Callable[[Any], list[Row | str]]
-"""Plays a batch in a worker: of each task its row, or in one line why there is none."""
+"""Plays a batch in a worker, and gives for each task its row, or in one line why there is none."""
 _InFlight = dict[Future[list[Row | str]], Batch]
-"""The batches in flight."""
+"""The batches that are being played."""
 
 DIED = "the worker process died"
 _OTHER_CODE = (
@@ -24,9 +24,9 @@ _OTHER_CODE = (
     "the study ran"
 )
 _DEADLY = 3
-"""Workers that a policy may kill before the rest of its tasks is not tried any more."""
+"""After a policy has killed so many workers, the rest of its tasks is not tried any more."""
 _QUIET_S = 2.0
-"""How long nothing may happen before the listener is told so."""
+"""The listener hears at least this often how many workers play."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Failure:
 
 
 class RunListener:
-    """Follows a run; this one keeps quiet."""
+    """Follows a run; this base class keeps quiet."""
 
     def playing(self, workers: int) -> None:
         """So many workers play now; told every few seconds at least."""
@@ -65,12 +65,14 @@ def run_all(
 
     An interrupt waits for the batches in flight and leaves all that is finished in the journal.
     When a worker dies, the batches then in flight are run again one by one, and in halves, so that
-    only the guilty task fails; the rest of a policy that has killed _DEADLY workers is not tried.
-    Raises ClusterLost when a cluster's scheduler is gone.
+    only the guilty task fails; when a policy has killed `_DEADLY` workers, its other tasks are not
+    tried. Raises ClusterLost when the scheduler of a cluster is gone.
     """
     run = _Run(journal, workers, make_executor, listener or RunListener(), play_batch)
     waiting = deque(in_batches([config for config in configs if config.key not in journal]))
     while waiting:
+        # A pool does not say which of its processes died of which batch. All that it had are
+        # suspects, and each is tried on its own before the rest goes on.
         for suspect in run.run_together(waiting):
             run.run_alone(suspect)
     return run.failures
@@ -94,7 +96,7 @@ class _Run:
         self._audience = listener
 
     def run_together(self, waiting: "deque[list[RunConfig]]") -> list[Batch]:
-        """Run until nothing waits or a worker dies; returns the batches in flight at a death.
+        """Run until nothing waits or a worker dies; returns the batches that a death cut off.
 
         No more are in flight than there are workers, so that few are suspected.
         """
@@ -104,6 +106,8 @@ class _Run:
                 while waiting or in_flight:
                     self._submit_waiting(executor, waiting, in_flight)
                     self._collect_finished(in_flight)
+            # A broken pool ends all its futures; the wait lets those that finished just before be
+            # kept.
             except BrokenExecutor:
                 wait(in_flight)
             except KeyboardInterrupt:
@@ -124,6 +128,8 @@ class _Run:
             wait([future])
         if self._kept(batch, future):
             return
+        # A batch of one that dies alone is guilty. A larger one is halved until the guilty task
+        # stands alone.
         if len(batch) == 1:
             self._deaths[batch[0].policy] += 1
             self._fail(batch, DIED)
@@ -142,7 +148,9 @@ class _Run:
     def _submit_waiting(
         self, executor: Executor, waiting: "deque[list[RunConfig]]", in_flight: _InFlight
     ) -> None:
-        """Fill the places; a cluster without any gets one batch, which waits for a worker."""
+        """Hand over as many batches as are played at once. A cluster without workers gets one,
+        which waits for a worker.
+        """
         workers = parallel_batches(executor, self._workers)
         self._audience.playing(workers)
         while waiting and len(in_flight) < max(workers, 1):
@@ -153,6 +161,7 @@ class _Run:
 
     def _collect_finished(self, in_flight: _InFlight) -> None:
         done, _ = wait(in_flight, _QUIET_S, FIRST_COMPLETED)
+        # Whole batches first, so that they are in the journal before a death is told.
         for future in sorted(done, key=_is_cut_off):
             if not self._kept(in_flight[future], future):
                 raise BrokenExecutor
@@ -175,6 +184,7 @@ class _Run:
     def _record(self, config: RunConfig, ending: Row | str) -> None:
         if isinstance(ending, str):
             self._fail([config], ending)
+        # The worker computed the digest from its own code and files.
         elif ending["digest"] != config.key:
             self._fail([config], _OTHER_CODE)
         else:
@@ -187,8 +197,10 @@ class _Run:
             self._audience.finished(config, None)
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
-        """Hand a batch over; a fork server that does not answer at once on a busy machine, or that
-        is killed while it starts a worker, is asked again: another one takes its place.
+        """Hand a batch over.
+
+        A fork server may not answer at once on a busy machine, or be killed while it starts a
+        worker. It is asked again: another one takes its place.
         """
         for patience_s in (0.5, 2.0):
             try:

@@ -1,4 +1,4 @@
-"""The plays of a scene: every policy meets the same film; one tidy row a play, and its events."""
+"""The plays of a scene: every policy meets the same film. Each gives one row and its events."""
 
 import hashlib
 import time
@@ -49,8 +49,10 @@ def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
 
 @dataclass(frozen=True)
 class PlayRecord:
-    """What happened in a play. `tracks` and `explained` are means a keyframe: tracks held, and
-    camera detections that a forecast explains.
+    """What happened in a play.
+
+    `tracks` and `explained` are means per keyframe: tracks held, and camera detections that a
+    forecast explains. `wall_s` is in seconds.
     """
 
     score: SceneScore
@@ -66,8 +68,8 @@ class PlayRecord:
 
 
 class ScenePlayer:
-    """Plays policies in one scene; those of the reference are kept, since the others are compared
-    with them.
+    """Plays policies in one scene. The plays of the reference are kept, because the others are
+    compared with them.
 
     Raises InvalidInput where the film of the scene cannot be made.
     """
@@ -112,6 +114,8 @@ class ScenePlayer:
         }
 
     def _record(self, config: PlayConfig) -> PlayRecord:
+        # The reference may be played before its own turn, for a comparison; then it is there when
+        # its row is due.
         if config != _reference(config):
             return play_through_film(config, self._film)
         if config not in self._references:
@@ -139,6 +143,7 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
         counts = []
         while not loop.over:
             belief = loop.belief
+            # Before the step: what the policy knew when it chose its cells.
             counts.append(
                 (
                     len(belief.tracks),
@@ -158,9 +163,10 @@ def without_events(row: Row) -> Row:
 
 
 def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
-    """The events of all plays as columns of one table: the play's names, then what was seen where,
-    and when found.
+    """The events of all plays as columns of one table: the names of the play, what was seen where,
+    and when it was found.
     """
+    # One entry per event. The names of a play repeat over its events.
     counts = [len(row["ttfds"]) for row in rows]
     names = {
         name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts)
@@ -169,6 +175,7 @@ def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
     seen = {
         name: [value for row in rows for value in row["sightings"][name]] for name in _EVENT_COLUMNS
     }
+    # A TTFD of 0 keyframes is a detection at first sight.
     delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
     return {**names, **seen, "detected": delays == 0, "ttfd": delays}
 

@@ -18,7 +18,7 @@ from care_sim.viewer.pictures.drawing import BACKGROUND
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 
 _LAST_PICTURE_S = 2.5
-"""How long the end of a film stays."""
+"""Seconds for which the last picture stays."""
 _GAP = 8
 
 Draw = Callable[[str, ClosedLoop, Sequence[Keyframe]], Image.Image]
@@ -31,7 +31,7 @@ def whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Ima
 
 
 class Clip:
-    """Episodes side by side on one film at `path`, drawn by `draw`; without a path it does nothing.
+    """Episodes side by side in one clip at `path`, drawn by `draw`; without a path it does nothing.
 
     Raises InvalidInput for a folder and for an ending that no clip has, MissingExtra for one whose
     library is not installed.
@@ -59,10 +59,10 @@ class Clip:
         return watch
 
     def write(self) -> bool:
-        """Write the film, a picture a keyframe, at the speed of the world; whether there was
-        anything to write.
+        """Write the clip, one picture per keyframe, at the speed of the world. Says whether there
+        was anything to write.
 
-        An episode that ends before the others keeps its last picture; one without a keyframe is
+        An episode that ends before the others keeps its last picture. One without a keyframe is
         left out.
         """
         films = [film for film in self._films if film]
@@ -72,6 +72,7 @@ class Clip:
 
 
 def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> Iterator[Image.Image]:
+    # An episode that has ended keeps showing how it ended.
     last = [film[-1] for film in films]
     for moment in zip_longest(*films):
         yield _row([now or end for now, end in zip(moment, last, strict=True)])
@@ -94,6 +95,7 @@ class BrakePhoto:
 
     def __init__(self, path: Path | None):
         self._path = path
+        # Without a path there is nothing to do and nothing to tell at the end.
         self._done = path is None
         if path is not None:
             check_output(path, PNG)
@@ -106,6 +108,6 @@ class BrakePhoto:
             self._done = True
 
     def report(self) -> None:
-        """Say so when there was nothing to take a picture of."""
+        """Tell on stderr that there was nothing to take a picture of."""
         if not self._done:
             print("the car never braked: no picture", file=sys.stderr)

@@ -59,10 +59,13 @@ def eventful(keyframes: Sequence[Keyframe]) -> list[Keyframe | None]:
     """First and last keyframe and those about a change of state; None for every run left out."""
     states = [(f.in_view, f.detected, f.braking, f.impact_speed_mps is not None) for f in keyframes]
     last = len(states) - 1
+    # A change, the keyframe before it, and both ends of the episode. The intersection drops what
+    # lies outside.
     changes = [n for n in range(1, last + 1) if states[n] != states[n - 1]]
     kept = sorted({0, last, *changes, *(n - 1 for n in changes)} & set(range(last + 1)))
     shown: list[Keyframe | None] = []
     for before, n in zip([-1, *kept], kept, strict=False):
+        # A gap between two kept keyframes is one line of dots, however long it is.
         shown += [keyframes[n]] if n == before + 1 else [None, keyframes[n]]
     return shown
 
@@ -81,6 +84,7 @@ def text(value: bool | int | float | None) -> str:
     """A result as people read it."""
     if value is None:
         return "-"
+    # Before numbers: bool is a subclass of int.
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:z.2f}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""The paper's figure of a sweep: first detection against the budget, a curve a policy."""
+"""The paper's figure of a sweep: first detection against the budget, one curve per policy."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from care_sim.study.run_config import Row
 BUDGET_FIGURES = tuple(f"{scenario}-budget" for scenario in SCENARIOS)
 """Every figure that a sweep can draw."""
 _FEW = 5
-"""Policies up to which their quartiles are drawn in full strength."""
+"""Up to so many policies their quartiles are drawn in full strength."""
 
 
 class _NamedCurve(NamedTuple):
@@ -46,15 +46,17 @@ def sweep_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def budget_figure(cells: Sequence[Cell]) -> Figure:
-    """Median first-detection distance in metres against the budget, interquartile bars; full scan
-    as a line.
+    """Median first-detection distance in metres against the budget, with bars from quartile to
+    quartile; the full scan is a line.
 
     A median that is not detected is an open marker at the bottom, with the number of episodes
-    without a detection; bars of a lower quartile that is not detected reach the bottom.
+    without a detection. A bar whose lower quartile is not detected reaches the bottom.
     """
     policies = dict.fromkeys((cell.policy, cell.tags) for cell in cells if cell.policy != "full")
+    # Room in height for one line of the legend per policy.
     figure = Figure(figsize=(8.2, 3.6 + 0.16 * max(len(policies), _FEW)), layout="constrained")
     axes = figure.add_subplot()
+    # Budgets from 1 to 35% are spread evenly by their ratios.
     axes.set_xscale("log")
     _name_curves(figure, _draw(axes, cells, styles(policies)))
     budgets = _budgets(cells)
@@ -81,6 +83,7 @@ def _draw(axes: Axes, cells: Sequence[Cell], drawn: dict[str, Style]) -> list[_N
         own = [cell for cell in cells if cell.policy == policy]
         shift = CLOSED_LOOP_DODGE.factor(number, len(drawn))
         curves.append(_curve(axes, own, shift, style, 1.0 if len(drawn) <= _FEW else 0.4))
+    # Before the open markers, which stand on the bottom of the axes.
     axes.set_ylim(bottom=0.0)
     _undetected(axes, cells, drawn)
     return curves
@@ -105,7 +108,9 @@ def _curve(
     """Draw the detected medians of a policy and their quartiles."""
     places = [cell.budget * shift for cell in cells]
     medians = [
-        math.nan if cell.detection.median is None else cell.detection.median for cell in cells
+        # nan breaks the line where the median is not detected.
+        math.nan if cell.detection.median is None else cell.detection.median
+        for cell in cells
     ]
     bars: dict[str, Any] = {
         "color": style.colour,
@@ -145,6 +150,7 @@ def _open_marker(axes: Axes, cell: Cell, style: Style, aside: float) -> None:
     """
     figure = axes.get_figure(root=True)
     assert figure is not None
+    # A shift in points: side by side whatever the scale of the axes. 72 points are an inch.
     moved = axes.transData + ScaledTranslation(aside / 72, 0, figure.dpi_scale_trans)
     hollow: dict[str, Any] = {
         "marker": style.marker,
@@ -167,6 +173,7 @@ def _open_marker(axes: Axes, cell: Cell, style: Style, aside: float) -> None:
 
 def _name_curves(figure: Figure, curves: Sequence[_NamedCurve]) -> None:
     """Name the curves beside the axes, in the order of their right ends."""
+    # The eye finds a name at about the height of its curve.
     handles = [curve.line for curve in sorted(curves, key=lambda curve: curve.end, reverse=True)]
     figure.legend(
         handles=handles, loc="outside right upper", frameon=False, fontsize=9, handlelength=3

@@ -17,7 +17,7 @@ from care_sim.study.run_config import Row
 
 CROWDING_FIGURE = "crowding"
 PALE = 0.55
-"""Share of the colours' range up to which numbers are printed in black."""
+"""Share of the range of colours up to which numbers are printed in black."""
 
 
 def crowding_figures(rows: Sequence[Row]) -> dict[str, Figure]:
@@ -26,11 +26,11 @@ def crowding_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def crowding_figure(rows: Sequence[Row]) -> Figure:
-    """Mean paired difference in first detection, all-camera minus CARE, in metres: a number in
-    every cell.
+    """Mean paired difference in first detection, all-camera minus CARE, in metres: one number per
+    cell.
 
-    Bold where the interval excludes zero, an asterisk where the gate is met too, a frame where
-    all-camera has collapsed.
+    Bold where the interval excludes zero, an asterisk where the gate is met too, a frame where all-
+    camera has collapsed.
     """
     crowd = Crowd(rows)
     size = max(1.6 + 0.8 * len(crowd.budgets), 6.0), 1.5 + 0.34 * len(crowd.counts)
@@ -38,12 +38,15 @@ def crowding_figure(rows: Sequence[Row]) -> Figure:
     axes = figure.add_subplot()
     gaps = [[crowd.gap(n, budget) for budget in crowd.budgets] for n in crowd.counts]
     values = np.array([[np.nan if gap is None else gap.mean for gap in line] for line in gaps])
+    # Symmetric about zero, so that the sign of a difference is its colour. At least as wide as a
+    # collapse, so that small differences look small.
     widest = max(float(np.nanmax(np.abs(values), initial=0.0)), COLLAPSE_M)
     image = axes.imshow(
         values, cmap="PuOr", vmin=-widest, vmax=widest, aspect="auto", origin="lower"
     )
     for (row, column), value in np.ndenumerate(values):
         text = mean(gaps[row][column])
+        # Written this way round, nan is pale: a cell that was not played has no colour.
         pale = not abs(value) > PALE * widest
         weight = "bold" if isinstance(text, Bold) else "normal"
         axes.text(
@@ -65,6 +68,7 @@ def crowding_figure(rows: Sequence[Row]) -> Figure:
 def _frame_collapses(axes: Axes, crowd: Crowd) -> None:
     for column, budget in enumerate(crowd.budgets):
         for vehicles in crowd.collapsed(budget):
+            # Pictures of a matrix have their cells centred on whole numbers.
             corner = (column - 0.5, crowd.counts.index(vehicles) - 0.5)
             axes.add_patch(
                 Rectangle(corner, 1.0, 1.0, fill=False, edgecolor="black", linewidth=1.2)

@@ -1,4 +1,4 @@
-"""The figures of the fault study: what a measure does as every fault grows, a panel a fault."""
+"""The figures of the fault study: what a measure does as every fault grows, one panel per fault."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ from care_sim.study.designs.variants import Place
 from care_sim.study.run_config import Row
 
 _COLUMNS = 5
-"""Panels side by side; a place at least stays free for the legend."""
+"""Panels side by side; at least one place stays free for the legend."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,13 @@ class _FaultPanels:
         """All faults in one place: an open marker at the bottom stands for a median that there is
         not.
         """
+        # Rounded down and one more: a last line that is full gets one below it for the legend.
         lines = len(FAULTS) // _COLUMNS + 1
         figure = Figure(figsize=(2.5 * _COLUMNS, 2.3 * lines), layout="constrained")
         panels = list(figure.subplots(lines, _COLUMNS, sharey=True).flat)
         for fault, axes in zip(FAULTS, panels, strict=False):
             self._panel(axes, fault, place, measure)
+        # All panels share their heights, so that setting the first sets all. Zero is in sight.
         panels[0].set_ylim(bottom=min(0.0, panels[0].get_ylim()[0]))
         for axes in panels[len(FAULTS) :]:
             axes.set_axis_off()
@@ -120,6 +122,7 @@ class _FaultPanels:
         axes.plot(
             *zip(*study, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label
         )
+        # Matplotlib leaves nan out of the line. Open markers at the bottom show it.
         missing = [place for place, height in study if math.isnan(height)]
         if missing:
             axes.plot(

@@ -16,12 +16,13 @@ _FORMATS = (".png", ".svg")
 
 
 def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as PNG and SVG, with its texts as they are: a $ in a name begins no formula,
-    control codes are shown as escapes, and what the font has no sign for is drawn as a box.
+    """Write a figure as PNG and SVG, with its texts as they are.
+
+    A $ in a name begins no formula, control codes are shown as escapes, and what the font has no
+    sign for is drawn as a box.
     """
-    of_ticks = {
-        id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)
-    }  # Matplotlib's own
+    # Labels of ticks are Matplotlib's own, and powers of ten among them are formulas.
+    of_ticks = {id(label) for tick in figure.findobj(Tick) for label in tick.findobj(Text)}
     for text in figure.findobj(Text):
         if id(text) not in of_ticks:
             text.set_parse_math(False)
@@ -30,6 +31,8 @@ def save(figure: Figure, stem: Path) -> None:
         warnings.filterwarnings("ignore", r"Glyph .* missing from font")
         with replacing(stem.with_suffix(".png")) as unfinished:
             figure.savefig(unfinished, dpi=200)
+        # Ids within an SVG are random without a salt, and it holds the date. Neither may make a new
+        # file of the same figure.
         with (
             rc_context({"svg.hashsalt": stem.name}),
             replacing(stem.with_suffix(".svg")) as unfinished,

@@ -20,8 +20,8 @@ _KINDS = ("pareto", "levels")
 PROTOCOL_FIGURES = tuple(
     f"{kind}-{source}{rest}" for kind in _KINDS for source in SOURCES for rest in ("", "-*")
 )
-"""Every figure that a folder may hold, as patterns: the source, then what of detector and
-conditions is not usual.
+"""Every figure that a folder may hold, as patterns: the source, then what is not usual in detector
+and conditions.
 """
 
 
@@ -31,6 +31,7 @@ def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     for plays in plays_by_setting(rows):
         if plays.policies:
             figures[f"pareto-{plays.setting.slug}"] = pareto_figure(plays)
+        # A single budget makes no curve.
         if len(plays.budgets) > 1:
             figures[f"levels-{plays.setting.slug}"] = levels_figure(plays)
     return figures
@@ -73,6 +74,7 @@ def frontier(points: Mapping[str, Point]) -> list[str]:
 
 
 def _beats(other: Point, point: Point) -> bool:
+    # Of two equal points neither beats the other, and both are on the frontier.
     return other != point and all(theirs >= ours for theirs, ours in zip(other, point, strict=True))
 
 
@@ -92,6 +94,7 @@ def _draw_recalls(
         (marker,) = axes.plot(
             overall, first, look.marker, color=look.colour, label=marked(policy, plays.tags[policy])
         )
+        # CARE is small and filled, so that it is seen within an open marker at the same place.
         if policy == REFERENCE:
             marker.set(markersize=5, zorder=5)
         else:
@@ -112,6 +115,8 @@ def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
     corners = [points[policy] for policy in frontier(points)]
     if not corners:
         return
+    # The limits are read before the line is drawn and set again after it, because the line would
+    # widen them.
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     overall, first = zip((left, corners[0][1]), *corners, (corners[-1][0], low), strict=True)
     axes.step(overall, first, where="pre", color="0.6", linewidth=1.2, zorder=2)
@@ -142,14 +147,15 @@ APART = "policies are drawn a little apart sideways, so that equal points stay v
 
 
 def levels_figure(plays: SettingPlays) -> Figure:
-    """Recalls in % of all policies at all budgets; the full scan as a dashed line; what the paper
-    gives of both, hollow and dotted.
+    """Recalls in % of all policies at all budgets. The full scan is a dashed line. What the paper
+    gives of both is hollow and dotted.
     """
     figure = Figure(figsize=(8.4, 4.0), layout="constrained")
     panels = figure.subplots(1, 2)
     for axes, ratio in zip(panels, (FIRST_SIGHTING, OVERALL), strict=True):
         _draw_levels(axes, plays, ratio)
         if not plays.setting.conditions:
+            # The paper gives levels for its plain setting alone.
             _draw_published(axes, plays, ratio)
         axes.set_xscale("log")
         axes.set_xticks(plays.budgets, [percent(budget) for budget in plays.budgets])
@@ -182,6 +188,7 @@ def _draw_levels(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
         shift = OPEN_LOOP_DODGE.factor(number, len(plays.tags))
         levels = {budget: plays.level(ratio, policy, budget).by_event for budget in plays.budgets}
         known = {budget * shift: value for budget, value in levels.items() if value is not None}
+        # CARE is drawn over the others.
         order = 4 if policy == REFERENCE else 3
         line = axes.plot(
             list(known),

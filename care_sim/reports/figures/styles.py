@@ -67,9 +67,10 @@ def bare_axes(axes: Axes, grid: str, lines: Literal["both", "y"] = "y") -> None:
 
 
 def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:
-    """A style for every policy, given with its tags; those that no car can have are grey and
+    """A style for every policy, given with its tags. Policies that no car can have are grey and
     dashed.
     """
+    # Policies of others get what is left, in their order; so the same study has the same colours.
     spare = cycle(_SPARE)
     greys = cycle(_GREYS)
     markers = cycle(_MARKERS)

@@ -1,4 +1,4 @@
-"""The chart of a sweep: first detection against the budget, a curve a policy."""
+"""The chart of a sweep: first detection against the budget, one curve per policy."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -44,6 +44,7 @@ def _chart(cells: Sequence[Cell]) -> Chart:
     base = alt.Chart(inline(values)).encode(
         x=budget_axis(_budgets(cells)), y=height, color=encoding.colour, opacity=encoding.opacity
     )
+    # Vega draws nothing at null. These points are put at the bottom, hollow.
     missed = base.transform_filter("datum.median == null").encode(y=alt.datum(0))
     about = [
         alt.Tooltip("policy:N"),
@@ -60,6 +61,7 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         missed.mark_point(filled=False, size=55).encode(shape=encoding.shape, tooltip=about),
     ]
     if full:
+        # One line is enough: the full scan has one cell in a scenario without conditions.
         line = [{"policy": FULL_SCAN, "median": cell.detection.median} for cell in full[:1]]
         rule = alt.Chart(inline(line)).mark_rule(strokeWidth=1.5, strokeDash=[5, 3])
         layers.append(rule.encode(y=height, color=encoding.colour, opacity=encoding.opacity))
@@ -79,9 +81,7 @@ def _chart(cells: Sequence[Cell]) -> Chart:
 
 
 def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, Any]]:
-    """The points of the policies; none in height where the median is not detected, which breaks the
-    line.
-    """
+    """The points of the policies. A median that is not detected is null, which breaks the line."""
     return [
         {
             "policy": marked(cell.policy, cell.tags),
@@ -89,6 +89,7 @@ def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, An
             "place": cell.budget
             * CLOSED_LOOP_DODGE.factor(policies.index(cell.policy), len(policies)),
             "median": cell.detection.median,
+            # A quartile that is not detected reaches the bottom.
             "low": cell.detection.low or 0.0,
             "high": cell.detection.high or 0.0,
             "text": spread(cell.detection),

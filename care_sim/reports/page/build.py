@@ -100,6 +100,7 @@ class Page:
     @property
     def warnings(self) -> list[str]:
         """Sentences about what is missing, or is not as it was."""
+        # Each reason once, with the number of episodes that it kept from playing.
         reasons = Counter(
             episode.ending for episode in self.episodes if isinstance(episode.ending, str)
         )
@@ -137,6 +138,7 @@ def write_page(
     Raises InvalidInput where there are no results, and MissingExtra without the libraries.
     """
     rows, study, left_out = reported(folder)
+    # Opened before anything is played: a path that cannot be written is told at once.
     with replacing(path, HTML) as unfinished:
         findings = Findings.of(study, rows)
         about = provenance_of(folder, rows, study.results, left_out)
@@ -179,5 +181,6 @@ def _asset(name: str) -> Markup:
 def _embedded(data: Any) -> Markup:
     """Plain data for a script element, whose end no text in it can be."""
     return Markup(
+        # "</script>" in a text would end the element.
         json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
     )

@@ -42,6 +42,7 @@ def inline(values: Sequence[Mapping[str, Any]]) -> Any:
 def specification(chart: Any) -> dict[str, Any]:
     """The specification without what the page sets for all charts."""
     spec: dict[str, Any] = chart.to_dict()
+    # The page sets both once for all its charts.
     for name in ("config", "$schema"):
         spec.pop(name, None)
     return spec
@@ -71,6 +72,7 @@ class Encoding:
     def of_styles(cls, drawn: Mapping[str, Style]) -> "Encoding":
         """The look of names with these styles."""
         names = list(drawn)
+        # A click on a name in the legend leaves its curve strong and all others faint.
         chosen = alt.selection_point(fields=["policy"], bind="legend")
         legend = alt.Legend(title=None)
 
@@ -96,6 +98,8 @@ def budget_axis(budgets: Sequence[float], column: str = "place") -> alt.X:
     """A logarithmic axis of budgets with a mark at each."""
     return alt.X(
         f"{column}:Q",
+        # A little wider than the budgets, so that no point lies on the edge; equal factors are
+        # equal distances here.
         scale=alt.Scale(type="log", domain=[min(budgets) * 0.85, max(budgets) * 1.18], nice=False),
         axis=alt.Axis(
             values=list(budgets),

@@ -35,6 +35,7 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
         for (n, budget), gap in gaps.items()
         if gap
     ]
+    # The same range of colours as in the figure, so that both look alike.
     widest = max([COLLAPSE_M, *(abs(gap.mean) for gap in gaps.values() if gap)])
     base = alt.Chart(inline(values)).encode(
         x=alt.X(
@@ -52,6 +53,7 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
         legend=alt.Legend(title="all-camera minus care, m", orient="bottom"),
     )
     frame = alt.condition("datum.collapsed", alt.value("black"), alt.value("transparent"))
+    # White numbers on dark colours, as in the figure.
     ink = alt.condition(f"abs(datum.gap) > {PALE * widest}", alt.value("white"), alt.value("black"))
     chart = alt.layer(
         base.mark_rect(strokeWidth=1.5).encode(color=colour, stroke=frame, tooltip=about),

@@ -1,4 +1,4 @@
-"""The episodes of a page: which are played again, and whether they go as they went when the results
+"""The episodes of a page: which are played again, and whether they go as they did when the results
 were made.
 """
 
@@ -57,17 +57,18 @@ class Episode:
 
 
 def chosen(rows: Sequence[Row], most: int) -> list[Row]:
-    """At most so many rows: those of the first seed, then of the next, so that policies are seen
-    side by side.
+    """At most so many rows: all of the first seed, then those of the next, so that policies can be
+    seen side by side.
     """
+    # The sort is stable: within a seed the rows keep their order.
     return sorted(rows, key=lambda row: row["seed"])[:most]
 
 
 def played_again(
     rows: Sequence[Row], workers: int, make_executor: ExecutorFactory = processes
 ) -> list[Episode]:
-    """Play the episodes of rows again, in processes. An interrupt does not wait for those that have
-    not begun.
+    """Play the episodes of rows again, in processes. An interrupt does not wait for episodes that
+    have not begun.
     """
     if not rows:
         return []
@@ -94,6 +95,7 @@ def _parameters(row: Row, kind: str) -> Parameters:
         for name, value in row.items()
         if name.startswith(f"{kind}.")
     )
+    # A column holds nothing in the rows whose scenario or policy lacks the parameter.
     return tuple((name, value) for name, value in named if value is not None)
 
 

@@ -1,4 +1,4 @@
-"""The charts of the fault study: what a measure does as every fault grows, a panel a fault."""
+"""The charts of the fault study: what a measure does as every fault grows, one panel per fault."""
 
 import math
 from collections.abc import Sequence
@@ -36,13 +36,17 @@ def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
     }
     drawn = {study.marked(policy): style for policy, style in known.items()}
     encoding = Encoding.of_styles(drawn)
+    # Areas fall by equal factors from the first policy to the last, so that each mark lies visibly
+    # within the one before.
     ratio = (_LEAST / _LARGEST) ** (1 / len(names))
     values = [
         value | {"area": round(_LARGEST * ratio**number, 1)}
         for number, policy in enumerate(names)
         for value in _values(study, place, measure, policy)
     ]
+    # One order for all panels. Each panel has a scale of its own and shows its strengths alone.
     strengths = sorted({value["level"] for value in values}, key=float)
+    # Without data of its own: the facet below gives every panel its share.
     base = alt.Chart().encode(
         x=alt.X("level:O", sort=strengths, title=None, axis=alt.Axis(labelAngle=0)),
         y=alt.Y("value:Q", title=None),

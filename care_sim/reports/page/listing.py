@@ -1,5 +1,5 @@
-"""The episodes of a page as it lists them: setting by setting a line a configuration, an entry a
-seed.
+"""The episodes of a page as it lists them, setting by setting: one line per configuration, one
+entry per seed.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,9 @@ from care_sim.study.run_config import Row
 
 @dataclass(frozen=True)
 class EpisodeEntry:
-    """What an entry says of an episode; `number` of the replay in the page, None without."""
+    """What an entry says of an episode; `number` is that of its replay in the page, None without
+    one.
+    """
 
     text: str
     about: str
@@ -68,6 +70,7 @@ def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
     played = []
     for episode in _watchable(episodes):
         assert episode.replay is not None
+        # Policies meet the same world, whose standing bodies are then written once.
         bodies = episode.replay.bodies
         row = episode.row
         played.append(
@@ -82,6 +85,7 @@ def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
                 "story": packed(episode.replay.story),
             }
         )
+    # Of several equal lists one is kept.
     bodies_of = {one["bodies"]: one.pop("standing") for one in played}
     return {"bodies": [bodies_of[number] for number in sorted(bodies_of)], "episodes": played}
 

@@ -39,8 +39,8 @@ def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
 
 
 def _pareto(plays: SettingPlays) -> Chart:
-    """First-sighting against overall recall, a panel a budget, and the frontier of what a car can
-    have.
+    """First-sighting against overall recall, one panel per budget, and the frontier of what a car
+    can have.
     """
     encoding = Encoding.of(plays.tags.items(), full=False)
     values = [value for budget in plays.budgets for value in _points(plays, budget)]
@@ -58,6 +58,7 @@ def _pareto(plays: SettingPlays) -> Chart:
     }
     line = (
         alt.Chart()
+        # Corners come without a policy and in the order of the line.
         .mark_line(color="#999999", interpolate="step-before")
         .encode(**place, order="order:Q")
     )
@@ -110,6 +111,8 @@ def _points(plays: SettingPlays, budget: float) -> _Values:
     possible = {
         policy: point for policy, point in points.items() if not {*plays.tags[policy]} & {*MARKS}
     }
+    # The frontier ends at the least recall shown, so that its staircase reaches both edges of the
+    # points.
     corners = [possible[policy] for policy in frontier(possible)]
     if corners:
         least = [min(point[axis] for point in points.values()) for axis in (0, 1)]
@@ -144,6 +147,7 @@ def _levels(plays: SettingPlays) -> Chart:
         alt.Tooltip("value:Q", format=".1f", title="recall (%)"),
         "by:N",
     ]
+    # The full scan has no place on the axis of budgets and is drawn as a rule across it.
     ours, papers = (f"datum.place != null && datum.by == '{by}'" for by in ("here", "paper"))
     panels = alt.layer(
         base.mark_rule(strokeWidth=1.5, strokeDash=[5, 3]).transform_filter("datum.place == null"),

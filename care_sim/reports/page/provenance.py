@@ -15,16 +15,16 @@ from care_sim.study.run_config import Row
 
 CONFIG = "config.json"
 _MANY = 12
-"""Values of a parameter that are listed; of more the first and the last."""
+"""So many values of a parameter are listed; of more, the first and the last."""
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """`machine` and `versions` as the study wrote them; `missing` are sentences about what is not
-    there.
+    """What is known of where rows come from.
 
-    `settings` are the values of every parameter that is not the same in all rows, or not the
-    default.
+    `machine` and `versions` as the study wrote them. `settings` are the values of every parameter
+    that is not the same in all rows, or not the default. `missing` are sentences about what is not
+    there.
     """
 
     machine: Mapping[str, Any]
@@ -61,6 +61,7 @@ def settings(rows: Sequence[Row]) -> dict[str, str]:
     """Parameters by name, with their values in the rows; those at their defaults throughout are
     left out.
     """
+    # All rows of a file have the same columns.
     names = [*filter(is_parameter, rows[0])]
     values = {name: list(dict.fromkeys(row.get(name) for row in rows)) for name in names}
     return {name: _listed(held) for name, held in values.items() if held != [DEFAULTS.get(name)]}
@@ -105,12 +106,14 @@ def _description(path: Path) -> tuple[dict[str, Any], list[str]]:
 def _unplayed(
     description: Mapping[str, Any], rows: Sequence[Row], kind: ResultsFormat
 ) -> list[str]:
-    """What the configurations ask for and the rows do not hold; what failed is told as left out."""
+    """What the configurations ask for and the rows do not hold. What failed is told as left out."""
     try:
         asked = sum(
             len(each.get("seeds", each.get("floor_seeds")))
             for each in description.get("configurations", ())
         )
+        # Every configuration of the open loop is played in all scenes. "1" has one character, for
+        # the closed loop, which names none.
         asked *= len(description.get("scenes", "1"))
         failed = len(description.get("failed", ()))
     except (AttributeError, TypeError):

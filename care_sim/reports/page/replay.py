@@ -29,9 +29,9 @@ from care_sim.study.run_config import Row
 from care_sim.world.world import Actor
 
 SECTORS = 128
-"""Directions of the picture in which fired cells are counted, from azimuth -pi on."""
+"""Sectors in which fired cells are counted, from azimuth -pi on."""
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
-"""How full a sector is, is written as one digit, from none of its cells to all of them."""
+"""The digits that say how full a sector is, from none of its cells to all of them."""
 _CENTI = 100
 _MILLI = 1000
 
@@ -67,8 +67,9 @@ def packed(story: dict[str, Any]) -> str:
 
 @dataclass
 class Recorder:
-    """Watches an episode. A moment is what there is before a keyframe; the last one is after the
-    last keyframe.
+    """Watches an episode.
+
+    A moment is what there is before a keyframe; the last one is after the last keyframe.
     """
 
     actors: Sequence[Actor] = ()
@@ -96,7 +97,7 @@ class Recorder:
         return [self._body(number, actor) for number, actor in enumerate(self.actors)]
 
     def story(self) -> dict[str, Any]:
-        """What was taken down, a list a column."""
+        """What was recorded, one list per column."""
         columns = {name: [moment[name] for moment in self.moments] for name in self.moments[0]}
         ego = {
             "size": _whole(np.array(self.ego_size[:2]), _CENTI),
@@ -109,6 +110,7 @@ class Recorder:
         tracks = loop.belief.tracks
         self.poses.append([actor.pose_at(world.time) for actor in self.actors])
         places = loop.sensor.boxes_to_world(tracks.boxes)
+        # Tracks move on the ground: their velocities have no vertical part.
         moves = loop.sensor.vectors_to_world(
             np.column_stack([tracks.velocities, np.zeros(len(tracks))])
         )
@@ -145,12 +147,14 @@ class Recorder:
             "reported": actor.label is not None,
             "sought": actor is self.first_sighting,
         }
+        # In whole centimetres and milliradians: what moves less stands still in the picture.
         still = bool((poses == poses[0]).all())
         return about | ({"pose": poses[0].tolist()} if still else {"poses": poses.tolist()})
 
 
 def fullness(fired: Cells, grid: AngularGrid) -> str:
-    """How much of every sector fires, a digit a sector."""
+    """How much of every sector fires, one digit per sector."""
+    # Cells are numbered row by row, so that the remainder is the column.
     width = grid.columns // SECTORS
     counts = np.bincount(np.asarray(fired) % grid.columns // width, minlength=SECTORS)
     return "".join(
@@ -166,6 +170,8 @@ def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) 
     lines = []
     for number, (left, _, right, _) in enumerate(detections.boxes.tolist()):
         camera = rig.cameras[int(detections.cameras[number])]
+        # The azimuths at mid-height. Since an old picture was taken the car has turned; in the sensor
+        # frame of now its boxes are turned the other way.
         ends = camera.rays(np.array([[left, camera.height / 2], [right, camera.height / 2]]))
         azimuths = np.arctan2(ends[:, 1], ends[:, 0]) - detections.yaw_changes[number]
         lines.append([*_whole(azimuths, _MILLI), int(known[number])])
@@ -173,7 +179,7 @@ def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) 
 
 
 def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
-    """What the keyframes tell, a column each."""
+    """What the keyframes tell, one column for each thing."""
     switches = {"in_view": "in_view", "found": "detected", "brake": "braking"}
     written = {
         key: "".join(str(int(getattr(f, name))) for f in keyframes)

@@ -18,14 +18,16 @@ _LETTERS = {
     Path.CLOSEPOLY: "Z",
 }
 STROKE = 0.28
-"""How thick a bar is that stands for a line of a marker without an area."""
+"""Width of the bar that stands for a line of a marker without an area."""
 
 
 def outline(marker: str) -> str:
-    """The outline of a marker that Matplotlib knows by this name; bars where it draws lines. It can
-    be filled.
+    """The outline, which can be filled, of a marker that Matplotlib knows by this name; bars where
+    it draws lines.
     """
     style = MarkerStyle(marker)
+    # Matplotlib's markers reach from -0.5 to 0.5 with y upwards, Vega's from -1 to 1 with y
+    # downwards.
     path = style.get_path().transformed(style.get_transform() + Affine2D().scale(2, -2))
     return "".join(_outlined(path) if style.is_filled() else starmap(_bar, _ends(path)))
 
@@ -44,6 +46,7 @@ def _ends(path: Path) -> Iterator[tuple[Floats, Floats]]:
 
 
 def _bar(start: Floats, end: Floats) -> str:
+    # Half the width of the bar along the line; turned by a right angle it leads to the corners.
     along = (end - start) * STROKE / 2 / np.hypot(*(end - start))
     across = np.array([-along[1], along[0]])
     corners = (start + across, start - across, end - across, end + across)

@@ -1,4 +1,4 @@
-"""Tables of a study as a page holds them: blocks of rows, and the number by which an entry is
+"""Tables of a study as a page holds them: blocks of rows, and the number by which each entry is
 sorted.
 """
 
@@ -24,8 +24,8 @@ class Entry:
 
 @dataclass(frozen=True)
 class Line:
-    """A row. One that is `attached`, the paper's numbers, belongs to the row above and moves with
-    it.
+    """A row. An `attached` one holds the paper's numbers, belongs to the row above it and moves
+    with it.
     """
 
     entries: tuple[Entry, ...]
@@ -44,6 +44,7 @@ def blocks(table: Table) -> list[Block]:
     """The rows of a table by the headings among them."""
     parts: list[tuple[str, list[Line]]] = [("", [])]
     for row in table.rows:
+        # A heading begins a block.
         if len(row) == 1 < len(table.columns):
             parts.append((row[0], []))
         else:
@@ -58,8 +59,10 @@ def sort_key(text: str) -> float | None:
     """The number that an entry begins with, the value of a share as k/n, and the least for what was
     never detected.
     """
+    # Below every distance, as medians rank it.
     if text.startswith((NOT_DETECTED, "n.d.")):
         return float("-inf")
+    # k/n is a share; 0/0 is none.
     share = _SHARE.fullmatch(text)
     number = _NUMBER.match(text)
     if share and int(share[2]):

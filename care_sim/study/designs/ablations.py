@@ -47,6 +47,7 @@ def _margins(columns: int, rows: int) -> Variant:
 
 
 def _rules(name: str, values: Iterable[float]) -> tuple[Variant, ...]:
+    # The default value is the usual policy, whose rows carry no parameter.
     default = getattr(ForgettingRules(), name)
     return tuple(
         Variant(f"{value:g}", parameters={} if value == default else {name: float(value)})
@@ -120,9 +121,12 @@ def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
         for place in ABLATION_PLACES
         for config in USUAL_VARIANT.configurations(place, ["full"], seeds)
     ]
+    # The policy itself at every level; the others under the conditions of the level, whose
+    # parameters they do not have.
     for place, ablation in product(ABLATION_PLACES, ABLATIONS):
         beside = [*ablation.references, *(also if ablation.varies_conditions else ())]
         for level in ablation.levels:
             made += level.configurations(place, [ablation.policy], seeds)
             made += level.for_others().configurations(place, beside, seeds)
+    # The usual level comes in every ablation and is played once.
     return list(dict.fromkeys(made))

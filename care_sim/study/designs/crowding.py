@@ -9,7 +9,7 @@ _CROWDING_BUDGETS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.20, 0.35)
 _VEHICLE_COUNTS = range(len(VEHICLE_PLACES) + 1)
 CROWDING_POLICIES = ("all-camera", "care", "full")
 VEHICLES_COLUMN = "scenario.vehicles"
-"""The column of the rows that the study varies."""
+"""The column that the study varies."""
 
 
 def crowding_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:

@@ -14,7 +14,7 @@ reserves apart.
 """
 FAULT_POLICIES = ("history", "all-camera", "care", "full")
 _BLACKOUT_START_S = 2.0
-"""The person comes into the camera's view 2.4 to 2.9 s after the start."""
+"""Seconds. The person comes into the camera's view 2.4 to 2.9 s after the start."""
 _DEAD_ROWS = ((11,), (10, 11), (10, 11, 12), (9, 10, 11, 12))
 """Grown out of the middle of the rows that meet a person at the full scan's 16 m, 1 to 6 degrees
 below the horizon.
@@ -23,7 +23,7 @@ below the horizon.
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault from none of it (the first level) to much of it; the labels of the levels are its
+    """A fault from none of it, the first level, to much of it. The labels of the levels are its
     strength in `unit`.
     """
 
@@ -39,6 +39,8 @@ class Fault:
 
 
 def _growing(parameter: str, *values: float, start: float = 0, **given: Any) -> tuple[Variant, ...]:
+    # At strength 0 nothing else of the fault has an effect, and the level is the usual one. A burst
+    # of one keyframe is no burst, but its share of misses stays.
     first = Variant(f"{start:g}", given if start else {})
     return (first, *(Variant(f"{value:g}", {parameter: value, **given}) for value in values))
 

@@ -28,6 +28,8 @@ def paper_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeC
     impaired = [policy for policy in policies if policy != "full"]
     lagging = [policy for policy in impaired if policy != "history"]
     return [
+        # The full scan has one budget: 4 x 4 + 1, then 4 x 3 + 1, then 4 + 1. History asks no
+        # camera, so that latency is played without it.
         *grid(["dense"], policies, (0.03, 0.05, 0.10, 0.20), seeds),
         *grid(["dartout"], policies, (0.03, 0.05, 0.10), seeds),
         *grid(["cutin"], policies, (0.10,), seeds),
@@ -39,6 +41,7 @@ def paper_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeC
 @cache
 def paper_cells() -> frozenset[Key]:
     """Setting, policy and budget of every cell of the study."""
+    # The seed is in no key, so that one seed tells all cells.
     return frozenset(key_of(config.row()) for config in paper_study([0]))
 
 

@@ -1,4 +1,4 @@
-"""What a study varies, one thing at a time: places, levels, and where their rows are found."""
+"""What a study varies, one thing at a time: places, levels, and the keys of their rows."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,10 +22,10 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Variant:
-    """One value of what is varied: fields of `EpisodeConfig` that depart from the usual, or
+    """One value of what is varied: fields of `EpisodeConfig` that depart from the usual ones, or
     parameters of the policy.
 
-    `policy` plays instead of the study's own where the level is another policy.
+    Where the level is another policy, `policy` plays instead of the study's own.
     """
 
     label: str
@@ -57,11 +57,13 @@ class Variant:
             "policy": self.policy or policy,
             "budget": place.budget,
         }
+        # The key of a row that has just these values: the same way in which rows get theirs.
         key = key_of(
             row
             | dict(self.changes)
             | {f"policy.{name}": value for name, value in self.parameters.items()}
         )
+        # The full scan was run once for all levels that it does not feel.
         return (key[0].for_full(), "full", 1.0) if policy == "full" else key
 
 

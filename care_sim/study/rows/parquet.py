@@ -15,11 +15,11 @@ from care_sim.study.rows.schema import Schema
 from care_sim.study.run_config import Row
 
 STUDY_NOTE = b"care_sim.study"
-"""Where the schema of a file names the study that its rows belong to."""
+"""Key of the metadata that names the study of a file's rows."""
 LEFT_OUT_NOTE = b"care_sim.left_out"
-"""Where the schema of a file tells what is missing in it."""
+"""Key of the metadata that tells what is missing in a file."""
 _ANY = Schema()
-"""Of columns of whatever name and type."""
+"""Columns of any name and type."""
 
 
 def write_rows(
@@ -29,8 +29,8 @@ def write_rows(
     left_out: Sequence[str] = (),
     schema: Schema = _ANY,
 ) -> None:
-    """Write rows, the name of their study and what it lacks to a Parquet file; columns of nothing
-    as `schema` says.
+    """Write rows, the name of their study and what it lacks to a Parquet file. A column in which no
+    row holds anything has the type that `schema` gives it.
     """
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [row.get(name) for row in rows] for name in names}
@@ -56,13 +56,14 @@ def write_columns(
 
 
 def check_columns(rows: Iterable[Row]) -> None:
-    """Raise InvalidInput where one column cannot hold a parameter of all rows: a number here and a
-    text there.
+    """Raise InvalidInput where one column cannot hold a parameter of all rows, such as a number in
+    one and a text in another.
     """
     values: dict[str, dict[tuple[type, Any], None]] = {}
     for row in rows:
         for name, value in row.items():
             if "." in name:
+                # By type and value: 1, 1.0 and True are equal, but not the same in a column.
                 values.setdefault(name, {})[type(value), value] = None
     for name, held in values.items():
         try:
@@ -84,10 +85,11 @@ def _with_tuples(value: Any) -> Any:
 
 
 def read_rows(path: Path, schema: Schema | None = None) -> list[Row]:
-    """Read rows back, of a schema the columns that it knows. Raises InvalidInput for a file that is
-    damaged, is empty, or has not the schema.
+    """Read rows back; with a schema, the columns that it knows. Raises InvalidInput for a file that
+    is damaged, is empty, or does not have the schema.
     """
     table = _read(path)
+    # The first fault is told.
     for fault in (schema or _ANY).faults(table):
         raise InvalidInput(f"{path} holds no rows of a study: {fault}")
     known = table.select(schema.known(table)) if schema else table
@@ -121,6 +123,7 @@ def _read(path: Path) -> pa.Table:
         raise InvalidInput(f"no results at {path}; expected a folder that a study wrote")
     try:
         table = pq.read_table(path)
+        # Damaged offsets are found here, not as a crash when values are read.
         table.validate(full=True)
         table.column_names  # noqa: B018 (names of broken characters show only now)
         return table

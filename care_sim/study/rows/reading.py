@@ -44,17 +44,21 @@ def _setting_of_episode(row: Row) -> Setting:
     changed = [
         (n, row[n])
         for n in names
+        # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names
+        # another setting, whatever its value.
         if n not in _AXES and row[n] is not None and row[n] != _USUAL_EPISODE.get(n)
     ]
+    # Sorted, so that the order of columns in a file does not make another setting.
     conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
     return Setting(row["scenario"], tuple(conditions))
 
 
 def _setting_of_play(row: Row) -> Setting:
-    """A condition that the row has no column for is the usual one."""
+    """A condition for which the row has no column is the default."""
     changed = tuple(
         (name, row[name])
         for name, usual in _USUAL_PLAY.items()
+        # Files of older versions have no columns for the conditions that were added since.
         if row.get(name) not in (usual, None)
     )
     return Setting(row["source"], changed, with_parameters(row, "detector"))
@@ -85,7 +89,7 @@ def with_parameters(row: Row, kind: str) -> str:
 
 
 def _text(value: Any) -> str:
-    """The same for a number that was an int before a file held it."""
+    """Written the same for a number that was an int before a file held it as a float."""
     return f"{value:g}" if is_number(value) else f"{value}"
 
 
@@ -103,7 +107,7 @@ def grouped(rows: Sequence[Row]) -> dict[Key, list[Row]]:
 
 
 def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
-    """The full scans of the same worlds, None where they were not run."""
+    """The rows of the full scan in the same worlds, None where it was not run."""
     return groups.get((setting.for_full(), "full", 1.0))
 
 
@@ -129,9 +133,9 @@ def annotated(rows: Sequence[Row]) -> list[Row]:
     """The rows with three more columns.
 
     `tags` of the policy, joined by '+'. `regret_m`: detection distance of the full scan of the same
-    world and seed minus this row's, 0 at best, None where the full scan was not run. `censored`:
-    the policy, or that full scan, never detected the actor, so that `regret_m` counts with the most
-    its distance can have been and is a bound.
+    world and seed minus that of this row, 0 at best, None where the full scan was not run.
+    `censored`: the policy, or that full scan, never detected the actor, so that `regret_m` takes
+    the most that its distance can have been and is a bound.
     """
     full = {(setting_of(row), row["seed"]): row for row in rows if row["policy"] == "full"}
     return [{**row, **_regret(row, full)} for row in tagged(rows)]

@@ -1,5 +1,5 @@
-"""What the columns of results must be, so that every report can be made of them: checked where a
-file is opened.
+"""What the columns of results must be, so that every report can be made of them. They are checked
+when a file is opened.
 """
 
 import math
@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 from care_sim.core.conditions import DEFAULTS
 
 _LARGEST = 1e12
-"""What a measured number may be and still be averaged and drawn."""
+"""The largest size of a measured number that can still be averaged and drawn."""
 PARAMETERS = ("scenario.", "policy.", "detector.")
 """What the names of columns of parameters begin with."""
 
@@ -53,7 +53,7 @@ _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": p
 
 @dataclass(frozen=True)
 class Column:
-    """A column of one of `_KINDS`, its numbers within `least` and `most`.
+    """A column of one of `_KINDS`, its numbers between `least` and `most`.
 
     Where it is `optional`, rows may hold nothing in it. Numbers that are `whole` count something,
     whatever type a file holds them in.
@@ -67,7 +67,7 @@ class Column:
 
     @property
     def type(self) -> pa.DataType:
-        """What it is written as where no row tells."""
+        """The type to write where no row holds a value."""
         return _WRITTEN.get(self.kind, pa.float64())
 
     def faults(self, values: pa.ChunkedArray) -> Iterator[str]:
@@ -84,6 +84,7 @@ class Column:
             yield from self._beyond(values)
 
     def _beyond(self, values: pa.ChunkedArray) -> Iterator[str]:
+        # Lists within lists are opened level by level; a gap in one is no number.
         while _is_list_of(lambda _kind: True, values.type):
             values = pc.list_flatten(values)
             if values.null_count:
@@ -91,6 +92,7 @@ class Column:
         if not _is_number(values.type) or self.kind == _ANY:
             return
         ends = pc.min_max(values).as_py()
+        # None where there are no values to look at.
         finite = pc.all(pc.is_finite(values)).as_py() in (True, None)
         if (
             not finite
@@ -130,9 +132,11 @@ def as_optional(column: Column) -> Column:
 
 @dataclass(frozen=True)
 class Schema:
-    """The columns of a kind of results: those that are `needed`, `further` ones that are checked
-    where they are, and `sums`, which come again for every stratum as KIND/STRATUM/NAME, all or
-    none. Columns of parameters are known too, all others are not read.
+    """The columns of a kind of results.
+
+    Those that are `needed`; `further` ones that are checked where they are; `sums`, which come
+    again for every stratum as KIND/STRATUM/NAME, all of them or none. Columns of parameters are
+    known too. All others are not read.
     """
 
     needed: Mapping[str, Column] = field(default_factory=dict)
@@ -160,7 +164,7 @@ class Schema:
 
     @property
     def lenient(self) -> "Schema":
-        """The same where nothing is needed: of results that an older version wrote."""
+        """The same where nothing is needed, for results that an older version wrote."""
         return Schema({}, {**self.needed, **self.further})
 
     def column(self, name: str) -> Column:
@@ -174,6 +178,7 @@ class Schema:
         parts = (name.split("/") for name in names)
         strata = {
             (kind, label)
+            # A file that has one sum of a stratum must have all of them.
             for kind, label, last in (part for part in parts if len(part) == 3)
             if last in self.sums
         }

@@ -1,4 +1,4 @@
-"""What rows that are compared have in common: one `Setting` for the closed and the open loop."""
+"""What rows have in common that may be compared: one `Setting` for the closed and the open loop."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -35,6 +35,7 @@ class Setting:
 
         The paper defines it in the open loop alone.
         """
+        # Only the open loop has a detector here.
         return bool(self.detector) and self.conditions == (("camera_latency", 1),)
 
     @property
@@ -55,6 +56,7 @@ class Setting:
         detector = [] if self.detector in ("", PROXY) else [self.detector]
         changed = [f"{name}-{value}" for name, value in self.conditions]
         text = "-".join([self.world, *detector, *changed])
+        # Every other sign may mean something to a file system or a shell.
         return "".join(sign if sign.isalnum() or sign in ".-" else "-" for sign in text)
 
     def for_full(self) -> "Setting":
