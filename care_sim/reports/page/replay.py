@@ -170,8 +170,8 @@ def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) 
     lines = []
     for number, (left, _, right, _) in enumerate(detections.boxes.tolist()):
         camera = rig.cameras[int(detections.cameras[number])]
-        # The azimuths at mid-height. Since an old picture was taken the car has turned; in the sensor
-        # frame of now its boxes are turned the other way.
+        # The azimuths at mid-height. Since an old picture was taken the car has turned; in the
+        # sensor frame of now its boxes are turned the other way.
         ends = camera.rays(np.array([[left, camera.height / 2], [right, camera.height / 2]]))
         azimuths = np.arctan2(ends[:, 1], ends[:, 0]) - detections.yaw_changes[number]
         lines.append([*_whole(azimuths, _MILLI), int(known[number])])
