@@ -63,6 +63,8 @@ class Export(PlayOptions):
                 "source must be nuscenes:FOLDER, whose samples the official form names, got "
                 f"{self.source!r}"
             )
+
+        # One floor and one latency: results are of one way to play, whereas a study has several.
         source = self.scene_source()
         common = self.common()
         floors = [common.pop("floor_seed")]

@@ -67,6 +67,7 @@ class View:
                 file=sys.stderr,
             )
             return _FAILED
+        # The page of the viewer asks its own server for the data, which has a port of its own.
         data, pages = _free_ports(2)
         source = quote(f"rerun+http://{_HERE}:{data}/proxy", safe="")
         print(
@@ -82,6 +83,7 @@ def _rerun(*options: str) -> int:
     """Run the viewer that comes with Rerun until it ends or is interrupted; none of its processes
     outlives this one.
     """
+    # A session of its own makes the viewer and its children one group, which is ended as one.
     quiet = {"RUST_LOG": "warn"} | os.environ
     command = [sys.executable, "-c", _VIEWER, *options]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=quiet)

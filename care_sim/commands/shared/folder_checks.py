@@ -43,6 +43,7 @@ def check_results(folder: Path, configs: Sequence[RunConfig], study: Study) -> N
     path = folder / study.results.file
     if not path.is_file():
         return
+    # A file that names no study was written by a version that had sweeps alone.
     there = read_notes(path)[0] or SWEEP.name
     rows, gone = _rows_and_gone(path, configs, study)
     unit = study.results.unit.removesuffix("s")

@@ -53,8 +53,12 @@ def run_study(
     with _journal(folder, study) as journal:
         _check(folder, configs, study, force, journal)
         _say_what_is_found(configs, journal, folder, kind.unit)
+
+        # The journal keeps what finishes, even if this process ends before results are written.
         failures = run_with_progress(configs, journal, workers, make_executor, kind)
         played = [config for config in configs if config.key in journal]
+
+        # Results of an earlier run are worth more than new ones with holes in their place.
         left = lost(folder, played, study) if failures and not force else ""
         if left:
             print(left, file=sys.stderr)

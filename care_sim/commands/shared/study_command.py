@@ -50,6 +50,7 @@ class StudyCommand:
         """
         make_executor = executors.cluster(self.cluster) if self.cluster else executors.processes
         failures = run_study(configs, out, self.workers, make_executor, STUDIES[study], self.force)
+        # What is printed is read back from the folder, as `care-sim report` would print it.
         if len(failures) < len(configs):
             rows, _, missing = reported(out)
             print_report(rows, console(), STUDIES[study], missing)

@@ -32,16 +32,20 @@ def same_on_grid(engine: str) -> str:
 
 
 def ratios(report: BenchReport) -> dict[str, float]:
-    """The ratios by name. Engine `fast` stands against all others where there is one, else Bullet's
-    does. Steps are those of a second on the core, but for processes side by side.
+    """The ratios by name: steps over those of known environments, scans of `fast` over those of
+    every other engine, and two processes over one. Where there is no engine `fast`, Bullet takes
+    its place.
     """
     speed = report["speed"]
     engines = report["scans"]["engines"]
     curves = report["growth"]["grid"]["ms"]
+    # Per second on the core, so that what else runs on it does not favour one side. Two processes
+    # are compared by the clock: whether they run at the same time is the question.
     steps = {name: middle(figures["steps_per_cpu_s"]) for name, figures in speed.items()}
     scan = {name: middle(figures["scan_ms"]) for name, figures in engines.items()}
     mine = FAST if FAST in engines else REFERENCE_ENGINE
     one, two = (middle(values) for values in report["vectorised"].values())
+    # What was not measured here has no ratio.
     return {
         **{
             name: steps[report["main"]] / steps[peer]

@@ -36,6 +36,7 @@ _RATIO_BOUNDS = {
     OVER_REACHING: 1.5,
 }
 _TWO_PROCESSES = 1.8
+"""Of two: what they lose to each other, to the pipes and to the process that steps them."""
 _SAME_RAYS = 0.8
 """Sixteen times the cells may cost a fixed number of rays a quarter more."""
 
@@ -67,6 +68,8 @@ def targets(report: BenchReport) -> list[Target]:
         for name in ("scenario", "policy", "budget")
     ):
         return []
+
+    # What costs most in each figure, for whoever wants to mend it.
     keyframe = _keyframe_holder(report)
     scan = _scan_holder(report)
     choice = _choice_holder(report)
@@ -112,6 +115,7 @@ def targets(report: BenchReport) -> list[Target]:
 def _study_target(study: Mapping[str, float] | None) -> list[Target]:
     if study is None:
         return []
+    # A run may play another number of seeds than the target speaks of.
     seconds = study["seconds"] / study["episodes"] * _STUDY_EPISODES
     return [
         Target(
@@ -146,5 +150,6 @@ def _choice_holder(report: BenchReport) -> str:
 
 def _memory_holder(report: BenchReport) -> str:
     memory = report["memory"]
+    # Up to the first episode, memory is that of libraries and compiled code.
     begun = memory["begun_mb"]
     return _longest({"libraries": begun, "episodes": memory["peak_mb"] - begun}, memory["peak_mb"])

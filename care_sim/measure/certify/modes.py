@@ -58,7 +58,7 @@ def together(episodes: Sequence[Drawn], most: int) -> list[Sequence[Drawn]]:
 
 
 def in_turns(episodes: Sequence[Drawn], source: str) -> list[Played]:
-    """A keyframe of each in turn, until all are over."""
+    """The episodes in one process, one keyframe of each in turn, until all are over."""
     with ExitStack() as stack:
         envs = [
             stack.enter_context(closing(certified_env(episode, source))) for episode in episodes
@@ -78,6 +78,8 @@ def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None
     """
     makers = [partial(certified_env, episode, source) for episode in episodes]
     with ExitStack() as stack:
+        # Policies ask environments of this process for their rigs. Those of another process are out
+        # of reach, so that each has a twin here.
         twins = _twins(stack, episodes, source) if context else []
         vector = stack.enter_context(
             closing(SyncVectorEnv(makers) if context is None else _forked(makers, context))
@@ -87,12 +89,14 @@ def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None
 
 
 def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorEnv:
+    # Each ends when this process ends, however that happens.
     with starting():
         return AsyncVectorEnv([partial(following, maker) for maker in makers], context=context)
 
 
 def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Played]:
     """In the subprocesses of Stable-Baselines3 (extra 'rl')."""
+    # Imported here: it brings PyTorch, and only this mode needs the extra.
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
     makers: list[Any] = [
@@ -145,7 +149,7 @@ def answer_parent() -> None:
 
 
 def certified_env(episode: Drawn, source: str) -> Trail:
-    """The environment of an episode, which leaves its trail."""
+    """The environment of an episode, which keeps its trail."""
     recorded = {"source": source} if episode.environment == REPLAY else {}
     arguments = dict(episode.arguments) | recorded
     return Trail(

@@ -76,6 +76,8 @@ def trails_of(
         try:
             futures = {executor.submit(attempt, batch, source): batch for batch in waiting}
             for future in as_completed(futures):
+                # A worker that died takes its batch with it, and the others with theirs: the reason
+                # stands in the place of the trails.
                 try:
                     found |= future.result()
                 except BrokenExecutor:
@@ -97,6 +99,8 @@ def episode_batches(episodes: Sequence[Drawn]) -> list[list[Drawn]]:
     """Episodes in lists that are played one after the other: those of a street together, since it
     takes seconds to make, and the others by mode.
     """
+    # `groupby` needs its groups side by side. Episodes of a street make one group whatever their
+    # mode, which `attempt` takes apart again.
     ordered = sorted(episodes, key=lambda episode: (*_world(episode), episode.mode, episode.number))
     made: list[list[Drawn]] = []
     for (world, mode), group in groupby(
@@ -125,6 +129,7 @@ def attempt(batch: Sequence[Drawn], source: str) -> Trails:
     found: Trails = {}
     for group in _alike(batch):
         trails = answer(play_in_mode, group[0].mode, group, source)
+        # One text instead of trails: an exception that ended the whole group.
         if isinstance(trails, str):
             trails = [_alone(episode, source) for episode in group]
         found |= {episode.number: trail for episode, trail in zip(group, trails, strict=True)}

@@ -66,6 +66,7 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin the episode."""
+        # Only the first reset begins the episode.
         if not self._stages:
             self._observation, _ = super().reset(seed=self._episode.seed)
             self._note(self._episode.text)
@@ -96,6 +97,7 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
             self._look(self._observation)
 
     def _look(self, observation: Any) -> None:
+        """Note the first three of `TRAIL_STAGES`, before the policy chooses."""
         loop = self.env.unwrapped.loop  # type: ignore[attr-defined]
         self._note(
             *(_moving(loop) if isinstance(loop, ClosedLoop) else _filmed(loop)), observation["ego"]
@@ -104,11 +106,13 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._note(observation["tracks"])
 
     def _act(self, observation: Any, fired: Any) -> None:
+        """Note the other three of `TRAIL_STAGES`, after the keyframe."""
         self._note(fired)
         self._note(observation["ranges"].ravel()[fired])
         self._note(*_detected(self.env.unwrapped))
 
     def _note(self, *parts: Any) -> None:
+        # The hash runs on: once two episodes differ, every later byte differs too, but for chance.
         self._content.update(portable_bytes(*parts))
         self._stages.append(self._content.digest()[-1])
 

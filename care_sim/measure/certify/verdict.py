@@ -43,6 +43,8 @@ class Verdict:
         stages = Counter(name for name, _ in self.differing.values())
         told = ", ".join(f"{count:,} {_where(name)}" for name, count in stages.most_common())
         yield f"{counted}: {self.hash or 'no hash'}, not as published: {told}"
+
+        # The first of them in detail, with the command that plays it alone.
         first = min(self.differing)
         name, keyframe = self.differing[first]
         moment = "" if keyframe is None else f", keyframe {keyframe}"

@@ -35,6 +35,7 @@ class Outcomes:
         (_, drawn), (_, expected) = (trace(config.changed(engine=engine)) for engine in _ENGINES)
         self.episodes += 1
         self.keyframes += len(expected)
+        # An outcome that differs from Bullet's may be owed to Bullet's tolerance.
         if outcome(drawn) != outcome(expected):
             self.other_outcomes.append(config.label)
             if outcome(drawn) != outcome(_exact(config)):

@@ -18,6 +18,7 @@ from care_sim.measure.parity.answers import SAME_RANGE_M
 SCAN_BODIES = 30
 """Bodies of the scan that the targets speak of."""
 REFERENCE_ENGINE = "bullet"
+"""The engine whose answers the others are compared with."""
 
 
 def scans(config: BenchConfig) -> tuple[dict[str, Any], list[str]]:
@@ -70,9 +71,8 @@ def agreement(
 def laps(
     made: Mapping[str, Caster], bodies: MovingBodies, cells: Cells, samples: int
 ) -> dict[str, Floats]:
-    """(samples, 3) seconds of poses, cast and both, of every engine; the engines take turns, scan
-    by scan.
-    """
+    """(samples, 3) seconds of poses, cast and both, of every engine."""
+    # The engines take turns, scan by scan: what else the machine does falls on all alike.
     times = {name: np.empty((samples, 3)) for name in made}
     for number in range(samples):
         poses = bodies.at(number)
