@@ -21,7 +21,7 @@ def policy_paragraphs() -> Iterator[str]:
         yield _hidden(entry, f"that of {package_of(winner)}" if winner else "the built-in one")
 
 
-def parameters_of(make: PolicyMaker) -> list[str]:
+def parameter_texts(make: PolicyMaker) -> list[str]:
     """The parameters as NAME=DEFAULT; a bare name must be given."""
     return [
         parameter.name
@@ -41,7 +41,7 @@ def _paragraph(name: str) -> str:
     return _lines(
         f"{name} ({', '.join(tags_of(name))})",
         _summary(name, make),
-        " ".join(parameters_of(make)),
+        " ".join(parameter_texts(make)),
         getattr(make, "source", ""),
     )
 

@@ -16,7 +16,7 @@ from care_sim.world.bullet import BulletWorld
 
 
 @dataclass(frozen=True)
-class Prop:
+class AnnotatedBody:
     """An annotated box: its `number` in the film, its class name (None outside the five classes),
     length, width and height, and the frame in its centre, seen from the sensor.
     """
@@ -45,23 +45,23 @@ class Prop:
 
 
 def sense(
-    props: Sequence[Prop], sensor: Frame, height_m: float, grid: AngularGrid
+    annotated: Sequence[AnnotatedBody], sensor: Frame, height_m: float, grid: AngularGrid
 ) -> tuple[Annotations, IdentifiedDetections, Cloud]:
-    """What a LiDAR in the frame `sensor` and the cameras around it see of `props`, every cell
+    """What a LiDAR in the frame `sensor` and the cameras around it see of `annotated`, every cell
     fired.
 
     The road is a plane `height_m` below the sensor, parallel to the car. It hides nothing, because
     real roads undulate: a plane in the world would bury what stands where they fall.
     """
-    reported = [prop for prop in props if prop.label is not None]
+    reported = [one for one in annotated if one.label is not None]
     annotations = annotations_of(reported)
     with closing(BulletWorld(ground=False)) as world:
         # All of them occlude. Those of the five classes have a number in the film.
-        bodies = {id(prop): _add(world, prop, sensor) for prop in props}
-        numbers = {bodies[id(prop)]: prop.number for prop in reported}
-        labels = {bodies[id(prop)]: CLASSES.index(str(prop.label)) for prop in reported}
+        bodies = {id(one): _add(world, one, sensor) for one in annotated}
+        numbers = {bodies[id(one)]: one.number for one in reported}
+        labels = {bodies[id(one)]: CLASSES.index(str(one.label)) for one in reported}
         seen = surround_detections(world, SURROUND_CAMERAS, sensor, labels, annotations.boxes)
-        swept = full_sweep(world, grid, sensor, _table([prop.bounds for prop in props]), height_m)
+        swept = full_sweep(world, grid, sensor, _table([one.bounds for one in annotated]), height_m)
     identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
     return (
         annotations,
@@ -70,11 +70,11 @@ def sense(
     )
 
 
-def annotations_of(props: Sequence[Prop]) -> Annotations:
-    """The annotations of `props`, all of the five classes."""
-    boxes = _table([prop.box for prop in props])
-    classes = [CLASSES.index(str(prop.label)) for prop in props]
-    numbers = [prop.number for prop in props]
+def annotations_of(annotated: Sequence[AnnotatedBody]) -> Annotations:
+    """The annotations of `annotated`, all of the five classes."""
+    boxes = _table([one.box for one in annotated])
+    classes = [CLASSES.index(str(one.label)) for one in annotated]
+    numbers = [one.number for one in annotated]
     return Annotations(np.array(numbers, dtype=np.int64), np.array(classes, dtype=np.int64), boxes)
 
 
@@ -82,8 +82,6 @@ def _table(boxes: list[tuple[float, ...]]) -> Floats:
     return np.array(boxes, dtype=float).reshape(-1, 7)
 
 
-def _add(world: BulletWorld, prop: Prop, sensor: Frame) -> int:
-    foot = prop.foot
-    return world.add(
-        sized("prop", prop.label, prop.size), sensor.holding(foot.origin, foot.rotation)
-    )
+def _add(world: BulletWorld, one: AnnotatedBody, sensor: Frame) -> int:
+    foot = one.foot
+    return world.add(sized("prop", one.label, one.size), sensor.holding(foot.origin, foot.rotation))

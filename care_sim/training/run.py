@@ -92,7 +92,7 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
         if sys.stderr.isatty()
         else nullcontext(ProgressLines(config.steps, "steps")) as show
     ):
-        shown = _shower(show, config, clock, begun)
+        shown = _progress(show, config, clock, begun)
         while True:
             # A resumed run may have been interrupted between learning and evaluation.
             if not folder.evaluated(model):
@@ -102,16 +102,16 @@ def _learn(config: AgentConfig, folder: Folder, model: "BaseAlgorithm", env: Any
             if (left := config.steps - model.num_timesteps) <= 0:
                 break
             with clock:
-                _stretch(model, min(config.evaluate_every, left), shown, folder)
+                _learn_steps(model, min(config.evaluate_every, left), shown, folder)
     if learned := model.num_timesteps - begun:
+        rate = learned / clock.own_seconds
         _say(
-            f"{learned / clock.here:.0f} environment steps per second inside {config.algorithm}, "
-            "learning included"
+            f"{rate:.0f} environment steps per second inside {config.algorithm}, learning included"
         )
     _say(f"kept in {folder.path}")
 
 
-def _stretch(
+def _learn_steps(
     model: "BaseAlgorithm", steps: int, shown: Callable[[int], None], folder: Folder
 ) -> None:
     from stable_baselines3.common.callbacks import ConvertCallback
@@ -127,11 +127,11 @@ def _stretch(
         folder.save(model)
 
 
-def _shower(
+def _progress(
     show: Show, config: AgentConfig, clock: "Stopwatch", begun: int
 ) -> Callable[[int], None]:
     def shown(steps: int) -> None:
-        rate = (steps - begun) / max(clock.here, 1e-9)
+        rate = (steps - begun) / max(clock.own_seconds, 1e-9)
         left = max(config.steps - steps, 0) / rate if rate else 0.0
         show(min(steps, config.steps), f"{rate:.0f} steps/s, {rounded_duration(left)} left")
 
@@ -150,18 +150,18 @@ class Stopwatch:
         self._since = time.monotonic()
 
     def __exit__(self, *_: object) -> None:
-        self._done = self.here
+        self._done = self.own_seconds
         self._since = None
 
     @property
-    def here(self) -> float:
+    def own_seconds(self) -> float:
         """Of this program."""
         return self._done + (time.monotonic() - self._since if self._since is not None else 0.0)
 
     @property
     def seconds(self) -> float:
         """With those before it was resumed."""
-        return self._before + self.here
+        return self._before + self.own_seconds
 
 
 def _check_tensorboard(config: AgentConfig) -> None:

@@ -121,12 +121,12 @@ def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArr
 
 def _loss(torch: Any, network: Any, data: Examples, rows: NDArray[np.int64]) -> Any:
     """The weighted logistic loss over some examples."""
-    inputs, positive, weigh = (
-        torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weigh)
+    inputs, positive, weights = (
+        torch.from_numpy(column[rows]) for column in (data.inputs, data.positive, data.weights)
     )
     scores = network(inputs)[:, 0]
     # With logits: the logarithm of a sigmoid that underflows would be minus infinity.
-    return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weigh)
+    return torch.nn.functional.binary_cross_entropy_with_logits(scores, positive.float(), weights)
 
 
 def _loss_of(torch: Any, network: Any, data: Examples) -> float:

@@ -44,12 +44,12 @@ OTHER_CELLS = 200
 @dataclass(frozen=True)
 class Examples:
     """`inputs` (n, SCAN_INPUTS + len(RIG_INPUTS)) of cells, whether they are `positive` (n,), and
-    what they `weigh` (n,).
+    their `weights` (n,).
     """
 
     inputs: Float32s
     positive: NDArray[np.bool_]
-    weigh: Float32s
+    weights: Float32s
 
     def __len__(self) -> int:
         return len(self.positive)
@@ -70,10 +70,10 @@ def balanced(plays: Iterable[Examples]) -> Examples:
     """All plays as one, positive and other examples of equal weight, 1 on average."""
     together = _joined([*plays])
     # In float64: millions of weights are summed. Each group then weighs half of the total.
-    weigh = together.weigh.astype(np.float64)
+    weights = together.weights.astype(np.float64)
     for group in (together.positive, ~together.positive):
-        weigh[group] *= len(weigh) / 2 / max(weigh[group].sum(), 1e-12)
-    return replace(together, weigh=weigh.astype(np.float32))
+        weights[group] *= len(weights) / 2 / max(weights[group].sum(), 1e-12)
+    return replace(together, weights=weights.astype(np.float32))
 
 
 def front_alone(film: Film) -> Film:
@@ -104,26 +104,26 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
 
 def _play(env: FilmEnv, seed: int, rng: np.random.Generator) -> Iterator[Examples]:
     policy = History(env.rig)
-    cues = CellInputs(env.rig)
+    inputs = CellInputs(env.rig)
     observation, _ = env.reset(seed=seed)
     while not env.loop.over:
-        yield _keyframe(env.loop, Belief.from_observation(observation), cues, rng)
+        yield _keyframe(env.loop, Belief.from_observation(observation), inputs, rng)
         observation, *_ = env.step(policy(observation))
 
 
 def _keyframe(
-    loop: OpenLoop, belief: Belief, cues: CellInputs, rng: np.random.Generator
+    loop: OpenLoop, belief: Belief, inputs: CellInputs, rng: np.random.Generator
 ) -> Examples:
     positive, shares = untracked_cells(loop)
     # Drawn from all cells and not from the others alone: a few of so many are positive.
-    others = np.setdiff1d(rng.choice(cues.rig.grid.size, OTHER_CELLS, replace=False), positive)
+    others = np.setdiff1d(rng.choice(inputs.rig.grid.size, OTHER_CELLS, replace=False), positive)
     cells = np.concatenate([positive, others])
-    seen = cues.of(belief, cues.rig.hulls(belief.tracks.boxes))
-    weigh = np.concatenate([shares, np.ones(len(others), np.float32)])
+    seen = inputs.of(belief, inputs.rig.hulls(belief.tracks.boxes))
+    weights = np.concatenate([shares, np.ones(len(others), np.float32)])
     return Examples(
-        np.hstack([seen.rows(cells), cues.outlooks[cells]]),
+        np.hstack([seen.rows(cells), inputs.rig_inputs[cells]]),
         np.arange(len(cells)) < len(positive),
-        weigh,
+        weights,
     )
 
 

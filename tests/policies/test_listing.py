@@ -1,7 +1,7 @@
 """The list of policies, with what installed packages add, hide and break."""
 
 from care_sim.policies import BUILT_IN
-from care_sim.policies.listing import parameters_of, policy_paragraphs
+from care_sim.policies.listing import parameter_texts, policy_paragraphs
 
 GOOD = '''
 import care_sim
@@ -35,9 +35,9 @@ def test_every_built_in_policy_has_tags_a_source_and_a_summary_that_fit_80_colum
 
 
 def test_parameters_come_with_their_defaults():
-    assert parameters_of(BUILT_IN["care"]) == []
-    assert parameters_of(BUILT_IN["random-points"]) == ["seed=0"]
-    assert {"k_safe=2.0", "standstill_m=2.0"} <= set(parameters_of(BUILT_IN["care-sbf"]))
+    assert parameter_texts(BUILT_IN["care"]) == []
+    assert parameter_texts(BUILT_IN["random-points"]) == ["seed=0"]
+    assert {"k_safe=2.0", "standstill_m=2.0"} <= set(parameter_texts(BUILT_IN["care-sbf"]))
 
 
 def test_an_installed_policy_is_listed_with_its_package(install):

@@ -80,8 +80,8 @@ def test_a_front_alone_sees_what_the_first_camera_saw(film):
 def test_positive_and_other_examples_weigh_the_same_and_1_on_average():
     inputs, positive = np.zeros((4, 2), np.float32), np.array([True, False, False, False])
     made = Examples(inputs, positive, np.array([0.2, 1, 1, 2], np.float32))
-    weigh = balanced([made, made]).weigh
-    assert weigh == pytest.approx([2, 0.5, 0.5, 1] * 2)
+    weights = balanced([made, made]).weights
+    assert weights == pytest.approx([2, 0.5, 0.5, 1] * 2)
 
 
 @pytest.mark.slow
@@ -91,6 +91,6 @@ def test_a_street_gives_the_same_examples_again():
     for one, other in zip(once, again, strict=True):
         assert one.inputs.shape == (len(one), SCAN_INPUTS + len(RIG_INPUTS))
         assert np.array_equal(one.inputs, other.inputs)
-        assert np.array_equal(one.weigh, other.weigh)
+        assert np.array_equal(one.weights, other.weights)
         assert 39 * OTHER_CELLS < (~one.positive).sum() <= 40 * OTHER_CELLS
         assert one.positive.any()

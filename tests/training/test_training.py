@@ -125,7 +125,7 @@ def test_it_trains_keeps_and_goes_on(capsys, tmp_path):
 @pytest.mark.usefixtures("libraries")
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "moment", ["care_sim.training.run.evaluate", "care_sim.training.run._stretch"]
+    "moment", ["care_sim.training.run.evaluate", "care_sim.training.run._learn_steps"]
 )
 def test_an_interrupted_run_goes_on(capsys, monkeypatch, tmp_path, moment):
     """Whether the rules are being measured or the first steps were just learned."""

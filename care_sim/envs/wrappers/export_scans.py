@@ -24,7 +24,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.watcher import WatchedKeyframe
 from care_sim.policies.base import Policy
 
-UNITS_NOTE = (
+_UNITS_NOTE = (
     "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x "
     "along the road, y "
     "left, z up. Sensor frame, that of points and tracks: x forward, y left, z up; "
@@ -96,7 +96,7 @@ class ExportScans(Watching):
 
     def _describe(self, outcome: Mapping[str, Any] | None) -> None:
         content = {
-            "units": UNITS_NOTE,
+            "units": _UNITS_NOTE,
             "grid": asdict(self._closed_loop.rig.grid),
             "classes": CLASSES,
             "shares": SHARES,

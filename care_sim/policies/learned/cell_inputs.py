@@ -73,7 +73,7 @@ class CellFeatures(NamedTuple):
 
 
 class CellInputs:
-    """The cues of a rig's cells, N of them in the order of their index."""
+    """The inputs of a rig's cells, N of them in the order of their index."""
 
     def __init__(self, rig: Rig):
         self.rig = rig
@@ -100,7 +100,7 @@ class CellInputs:
         return seen
 
     @cached_property
-    def outlooks(self) -> Float32s:
+    def rig_inputs(self) -> Float32s:
         """(N, `RIG_INPUTS`) what is known of every cell without a keyframe."""
         x, y, z = self.rig.grid.directions.T
         flat = np.hypot(x, y)

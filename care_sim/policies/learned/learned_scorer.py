@@ -39,8 +39,8 @@ class LearnedScorer(Policy):
         super().__init__(rig)
         weights = load_weights(shipped_weights(self.name) if path is None else path)
         weights.check(self.name, rig)
-        self._cues = CellInputs(rig)
-        self._network = CellNetwork(weights, self._cues.outlooks)
+        self._inputs = CellInputs(rig)
+        self._network = CellNetwork(weights, self._inputs.rig_inputs)
         # What exploitation leaves, as Algorithm 1 rounds it.
         self._reserve = rig.budget - round((1 - rig.reserve_fraction) * rig.budget)
 
@@ -48,20 +48,20 @@ class LearnedScorer(Policy):
         """Hulls, then the cells of the highest scores."""
         hulls = self.rig.hulls(belief.tracks.boxes)
         return Demand(
-            hulls, [[highest(self._network.scores(self._cues.of(belief, hulls)), self._reserve)]]
+            hulls, [[highest(self._network.scores(self._inputs.of(belief, hulls)), self._reserve)]]
         )
 
 
 class CellNetwork:
-    """The network of some weights over cells whose outlooks (N, `RIG_INPUTS`) are fixed."""
+    """The network of some weights over cells whose rig_inputs (N, `RIG_INPUTS`) are fixed."""
 
-    def __init__(self, weights: Weights, outlooks: NDArray[np.float32]):
+    def __init__(self, weights: Weights, rig_inputs: NDArray[np.float32]):
         # The first layer is linear, so its sum falls into parts. What the rig decides and what each
         # code of marks adds is computed here once; a keyframe looks it up and adds two products.
         layer = weights.array("layer", SCAN_INPUTS + len(RIG_INPUTS), None)
         units = layer.shape[1]
         self._out = weights.array("out", units)
-        hidden = outlooks @ layer[SCAN_INPUTS:] + weights.array("bias", units)
+        hidden = rig_inputs @ layer[SCAN_INPUTS:] + weights.array("bias", units)
         self._rig_terms = RigTerms(hidden, np.maximum(hidden, 0) @ self._out)
         by_size, by_nearness = np.ascontiguousarray(layer[len(CELL_MARKS) : SCAN_INPUTS])
         self._mark_weights = MarkWeights(_by_code(layer[: len(CELL_MARKS)]), by_size, by_nearness)

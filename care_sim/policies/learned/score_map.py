@@ -50,8 +50,8 @@ class ScoreMap:
             self._ego @ observation["ego"] + self._bias
         )
         weight, bias = self._hidden
-        thought = np.maximum(np.maximum(seen, 0) @ weight.T + bias, 0)
-        return np.asarray(np.tanh((thought @ self._score).reshape(self._place.shape) + self._place))
+        hidden = np.maximum(np.maximum(seen, 0) @ weight.T + bias, 0)
+        return np.asarray(np.tanh((hidden @ self._score).reshape(self._place.shape) + self._place))
 
     def _windows(self, grid: NDArray[np.float32]) -> NDArray[np.float32]:
         """(sectors, channels * blocks) what each sector sees; nothing above and below the grid."""

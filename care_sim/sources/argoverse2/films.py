@@ -33,7 +33,7 @@ from care_sim.sources.argoverse2.tables import (
     read_poses,
     table,
 )
-from care_sim.sources.boxes_as_bodies import Prop, annotations_of, sense
+from care_sim.sources.boxes_as_bodies import AnnotatedBody, annotations_of, sense
 from care_sim.sources.car_motion import motions
 
 UP_LIDAR = (1.35, 0.0, 1.64)
@@ -89,11 +89,11 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
     for row in np.searchsorted(moments, keyframes).tolist():
         sensor = cars[row].holding(np.array(UP_LIDAR))
         seen = sense(
-            _props(_rows(boxes, moments[row], seen=True)), sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid
+            _bodies(_rows(boxes, moments[row], seen=True)), sensor, ARGOVERSE2_SENSOR_HEIGHT_M, grid
         )
         shots.append(Shot(float(times[row]), str(moments[row]), sensor, egos[row], *seen))
-    unseen = _props(_rows(boxes, keyframes[0], seen=False))
-    hidden = annotations_of([prop for prop in unseen if prop.label is not None])
+    unseen = _bodies(_rows(boxes, keyframes[0], seen=False))
+    hidden = annotations_of([body for body in unseen if body.label is not None])
     return Film(
         log.name,
         SURROUND_CAMERAS,
@@ -152,7 +152,7 @@ def _rows(boxes: Columns, sweep: int, seen: bool) -> Columns:
     return {name: column[kept] for name, column in boxes.items()}
 
 
-def _props(boxes: Columns) -> list[Prop]:
+def _bodies(boxes: Columns) -> list[AnnotatedBody]:
     """The boxes as bodies; the sensor's axes are the car's."""
     numbers = boxes["number"].tolist()
     labels = [ARGOVERSE2_CATEGORIES[name] for name in boxes["category"].tolist()]
@@ -164,4 +164,4 @@ def _props(boxes: Columns) -> list[Prop]:
         Frame.turned_by(Rotation.from_quat(turn), place)
         for turn, place in zip(turns, places, strict=True)
     ]
-    return [Prop(*values) for values in zip(numbers, labels, sizes, frames, strict=True)]
+    return [AnnotatedBody(*values) for values in zip(numbers, labels, sizes, frames, strict=True)]

@@ -59,7 +59,7 @@ def nuscenes_film(
         detections.check(database)
     samples = database.samples(scene)
     data = [_recordings(database, sample) for sample in samples]
-    stage = _stage(database, samples, data[0], grid or AngularGrid(), detections)
+    setup = _scene_setup(database, samples, data[0], grid or AngularGrid(), detections)
     cars = [
         _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
     ]
@@ -67,16 +67,16 @@ def nuscenes_film(
     # Times are microseconds; the motion is that of the poses at which the sweeps were taken.
     egos = motions(times, cars)
     shots = tuple(
-        stage.shot(*moment)
+        setup.shot(*moment)
         for moment in zip(samples, data, times.tolist(), cars, egos, strict=True)
     )
-    cameras = tuple(camera.pinhole for camera in stage.cameras)
-    hidden = stage.hidden(samples[0], cars[0])
-    return Film(scene["name"], cameras, stage.lidar.z, NUSCENES_KEYFRAME_S, shots, hidden)
+    cameras = tuple(camera.pinhole for camera in setup.cameras)
+    hidden = setup.hidden(samples[0], cars[0])
+    return Film(scene["name"], cameras, setup.lidar.z, NUSCENES_KEYFRAME_S, shots, hidden)
 
 
 @dataclass(frozen=True)
-class _Stage:
+class _SceneSetup:
     """What holds for a whole scene: the LiDAR's frame in the car, the cameras, a number per
     instance.
     """
@@ -125,16 +125,18 @@ class _Stage:
         )
 
 
-def _stage(
+def _scene_setup(
     database: Database,
     samples: list[JsonRow],
     recordings: dict[str, JsonRow],
     grid: AngularGrid,
     detections: DetectionFile | None,
-) -> _Stage:
+) -> _SceneSetup:
     lidar = _lidar_mount(database, recordings[LIDAR])
     cameras = tuple(_camera(database, recordings[channel], lidar) for channel in CAMERA_CHANNELS)
-    return _Stage(database, lidar, cameras, _object_numbers(database, samples), grid, detections)
+    return _SceneSetup(
+        database, lidar, cameras, _object_numbers(database, samples), grid, detections
+    )
 
 
 def _recordings(database: Database, sample: JsonRow) -> dict[str, JsonRow]:

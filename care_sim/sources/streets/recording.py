@@ -42,9 +42,9 @@ def record(
     """
     grid = grid or AngularGrid()
     with closing(BulletWorld()) as world:
-        stage = _Stage(street, world)
+        bodies = _StreetBodies(street, world)
         shots, hidden = zip(
-            *(stage.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True
+            *(bodies.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True
         )
     return Film(street.name, cameras, LIDAR_POSITION[2], STREET_KEYFRAME_S, shots, hidden[0])
 
@@ -68,7 +68,7 @@ def _street_film(seed: int, secret: str) -> Film:
     )
 
 
-class _Stage:
+class _StreetBodies:
     """The bodies of a street in a simulator. Each enters when it first comes near, then follows its
     way.
     """

@@ -97,7 +97,7 @@ def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
 
 
 def test_outlooks_are_those_of_the_ray():
-    elevation, ground, cosine, sine, covered = CellInputs(RIG).outlooks.T.reshape(
+    elevation, ground, cosine, sine, covered = CellInputs(RIG).rig_inputs.T.reshape(
         len(RIG_INPUTS), *GRID.shape
     )
     assert elevation[:, 0] == pytest.approx(np.linspace(GRID.top, GRID.bottom, 32) / 0.5, abs=1e-6)
@@ -110,7 +110,7 @@ def test_outlooks_are_those_of_the_ray():
 
 
 def test_a_front_camera_covers_what_is_ahead():
-    covered = CellInputs(Rig(GRID, SURROUND_CAMERAS[:1])).outlooks[:, 4].reshape(GRID.shape)
+    covered = CellInputs(Rig(GRID, SURROUND_CAMERAS[:1])).rig_inputs[:, 4].reshape(GRID.shape)
     assert covered[8, 256 - 40 : 256 + 40].all()
     assert not covered[:, :150].any()
     assert not covered[:, 362:].any()
