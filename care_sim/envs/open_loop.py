@@ -149,7 +149,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         info = self.told(own, {"objects": len(scored), "found": int(scored.sum())})
         if self._over:
             info["outcome"] = asdict(self.score.tally())
-        # Nobody to be found is nobody missed.
+        # A keyframe without annotated objects misses none of them.
         reward = float(scored.mean()) - 1.0 if len(scored) else 0.0
         return self.observed(), reward, False, self._over, info
 

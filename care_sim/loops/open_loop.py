@@ -114,6 +114,12 @@ class OpenLoop:
             tracks, lambda numbers: {n: present[n] for n in numbers if n in present}
         )
 
+    def true_objects(self, tracks: Tracks) -> Cells:
+        """(n,) the numbers of the objects behind tracks, NOBODY for a track without one. Truth: for
+        the training alone.
+        """
+        return self._track_objects.behind(tracks)
+
     def full_scan(self) -> Scan:
         """What every cell would return now, before noise and dropout. Truth: for the privileged
         alone.

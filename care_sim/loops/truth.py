@@ -1,4 +1,4 @@
-"""What is true about the coming keyframe: for privileged policies and the scoring alone.
+"""What is true about the coming keyframe: for privileged policies, scoring and training alone.
 
 Truth is asked of the running loop and never enters a `Belief`.
 """
@@ -6,10 +6,13 @@ Truth is asked of the running loop and never enters a `Belief`.
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
+
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import Scan, Tracks
+from care_sim.sensors.annotated import NOBODY
 
 
 class Truth(Protocol):
@@ -72,6 +75,11 @@ class TrackObjects:
         """The tracks with the ids `tracks` (n,) were detected on `objects` (n,)."""
         # The last one counts: where the tracker changed its object, the truth changes with it.
         self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
+
+    def behind(self, tracks: Tracks) -> Cells:
+        """(n,) the objects behind tracks, NOBODY for a track without one."""
+        objects = [self._objects.get(track, NOBODY) for track in tracks.ids.tolist()]
+        return np.array(objects, np.int64)
 
     def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
         """(n, 7) where the objects behind forecasts are now; a track without one stays as forecast.

@@ -88,10 +88,7 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     cloud = loop.shot.cloud
     annotations = loop.shot.annotations
     in_range = np.hypot(annotations.boxes[:, 0], annotations.boxes[:, 1]) <= RANGE_M
-    # A track knows no object; the truth gives the box of the one behind it, bit for bit as it is
-    # annotated.
-    behind_tracks = loop.true_boxes(loop.belief.tracks)
-    tracked = (annotations.boxes[:, None] == behind_tracks[None]).all(axis=2).any(axis=1)
+    tracked = np.isin(annotations.objects, loop.true_objects(loop.belief.tracks))
     wanted = np.isin(cloud.objects, annotations.objects[in_range & ~tracked])
     cells, first = np.unique(cloud.cells[wanted], return_index=True)
     # Per object: how many cells return from it. Fewer than MIN_RETURNS would not detect it.

@@ -46,8 +46,8 @@ class ValidationScore:
 def evaluate(env: gymnasium.Env[Any, Any], choose: Choose, seeds: Iterable[int]) -> ValidationScore:
     """Play one episode per seed."""
     played = [_episode(env, choose, seed) for seed in seeds]
-    # Nobody detected at all counts as 0 m, so that missing someone is worst. The open loop has no
-    # such distance.
+    # An actor who is never detected counts as 0 m, the worst there is. The open loop has no such
+    # distance.
     distances = [
         outcome["detection_distance_m"] or 0.0
         for _, outcome in played
