@@ -39,10 +39,32 @@ def _chart(cells: Sequence[Cell]) -> Chart:
     tags = dict.fromkeys((cell.policy, cell.tags) for cell in cells if cell.policy != FULL)
     full = [cell for cell in cells if cell.policy == FULL and cell.detection.median is not None]
     encoding = Encoding.of(tags, bool(full))
+    budgets = _budgets(cells)
     values = _values(cells, [policy for policy, _ in tags])
+    chart = _curves(encoding, values, budgets, full)
+    scenario = cells[0].setting.world
+    counts = sorted({cell.episodes for cell in cells})
+    seeds = counted(counts[0], "seed") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
+    title = f"{scenario}: first detection against the budget, {seeds} a point"
+    about_it = (
+        "Median distance of the first detection in metres, one curve per policy, "
+        f"budgets {budgets_text(budgets)}."
+    )
+    return Chart(
+        title, about_it, (*_NOTES, *tag_notes(own for _, own in tags)), specification(chart)
+    )
+
+
+def _curves(
+    encoding: Encoding,
+    values: Sequence[dict[str, Any]],
+    budgets: Sequence[float],
+    full: Sequence[Cell],
+) -> Any:
+    """Curves with quartiles and points, hollow points at the bottom, the full scan as a rule."""
     height = alt.Y("median:Q", title="first detection (m)", scale=alt.Scale(zero=True))
     base = alt.Chart(inline(values)).encode(
-        x=budget_axis(_budgets(cells)), y=height, color=encoding.colour, opacity=encoding.opacity
+        x=budget_axis(budgets), y=height, color=encoding.colour, opacity=encoding.opacity
     )
     # Vega draws nothing at null. These points are put at the bottom, hollow.
     missed = base.transform_filter("datum.median == null").encode(y=alt.datum(0))
@@ -65,19 +87,7 @@ def _chart(cells: Sequence[Cell]) -> Chart:
         line = [{"policy": FULL_SCAN, "median": cell.detection.median} for cell in full[:1]]
         rule = alt.Chart(inline(line)).mark_rule(strokeWidth=1.5, strokeDash=[5, 3])
         layers.append(rule.encode(y=height, color=encoding.colour, opacity=encoding.opacity))
-    chart = alt.layer(*layers).add_params(encoding.chosen).properties(width="container", height=300)
-    scenario = cells[0].setting.world
-    budgets = _budgets(cells)
-    counts = sorted({cell.episodes for cell in cells})
-    seeds = counted(counts[0], "seed") if len(counts) == 1 else f"{counts[0]} to {counts[-1]} seeds"
-    title = f"{scenario}: first detection against the budget, {seeds} a point"
-    about_it = (
-        "Median distance of the first detection in metres, one curve per policy, "
-        f"budgets {budgets_text(budgets)}."
-    )
-    return Chart(
-        title, about_it, (*_NOTES, *tag_notes(own for _, own in tags)), specification(chart)
-    )
+    return alt.layer(*layers).add_params(encoding.chosen).properties(width="container", height=300)
 
 
 def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, Any]]:

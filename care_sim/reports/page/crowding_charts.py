@@ -3,6 +3,7 @@ budget.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import altair as alt
 
@@ -35,8 +36,20 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
         for (n, budget), gap in gaps.items()
         if gap
     ]
+    chart = _heat_map(crowd, values)
+    seeds = counted(len({row["seed"] for row in rows}), "seed")
+    title = f"dense: first detection of all-camera minus care, m, {seeds}"
+    about_it = (
+        "A heat map of the mean difference by budget and standing vehicles; negative where "
+        "all-camera is later."
+    )
+    return [Chart(title, about_it, _NOTES, specification(chart))]
+
+
+def _heat_map(crowd: Crowd, values: Sequence[dict[str, Any]]) -> Any:
+    """One square per budget and number of vehicles, with its number; framed where collapsed."""
     # The same range of colours as in the figure, so that both look alike.
-    widest = max([COLLAPSE_M, *(abs(gap.mean) for gap in gaps.values() if gap)])
+    widest = max([COLLAPSE_M, *(abs(value["gap"]) for value in values)])
     base = alt.Chart(inline(values)).encode(
         x=alt.X(
             "budget:O",
@@ -55,14 +68,7 @@ def crowding_charts(rows: Sequence[Row]) -> list[Chart]:
     frame = alt.condition("datum.collapsed", alt.value("black"), alt.value("transparent"))
     # White numbers on dark colours, as in the figure.
     ink = alt.condition(f"abs(datum.gap) > {PALE * widest}", alt.value("white"), alt.value("black"))
-    chart = alt.layer(
+    return alt.layer(
         base.mark_rect(strokeWidth=1.5).encode(color=colour, stroke=frame, tooltip=about),
         base.mark_text(fontSize=11).encode(text="text:N", color=ink, tooltip=about),
     ).properties(width="container", height=26 * len(crowd.counts))
-    seeds = counted(len({row["seed"] for row in rows}), "seed")
-    title = f"dense: first detection of all-camera minus care, m, {seeds}"
-    about_it = (
-        "A heat map of the mean difference by budget and standing vehicles; negative where "
-        "all-camera is later."
-    )
-    return [Chart(title, about_it, _NOTES, specification(chart))]

@@ -44,6 +44,25 @@ def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
         for number, policy in enumerate(names)
         for value in _values(study, place, measure, policy)
     ]
+    chart = _panels(encoding, values)
+    seeds = counted(len({row["seed"] for row in study.rows}), "seed")
+    apart = "Marks of later policies are smaller, so that equal ones stay visible."
+    hollow = "Hollow, at the bottom: the median is an actor that was not detected."
+    return Chart(
+        f"{place}: {measure.label}, {seeds}",
+        f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a "
+        "policy.",
+        (
+            apart,
+            *([hollow] if any(value["value"] is None for value in values) else []),
+            *study.notes(study.policies),
+        ),
+        specification(chart.add_params(encoding.chosen)),
+    )
+
+
+def _panels(encoding: Encoding, values: Sequence[dict[str, Any]]) -> Any:
+    """One panel per fault: curves of the policies over its strengths."""
     # One order for all panels. Each panel has a scale of its own and shows its strengths alone.
     strengths = sorted({value["level"] for value in values}, key=float)
     # Without data of its own: the facet below gives every panel its share.
@@ -67,23 +86,9 @@ def _chart(study: StudyCells, place: Place, measure: CurveMeasure) -> Chart:
         title=None, labelAnchor="start", labelExpr="split(datum.value, ', ')", labelFontSize=11
     )
     faults = [fault.label for fault in FAULTS]
-    chart = layers.facet(
+    return layers.facet(
         facet=alt.Facet("fault:N", sort=faults, header=header), columns=5, data=inline(values)
     ).resolve_scale(x="independent")
-    seeds = counted(len({row["seed"] for row in study.rows}), "seed")
-    apart = "Marks of later policies are smaller, so that equal ones stay visible."
-    hollow = "Hollow, at the bottom: the median is an actor that was not detected."
-    return Chart(
-        f"{place}: {measure.label}, {seeds}",
-        f"{measure.label} at every strength of {len(FAULTS)} faults, a panel a fault, a curve a "
-        "policy.",
-        (
-            apart,
-            *([hollow] if any(value["value"] is None for value in values) else []),
-            *study.notes(study.policies),
-        ),
-        specification(chart.add_params(encoding.chosen)),
-    )
 
 
 def _values(

@@ -44,42 +44,8 @@ def _pareto(plays: SettingPlays) -> Chart:
     """
     encoding = Encoding.of(plays.tags.items(), full=False)
     values = [value for budget in plays.budgets for value in _points(plays, budget)]
-    about = [
-        alt.Tooltip("overall:Q", format=".1f"),
-        alt.Tooltip("first:Q", format=".1f", title="first sightings"),
-    ]
-    place = {
-        "x": alt.X(
-            "overall:Q", title="overall recall (%)", scale=alt.Scale(zero=False, padding=12)
-        ),
-        "y": alt.Y(
-            "first:Q", title="first-sighting recall (%)", scale=alt.Scale(zero=False, padding=12)
-        ),
-    }
-    line = (
-        alt.Chart()
-        # Corners come without a policy and in the order of the line.
-        .mark_line(color="#999999", interpolate="step-before")
-        .encode(**place, order="order:Q")
-    )
-    points = (
-        alt.Chart()
-        .mark_point(size=90, strokeWidth=2)
-        .encode(
-            **place,
-            color=encoding.colour,
-            shape=encoding.shape,
-            opacity=encoding.opacity,
-            tooltip=["policy:N", *about],
-        )
-    )
-    panels = alt.layer(
-        line.transform_filter("datum.policy == null"),
-        points.transform_filter("datum.policy != null"),
-    ).properties(width=PANEL_WIDTH + 20, height=220)
-    order = [*map(_panel, plays.budgets)]
     chart = (
-        _faceted(panels, values, order)
+        _faceted(_pareto_panel(encoding), values, [*map(_panel, plays.budgets)])
         .resolve_scale(x="independent", y="independent")
         .add_params(encoding.chosen)
     )
@@ -101,6 +67,44 @@ def _pareto(plays: SettingPlays) -> Chart:
     return Chart(
         f"{_title(plays)}: first sightings against all", description, notes, specification(chart)
     )
+
+
+def _pareto_panel(encoding: Encoding) -> Any:
+    """One panel: the frontier as a line, and over it the policies as markers."""
+    about = [
+        alt.Tooltip("overall:Q", format=".1f"),
+        alt.Tooltip("first:Q", format=".1f", title="first sightings"),
+    ]
+    place = {
+        "x": alt.X(
+            "overall:Q", title="overall recall (%)", scale=alt.Scale(zero=False, padding=12)
+        ),
+        "y": alt.Y(
+            "first:Q", title="first-sighting recall (%)", scale=alt.Scale(zero=False, padding=12)
+        ),
+    }
+    # From a corner the frontier goes down first and then on, hence the step before the point.
+    line = (
+        alt.Chart()
+        .mark_line(color="#999999", interpolate="step-before")
+        .encode(**place, order="order:Q")
+    )
+    points = (
+        alt.Chart()
+        .mark_point(size=90, strokeWidth=2)
+        .encode(
+            **place,
+            color=encoding.colour,
+            shape=encoding.shape,
+            opacity=encoding.opacity,
+            tooltip=["policy:N", *about],
+        )
+    )
+    # Both are in one list of values: corners of the line have no policy.
+    return alt.layer(
+        line.transform_filter("datum.policy == null"),
+        points.transform_filter("datum.policy != null"),
+    ).properties(width=PANEL_WIDTH + 20, height=220)
 
 
 def _points(plays: SettingPlays, budget: float) -> _Values:
@@ -138,30 +142,9 @@ def _levels(plays: SettingPlays) -> Chart:
     """Both recalls against the budget; hollow: what the paper gives."""
     encoding = Encoding.of(plays.tags.items(), full=bool(plays.full))
     values = [value for ratio in _RECALLS for value in _curves(plays, ratio)]
-    height = alt.Y("value:Q", title="recall (%)", scale=alt.Scale(zero=False))
-    base = alt.Chart().encode(y=height, color=encoding.colour, opacity=encoding.opacity)
-    curves = base.encode(x=budget_axis(plays.budgets))
-    about = [
-        "policy:N",
-        "budget:N",
-        alt.Tooltip("value:Q", format=".1f", title="recall (%)"),
-        "by:N",
-    ]
-    # The full scan has no place on the axis of budgets and is drawn as a rule across it.
-    ours, papers = (f"datum.place != null && datum.by == '{by}'" for by in ("here", "paper"))
-    panels = alt.layer(
-        base.mark_rule(strokeWidth=1.5, strokeDash=[5, 3]).transform_filter("datum.place == null"),
-        curves.mark_line(strokeWidth=1.8).encode(strokeDash=encoding.dash).transform_filter(ours),
-        curves.mark_point(filled=True, size=50)
-        .encode(shape=encoding.shape, tooltip=about)
-        .transform_filter(ours),
-        curves.mark_point(filled=False, size=60)
-        .encode(shape=encoding.shape, tooltip=about)
-        .transform_filter(papers),
-    ).properties(width=PANEL_WIDTH + 140, height=260)
-    chart = _faceted(panels, values, [ratio.name for ratio in _RECALLS]).resolve_scale(
-        y="independent"
-    )
+    chart = _faceted(
+        _levels_panel(encoding, plays.budgets), values, [ratio.name for ratio in _RECALLS]
+    ).resolve_scale(y="independent")
     said = (
         ["Hollow: what the paper gives."] if any(value["by"] == "paper" for value in values) else []
     )
@@ -177,6 +160,31 @@ def _levels(plays: SettingPlays) -> Chart:
     )
 
 
+def _levels_panel(encoding: Encoding, budgets: Sequence[float]) -> Any:
+    """One panel: the full scan as a rule, our levels as curves, the paper's as hollow points."""
+    height = alt.Y("value:Q", title="recall (%)", scale=alt.Scale(zero=False))
+    base = alt.Chart().encode(y=height, color=encoding.colour, opacity=encoding.opacity)
+    curves = base.encode(x=budget_axis(budgets))
+    about = [
+        "policy:N",
+        "budget:N",
+        alt.Tooltip("value:Q", format=".1f", title="recall (%)"),
+        "by:N",
+    ]
+    # The full scan has no place on the axis of budgets and is drawn as a rule across it.
+    ours, papers = (f"datum.place != null && datum.by == '{by}'" for by in ("here", "paper"))
+    return alt.layer(
+        base.mark_rule(strokeWidth=1.5, strokeDash=[5, 3]).transform_filter("datum.place == null"),
+        curves.mark_line(strokeWidth=1.8).encode(strokeDash=encoding.dash).transform_filter(ours),
+        curves.mark_point(filled=True, size=50)
+        .encode(shape=encoding.shape, tooltip=about)
+        .transform_filter(ours),
+        curves.mark_point(filled=False, size=60)
+        .encode(shape=encoding.shape, tooltip=about)
+        .transform_filter(papers),
+    ).properties(width=PANEL_WIDTH + 140, height=260)
+
+
 def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
     """Our levels, moved apart, and the paper's; without a place the full scan."""
     values: _Values = []
@@ -185,19 +193,12 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
         for budget in plays.budgets:
             about = {"policy": marked(policy, tags), "budget": percent(budget), "panel": ratio.name}
             here = plays.level(ratio, policy, budget).by_event
-            said = None
-            if not plays.setting.conditions:
-                said = published_level(ratio, policy, budget)
-            values += (
-                [about | {"place": budget * shift, "value": here, "by": "here"}]
-                if here is not None
-                else []
-            )
-            values += (
-                [about | {"place": budget, "value": said, "by": "paper"}]
-                if said is not None
-                else []
-            )
+            if here is not None:
+                values.append(about | {"place": budget * shift, "value": here, "by": "here"})
+            # The paper's stand at their own budgets, and belong to its plain setting alone.
+            said = None if plays.setting.conditions else published_level(ratio, policy, budget)
+            if said is not None:
+                values.append(about | {"place": budget, "value": said, "by": "paper"})
     ceiling = plays.level(ratio, FULL, 1.0).by_event if plays.full else None
     full = {
         "policy": FULL_SCAN,
