@@ -57,7 +57,7 @@ class PlayConfig(Conditions, RunConfig):
         for name in UNFILMED:
             if getattr(self, name) != DEFAULTS[name]:
                 raise InvalidInput(
-                    f"{name} cannot be changed in the open loop: its films are made without"
+                    f"{name} cannot be changed in the open loop: its films are made without it"
                 )
         with gymnasium.make(
             # Any film will do for this check, and a generated street needs no data.

@@ -191,8 +191,8 @@ def check_size(tasks: int) -> None:
     """Raise InvalidInput for more tasks than a study can hold; asked before they are made."""
     if tasks > MOST_TASKS:
         raise InvalidInput(
-            "a study holds the rows of all its tasks in memory, so they are at most "
-            f"{MOST_TASKS:,}, got {shown(tasks)}: play it in parts, each with an --out of its own"
+            f"the tasks of a study must be at most {MOST_TASKS:,}, got {shown(tasks)}, because all "
+            "their rows are held in memory: play it in parts, each with its own --out"
         )
 
 

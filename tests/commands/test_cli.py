@@ -137,8 +137,7 @@ def test_an_unfinished_study_is_told_from_none(capsys, tmp_path):
     code, _, err = run(capsys, "report", tmp_path)
     assert (code, err) == (
         2,
-        f"care-sim: {tmp_path} holds an unfinished study; the command that began it goes on "
-        "there\n",
+        f"care-sim: {tmp_path} holds an unfinished study; run the command that began it again\n",
     )
     code, _, err = run(capsys, "report", tmp_path / "nowhere")
     assert "no results at" in err

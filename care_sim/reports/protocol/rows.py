@@ -162,8 +162,8 @@ def _check_films(rows: Sequence[Row]) -> None:
             )
         if films.setdefault(scene, row["film_hash"]) != row["film_hash"]:
             raise InvalidInput(
-                f"the plays of scene {row['scene']} are of two films, its data changed between "
-                "runs: take a new --out"
+                f"the plays of scene {row['scene']} are of two films: its data changed between "
+                "runs; give another --out"
             )
 
 

@@ -1,7 +1,7 @@
 """Every contrast of the paper's evaluation beside what was measured, and whether it is met."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.reports.formatting import ends
@@ -35,14 +35,7 @@ def statements_tables(plays: SettingPlays) -> list[Table]:
     said = claims_about(plays.setting)
     # Only the budgets of which the paper speaks: a verdict needs a claim.
     budgets = [budget for budget in plays.budgets if budget in PAPER_BUDGETS]
-    found = {
-        each: {budget: each.measured(plays, budget) for budget in budgets}
-        for each in said
-        if _is_played(each, plays)
-    }
-    measured = {
-        each: differences for each, differences in found.items() if any(differences.values())
-    }
+    measured = _measured(plays, said, budgets)
     if not measured:
         return []
     columns = [name for budget in budgets for name in (percent(budget), "interval")]
@@ -69,8 +62,16 @@ def statements_tables(plays: SettingPlays) -> list[Table]:
     ]
 
 
-def _is_played(statement: Comparison, plays: SettingPlays) -> bool:
-    return set(statement.policies) <= set(plays.policies)
+def _measured(
+    plays: SettingPlays, said: Iterable[Comparison], budgets: Sequence[float]
+) -> _Measured:
+    """What was measured of the statements; none of those without any difference."""
+    found = {
+        each: {budget: each.measured(plays, budget) for budget in budgets}
+        for each in said
+        if set(each.policies) <= set(plays.policies)
+    }
+    return {each: differences for each, differences in found.items() if any(differences.values())}
 
 
 def _lines(measured: _Measured, said: Mapping[Comparison, Claims]) -> Iterator[tuple[str, ...]]:
