@@ -29,6 +29,10 @@ T = TypeVar("T")
 ExecutorFactory = Callable[[int], Executor]
 """Makes an executor of so many workers; any executor of `concurrent.futures` will do."""
 
+MOST_WORKERS = 1024
+"""Most worker processes; each takes about 100 MB."""
+CORES = min(os.cpu_count() or 1, MOST_WORKERS)
+"""Workers unless another number is asked for."""
 _ANSWER_TIMEOUT_S = 10.0
 """How long a scheduler may take to answer."""
 
@@ -180,11 +184,3 @@ def _is_death(error: BaseException) -> bool:
     from dask.distributed import KilledWorker
 
     return isinstance(error, KilledWorker)
-
-
-MOST_WORKERS = 1024
-"""Most worker processes; each takes about 100 MB."""
-
-
-CORES = min(os.cpu_count() or 1, MOST_WORKERS)
-"""Workers unless another number is asked for."""

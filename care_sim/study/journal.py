@@ -16,6 +16,8 @@ from care_sim.base.json_text import check_file_size, parsed_json
 from care_sim.study.rows.parquet import with_tuples
 from care_sim.study.run_config import Row
 
+JOURNAL = "journal.jsonl"
+"""Name of the file in a folder of results."""
 _STUDY = "study"
 _CHECK = "check"
 LARGEST_JOURNAL = 2**32
@@ -134,6 +136,3 @@ def _read(line: str) -> Row | None:
 
 def _checksum(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-JOURNAL = "journal.jsonl"

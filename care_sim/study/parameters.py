@@ -20,6 +20,9 @@ _ALLOWED = "a flag, a number of at most 64 bits, a text, or a list of one kind o
 _DEEPEST = 4
 """Levels that lists may be nested."""
 _WHOLE = 2**63
+"""Whole numbers have 64 bits in a column: from minus this to less than this."""
+_LONGEST = 8192
+"""Characters of a parameter: a path and its name fit."""
 
 
 def checked_parameters(given: Iterable[tuple[str, Any]], whose: str) -> Parameters:
@@ -92,11 +95,7 @@ def _kind(value: Any) -> Any:
     return (*kinds,)
 
 
-_LONGEST = 8192
-"""Characters of a parameter: a path and its name fit."""
-
-
-def parameters(texts: Sequence[str]) -> "Parameters":
+def parameters(texts: Sequence[str]) -> Parameters:
     """Parameters given as NAME=VALUE. Raises InvalidInput for another form, and for a name that is
     given twice.
     """

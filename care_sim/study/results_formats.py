@@ -11,7 +11,7 @@ from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
-from care_sim.study.rows.reading import annotated, tagged
+from care_sim.study.rows.reading import with_added_columns, with_tags
 from care_sim.study.rows.schema import (
     CONDITION_COLUMNS,
     COUNT,
@@ -83,7 +83,7 @@ _PLAYS = Schema(
 EPISODES = ResultsFormat(
     "episodes",
     play_episodes,
-    annotated,
+    with_added_columns,
     "episodes.parquet",
     _EPISODES,
     listed_episodes,
@@ -92,13 +92,14 @@ PLAYS = ResultsFormat(
     "plays",
     play_scene,
     # The events have a file of their own, one row per event and play.
-    lambda rows: [without_events(row) for row in tagged(rows)],
+    lambda rows: [without_events(row) for row in with_tags(rows)],
     "plays.parquet",
     _PLAYS,
     listed_plays,
     lambda rows: {"events.parquet": event_columns(rows)},
 )
 RESULTS_FORMATS = (EPISODES, PLAYS)
+_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence"})
 
 
 def results_format_in(folder: Path) -> ResultsFormat:
@@ -109,6 +110,3 @@ def results_format_in(folder: Path) -> ResultsFormat:
 def is_parameter(name: str) -> bool:
     """Whether a column of rows holds what a task was given."""
     return name in _PARAMETERS or name.startswith(PARAMETERS)
-
-
-_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence"})

@@ -12,7 +12,7 @@ from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import ablations, crowding, faults, paper
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
-from care_sim.study.rows.reading import annotated
+from care_sim.study.rows.reading import with_added_columns
 from tests.helpers.made_rows import CROWD, STUDY, row
 
 
@@ -77,7 +77,9 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         "paper": paper.paper_study(range(2)),
     }
     for name, configs in played.items():
-        rows = annotated([row(config, 10.0 + number % 7) for number, config in enumerate(configs)])
+        rows = with_added_columns(
+            [row(config, 10.0 + number % 7) for number, config in enumerate(configs)]
+        )
         write_rows(rows, tmp_path / "episodes.parquet", name)
         read = read_rows(tmp_path / "episodes.parquet")
         tables = STUDIES[name].tables(read)

@@ -1,10 +1,12 @@
-from care_sim.study.rows.reading import annotated
+from care_sim.study.rows.reading import with_added_columns
 from tests.helpers.made_rows import rows
 
 
 def columns(study, policy):
     return [
-        (row["regret_m"], row["censored"]) for row in annotated(study) if row["policy"] == policy
+        (row["regret_m"], row["censored"])
+        for row in with_added_columns(study)
+        if row["policy"] == policy
     ]
 
 
@@ -22,7 +24,7 @@ def test_without_the_full_scan_of_the_same_world_there_is_no_regret():
 
 def test_what_was_there_stays_and_tags_are_text():
     (before,) = rows("care", [14.0])
-    (after,) = annotated([before])
+    (after,) = with_added_columns([before])
     assert before.items() <= after.items()
     assert after["tags"] == "causal"
 

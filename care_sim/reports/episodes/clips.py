@@ -25,7 +25,7 @@ Draw = Callable[[str, ClosedLoop, Sequence[Keyframe]], Image.Image]
 """Draws where a loop stands after its keyframes so far, under the name of its policy."""
 
 
-def whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
+def draw_whole(_name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
     """The picture of an episode on its own."""
     return Image.fromarray(draw_keyframe(loop, frames[-1]))
 
@@ -37,7 +37,7 @@ class Clip:
     library is not installed.
     """
 
-    def __init__(self, path: Path | None, draw: Draw = whole):
+    def __init__(self, path: Path | None, draw: Draw = draw_whole):
         self._path = path
         self._draw = draw
         self._films: list[list[Image.Image]] = []

@@ -29,8 +29,6 @@ _USUAL_PLAY = {name: value for name, value in DEFAULTS.items() if name != "floor
 
 Key = tuple[Setting, str, float]
 """Setting, policy with its parameters, budget."""
-
-
 Groups = Mapping[Key, Sequence[Row]]
 
 
@@ -126,10 +124,10 @@ def detection(row: Row) -> Reading:
     return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
 
 
-Worlds = dict[tuple[Setting, int], Row]
+_FullScans = dict[tuple[Setting, int], Row]
 
 
-def annotated(rows: Sequence[Row]) -> list[Row]:
+def with_added_columns(rows: Sequence[Row]) -> list[Row]:
     """The rows with three more columns.
 
     `tags` of the policy, joined by '+'. `regret_m`: detection distance of the full scan of the same
@@ -138,15 +136,15 @@ def annotated(rows: Sequence[Row]) -> list[Row]:
     the most that its distance can have been and is a bound.
     """
     full = {(setting_of(row), row["seed"]): row for row in rows if row["policy"] == "full"}
-    return [{**row, **_regret(row, full)} for row in tagged(rows)]
+    return [{**row, **_regret(row, full)} for row in with_tags(rows)]
 
 
-def tagged(rows: Sequence[Row]) -> list[Row]:
+def with_tags(rows: Sequence[Row]) -> list[Row]:
     """The rows with the column `tags`."""
     return [{**row, "tags": "+".join(tags_of(row["policy"]))} for row in rows]
 
 
-def _regret(row: Row, full: Worlds) -> Row:
+def _regret(row: Row, full: _FullScans) -> Row:
     bound = full.get((setting_of(row).for_full(), row["seed"]))
     ours = detection(row)
     if bound is None:

@@ -19,7 +19,7 @@ from care_sim.study.designs import ablations, faults
 from care_sim.study.episode_config import grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.rows.parquet import write_rows
-from care_sim.study.rows.reading import annotated, tagged
+from care_sim.study.rows.reading import with_added_columns, with_tags
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 from tests.helpers.places import ROOT
@@ -89,7 +89,7 @@ def played(tmp_path_factory):
     played.
     """
     configs = grid(["dartout"], ["history", "care", "full"], [0.05, 0.1], [0])
-    rows = annotated([run_episode(config) for config in configs])
+    rows = with_added_columns([run_episode(config) for config in configs])
     rows[0] |= {"detection_distance_m": 1.25, "episode_hash": "0"}
     return written(tmp_path_factory.mktemp("played"), rows, "sweep", most=5), rows
 
@@ -196,7 +196,9 @@ def test_after_the_last_keyframe_nothing_is_said_of_the_actor(opened, played):
 
 
 def test_a_distance_that_is_not_known_is_not_told(opened, tmp_path):
-    (row,) = annotated([run_episode(config) for config in grid(["dartout"], ["care"], [0.1], [0])])
+    (row,) = with_added_columns(
+        [run_episode(config) for config in grid(["dartout"], ["care"], [0.1], [0])]
+    )
     path = written(tmp_path, [row], "sweep", most=1)
     page = opened(path, READY)
     assert "m away" in page.inner_text(".tale")
@@ -300,7 +302,7 @@ def test_everything_is_open_in_print(opened, played):
 
 FAULTY = [row(config, 9.0) for config in faults.fault_study([0]) if config.scenario == "dartout"]
 ABLATED = [row(config, 9.0) for config in ablations.ablation_study([0])[:12]]
-PLAYED = tagged(made_plays.study({"history": (4, 2), "care": (8, 4), "full": (9, 5)}))
+PLAYED = with_tags(made_plays.study({"history": (4, 2), "care": (8, 4), "full": (9, 5)}))
 STUDIES = {
     "paper": (STUDY + rows("care", [9.0, None], budget=0.1), "Collisions: 0 in 22 episodes", 1),
     "crowding": (CROWD, "standing vehicles", 1),
