@@ -109,7 +109,7 @@ def _report(configs: Sequence[EpisodeConfig], answers: Sequence[Row | str]) -> l
     told = [*zip(configs, answers, strict=False)]
     rows = [(config, row) for config, row in told if not isinstance(row, str)]
     if rows:
-        console().print(outcome_table(rows))
+        console().print(_outcome_table(rows))
     failures = [
         f"failed: {config.label}: {reason}" for config, reason in told if isinstance(reason, str)
     ]
@@ -131,7 +131,7 @@ def _recorded(
         yield lambda name, env, policy: RecordRerun(env, shared, policy, name)
 
 
-def outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
+def _outcome_table(played: Sequence[tuple[EpisodeConfig, Row]]) -> Table:
     """One line per episode."""
     config = played[0][0]
     table = Table(title=f"{config.scenario} seed {config.seed}", title_justify="left", box=None)

@@ -45,7 +45,7 @@ class Export(PlayOptions):
                 configs, "scenes", console=Console(stderr=True), disable=not sys.stderr.isatty()
             )
             results = {
-                token: boxes for config in shown for token, boxes in scene_results(config).items()
+                token: boxes for config in shown for token, boxes in _scene_results(config).items()
             }
             unfinished.write_text(
                 json.dumps({"meta": self._meta(configs[0]), "results": results}), encoding="utf-8"
@@ -81,7 +81,7 @@ class Export(PlayOptions):
         return MODALITIES | {"care_sim": own}
 
 
-def scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
+def _scene_results(config: PlayConfig) -> dict[str, list[JsonRow]]:
     """Play a nuScenes scene: the boxes of every sample, by its token, in the official form."""
     film = config.source.film(config.scene)
     shots = zip(film.shots, play_through_film(config, film).keyframes, strict=True)

@@ -7,14 +7,14 @@ from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, repor
 from care_sim.commands.shared.options import DEFAULT_OPTIONS
 from care_sim.policies import contenders
 
-ALL_NAMES = "all"
+_ALL = "all"
 """The name that stands for every known one."""
 
 
 def expanded(names: Sequence[str], known: Collection[str]) -> list[str]:
     """The names, each once; `all` stands for those that are known."""
     return list(
-        dict.fromkeys(each for name in names for each in (known if name == ALL_NAMES else [name]))
+        dict.fromkeys(each for name in names for each in (known if name == _ALL else [name]))
     )
 
 
@@ -43,7 +43,7 @@ def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[
 
     Raises InvalidInput where something else is wrong.
     """
-    policies, broken = makeable(expanded(names, contenders() if ALL_NAMES in names else ()), make)
+    policies, broken = makeable(expanded(names, contenders() if _ALL in names else ()), make)
     left_out = [f"left out: {reason}" for reason in broken.values()]
     report_problems(left_out)
     return policies, left_out

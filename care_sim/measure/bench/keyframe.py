@@ -33,7 +33,7 @@ KEYFRAME_STAGES = (
 )
 """What a keyframe does besides the policy's choice."""
 
-Answer = TypeVar("Answer")
+_Answer = TypeVar("_Answer")
 
 
 class StageTimer:
@@ -42,7 +42,7 @@ class StageTimer:
     def __init__(self) -> None:
         self.seconds = dict.fromkeys((POLICY, *KEYFRAME_STAGES), 0.0)
 
-    def __call__(self, stage: str, call: Callable[..., Answer], *arguments: Any) -> Answer:
+    def __call__(self, stage: str, call: Callable[..., _Answer], *arguments: Any) -> _Answer:
         """What `call` returns; the time that it takes counts for `stage`."""
         started = time.perf_counter()
         answer = call(*arguments)

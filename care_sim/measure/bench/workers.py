@@ -17,13 +17,13 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import peak_rss_mb, play_episodes
 from care_sim.study.executors import processes
 
-Memory = dict[str, float]
+_Memory = dict[str, float]
 
 _PROCESSES = (1, 2)
 _STUDY_WORKERS = 2
 
 
-def worker_memory(config: BenchConfig) -> Memory:
+def worker_memory(config: BenchConfig) -> _Memory:
     """Peak memory in MB of a worker of the studies, which begins episode after episode.
 
     `begun_mb` when it has begun one, `early_mb` after a tenth of the resets, `peak_mb` after all of
@@ -33,7 +33,7 @@ def worker_memory(config: BenchConfig) -> Memory:
         return pool.submit(_resets, config.episode, config.resets).result()
 
 
-def _resets(config: EpisodeConfig, resets: int) -> Memory:
+def _resets(config: EpisodeConfig, resets: int) -> _Memory:
     memory = {"resets": float(resets)}
     with driven(config) as env:
         for number in range(resets):

@@ -47,7 +47,7 @@ def play_in_mode(mode: str, episodes: Sequence[Drawn], source: str) -> list[Play
     In a vector all are of one environment, or of the closed loop: their spaces are the same.
     """
     if mode == HASH_SEED:
-        return elsewhere(episodes, source)
+        return _under_another_hash_seed(episodes, source)
     groups = together(episodes, 1 if mode == SINGLE else _TOGETHER)
     return [trail for group in groups for trail in _PLAYERS[mode](group, source)]
 
@@ -61,7 +61,7 @@ def in_turns(episodes: Sequence[Drawn], source: str) -> list[Played]:
     """The episodes in one process, one keyframe of each in turn, until all are over."""
     with ExitStack() as stack:
         envs = [
-            stack.enter_context(closing(certified_env(episode, source))) for episode in episodes
+            stack.enter_context(closing(_certified_env(episode, source))) for episode in episodes
         ]
         policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
         observations = [env.reset()[0] for env in envs]
@@ -72,11 +72,11 @@ def in_turns(episodes: Sequence[Drawn], source: str) -> list[Played]:
         return [env.played for env in envs]
 
 
-def in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None) -> list[Played]:
+def _in_vector(episodes: Sequence[Drawn], source: str, context: str | None = None) -> list[Played]:
     """In a vector of Gymnasium: of this process, or of processes of a `context` of
     multiprocessing.
     """
-    makers = [partial(certified_env, episode, source) for episode in episodes]
+    makers = [partial(_certified_env, episode, source) for episode in episodes]
     with ExitStack() as stack:
         # Policies ask environments of this process for their rigs. Those of another process are out
         # of reach, so that each has a twin here.
@@ -94,13 +94,13 @@ def _forked(makers: Sequence[Callable[[], Trail]], context: str) -> AsyncVectorE
         return AsyncVectorEnv([partial(following, maker) for maker in makers], context=context)
 
 
-def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Played]:
+def _in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Played]:
     """In the subprocesses of Stable-Baselines3 (extra 'rl')."""
     # Imported here: it brings PyTorch, and only this mode needs the extra.
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
     makers: list[Any] = [
-        partial(following, partial(certified_env, episode, source)) for episode in episodes
+        partial(following, partial(_certified_env, episode, source)) for episode in episodes
     ]
     with ExitStack() as stack:
         twins = _twins(stack, episodes, source)
@@ -109,7 +109,7 @@ def in_subprocesses(episodes: Sequence[Drawn], source: str) -> list[Played]:
         return _stepped(episodes, twins, vector, vector.reset())
 
 
-def elsewhere(episodes: Sequence[Drawn], source: str) -> list[Played]:
+def _under_another_hash_seed(episodes: Sequence[Drawn], source: str) -> list[Played]:
     """In an interpreter with another hash seed than that of this one."""
     # Python takes a hash seed only when it starts. It reads what to play from its input, and prints
     # trails as hexadecimal text and reasons as lists of one text.
@@ -148,7 +148,7 @@ def answer_parent() -> None:
     print(json.dumps([trail.hex() if isinstance(trail, bytes) else [trail] for trail in trails]))
 
 
-def certified_env(episode: Drawn, source: str) -> Trail:
+def _certified_env(episode: Drawn, source: str) -> Trail:
     """The environment of an episode, which keeps its trail."""
     recorded = {"source": source} if episode.environment == REPLAY else {}
     arguments = dict(episode.arguments) | recorded
@@ -162,7 +162,7 @@ def _twins(stack: ExitStack, episodes: Sequence[Drawn], source: str) -> list[Tra
     """Environments of this process beside those of other processes, for whose rigs policies are
     made.
     """
-    twins = [stack.enter_context(closing(certified_env(episode, source))) for episode in episodes]
+    twins = [stack.enter_context(closing(_certified_env(episode, source))) for episode in episodes]
     for twin, episode in zip(twins, episodes, strict=True):
         if episode.environment == STREET:
             # Made in this process, a street is there in all that are forked from now on.
@@ -195,7 +195,7 @@ def _stepped(
 _PLAYERS: dict[str, Callable[[Sequence[Drawn], str], list[Played]]] = {
     SINGLE: in_turns,
     INTERLEAVED: in_turns,
-    SYNC: in_vector,
-    ASYNC: partial(in_vector, context="fork"),
-    SUBPROCESS: in_subprocesses,
+    SYNC: _in_vector,
+    ASYNC: partial(_in_vector, context="fork"),
+    SUBPROCESS: _in_subprocesses,
 }

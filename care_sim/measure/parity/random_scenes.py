@@ -18,12 +18,12 @@ def random_scenes(seed: int, number: int, done: Callable[[int], None]) -> Agreem
     tally = AgreementCounts()
     for first in range(0, number, SCENES_PER_CAST):
         some = range(first, min(first + SCENES_PER_CAST, number))
-        compare_scenes(seed, some, tally)
+        _compare_scenes(seed, some, tally)
         done(some.stop)
     return tally
 
 
-def compare_scenes(seed: int, numbers: range, tally: AgreementCounts) -> None:
+def _compare_scenes(seed: int, numbers: range, tally: AgreementCounts) -> None:
     """Compare scenes that share their bodies; `numbers` lie within one cast."""
     cast = numbers.start // SCENES_PER_CAST
     kinds = draw_bodies(seed, cast)

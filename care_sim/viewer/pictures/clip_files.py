@@ -26,7 +26,7 @@ def check_clip(path: Path) -> None:
     check_known("ending of a clip", path.suffix, ENDINGS)
     if path.suffix == ".mp4":
         import_imageio_ffmpeg()
-    check_output(path, CLIP_KINDS[path.suffix])
+    check_output(path, _CLIP_KINDS[path.suffix])
 
 
 def write_clip(
@@ -38,7 +38,7 @@ def write_clip(
     The ending of `path`, which `check_clip` has accepted, decides the form. The file is written
     whole or not at all.
     """
-    with replacing(path, CLIP_KINDS[path.suffix]) as unfinished:
+    with replacing(path, _CLIP_KINDS[path.suffix]) as unfinished:
         ENDINGS[path.suffix](unfinished, pictures, picture_s, hold_s)
 
 
@@ -98,7 +98,7 @@ def _in_few_colours(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     return [picture.quantize(palette=common, dither=Image.Dither.NONE) for picture in pictures]
 
 
-CLIP_KINDS = {".mp4": MP4, ".gif": GIF, ".webp": WEBP, ".png": PNG}
+_CLIP_KINDS = {".mp4": MP4, ".gif": GIF, ".webp": WEBP, ".png": PNG}
 ENDINGS: dict[str, Callable[[Path, Iterable[Image.Image], float, float], None]] = {
     ".mp4": _write_mp4,
     ".gif": _write_gif,

@@ -30,18 +30,18 @@ _COLUMN_PIXELS = 2
 _ROW_PIXELS = 3
 _GRID_TOP = _TOP + _VIEW_SIZE[1] + 22
 COMPARISON_WIDTH = _VIEW_SIZE[0]
-COMPARISON_HEIGHT = 508
+_COMPARISON_HEIGHT = 508
 
 
 def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image.Image:
     """A picture of the state of `loop` after the keyframes `frames`, under the heading `name`,
-    COMPARISON_WIDTH x COMPARISON_HEIGHT pixels.
+    512 x 508 pixels.
 
     Above, the street from behind the car, as in `care_sim.viewer.pictures.keyframe`. Below, the
     front half of the angular grid with the cells that fired, coloured by range, and whether the
     first-sighting actor is detected, since when and how far away. The episode is left as it was.
     """
-    canvas = Image.new("RGB", (COMPARISON_WIDTH, COMPARISON_HEIGHT), BACKGROUND)
+    canvas = Image.new("RGB", (COMPARISON_WIDTH, _COMPARISON_HEIGHT), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     _write_header(draw, name, loop, frames[-1])
     canvas.paste(_chase_view(loop, frames[-1]), (0, _TOP))
@@ -53,7 +53,7 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
     )
     canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
     text, colour = verdict_text(frames, loop.rig.keyframe_s)
-    draw.text((8, COMPARISON_HEIGHT - 26), text, colour, drawing.font(18))
+    draw.text((8, _COMPARISON_HEIGHT - 26), text, colour, drawing.font(18))
     return canvas
 
 

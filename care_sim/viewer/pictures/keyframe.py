@@ -47,8 +47,8 @@ _DIRECTIONS = (
 _BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
 TRACKED_COLOUR = (90, 220, 255)
-COASTING_COLOUR = (120, 140, 190)
-UNEXPLAINED_COLOUR = (255, 170, 40)
+_COASTING_COLOUR = (120, 140, 190)
+_UNEXPLAINED_COLOUR = (255, 170, 40)
 HIDDEN_COLOUR = (225, 225, 225)
 IN_VIEW_COLOUR = (255, 170, 40)
 DETECTED_COLOUR = (80, 230, 110)
@@ -80,7 +80,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     draw.text(
         (_CAMERA_AT[0] + 104, _PANELS + 8), "explained by a track", TRACKED_COLOUR, drawing.font(14)
     )
-    draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", UNEXPLAINED_COLOUR, drawing.font(14))
+    draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", _UNEXPLAINED_COLOUR, drawing.font(14))
     draw_grid(canvas, draw, loop.rig.grid, loop.belief.ranges)
     return np.asarray(canvas)
 
@@ -122,7 +122,7 @@ def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks
     for box, number, misses in reversed(
         list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))
     ):
-        colour = COASTING_COLOUR if misses else TRACKED_COLOUR
+        colour = _COASTING_COLOUR if misses else TRACKED_COLOUR
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
         if at := drawing.point_above(camera, box):
             drawing.label(draw, at, CLASSES[number], colour)
@@ -156,7 +156,7 @@ def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
         ImageDraw.Draw(camera),
         seen.boxes,
         names,
-        [TRACKED_COLOUR if is_known else UNEXPLAINED_COLOUR for is_known in known],
+        [TRACKED_COLOUR if is_known else _UNEXPLAINED_COLOUR for is_known in known],
     )
 
 

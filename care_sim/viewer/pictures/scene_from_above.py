@@ -27,13 +27,13 @@ _AROUND = np.array([0.0, 0.0, 0.0, 1.8, 1.8, 0.0, 0.0])
 
 FOUND_COLOUR = (80, 230, 110)
 MISSED_COLOUR = (255, 120, 60)
-OUT_OF_RANGE_COLOUR = (95, 100, 108)
-RING_COLOUR = (52, 56, 63)
+_OUT_OF_RANGE_COLOUR = (95, 100, 108)
+_RING_COLOUR = (52, 56, 63)
 RETURN_COLOUR = (172, 176, 184)
-PLAN_LEGEND = (
+_PLAN_LEGEND = (
     ("found", FOUND_COLOUR),
     ("not found", MISSED_COLOUR),
-    ("beyond 50 m", OUT_OF_RANGE_COLOUR),
+    ("beyond 50 m", _OUT_OF_RANGE_COLOUR),
     ("double line: its first sighting", INK),
 )
 
@@ -59,7 +59,7 @@ def draw_plan(
     canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     colours = [
-        FOUND_COLOUR if one else MISSED_COLOUR if near else OUT_OF_RANGE_COLOUR
+        FOUND_COLOUR if one else MISSED_COLOUR if near else _OUT_OF_RANGE_COLOUR
         for one, near in zip(found, scored, strict=True)
     ]
     canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
@@ -78,7 +78,7 @@ def _map(
         (left, top), (right, bottom) = _pixels(
             np.array([[-metres, metres], [metres, -metres]])
         ).tolist()
-        draw.ellipse((left, top, right, bottom), outline=RING_COLOUR)
+        draw.ellipse((left, top, right, bottom), outline=_RING_COLOUR)
         draw.text(
             (right - 4, (top + bottom) / 2),
             f"{metres:.0f} m",
@@ -119,10 +119,13 @@ def _write_words(
         (PICTURE_WIDTH - 12, 12), loop.film.name[:28], FAINT_INK, drawing.font(14), anchor="ra"
     )
     draw.text((20, _BOTTOM + 8), "From above, driving to the right:", INK, drawing.font(14))
-    for row, (text, colour) in enumerate(PLAN_LEGEND):
+    for row, (text, colour) in enumerate(_PLAN_LEGEND):
         draw.text((20, _BOTTOM + 40 + 24 * row), text, colour, drawing.font(16))
     draw.text(
-        (20, _BOTTOM + 40 + 24 * len(PLAN_LEGEND)), "dots: returns", RETURN_COLOUR, drawing.font(16)
+        (20, _BOTTOM + 40 + 24 * len(_PLAN_LEGEND)),
+        "dots: returns",
+        RETURN_COLOUR,
+        drawing.font(16),
     )
 
 

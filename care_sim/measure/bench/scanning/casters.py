@@ -37,7 +37,7 @@ PEER_CASTERS: dict[str, Callable[[Sequence[BodyKind], AngularGrid], Caster]] = {
 """Known engines, by name. Each raises MissingExtra without its library."""
 
 
-class OverWorld:
+class EngineCaster:
     """An engine of the benchmark over a PyBullet world with these bodies."""
 
     def __init__(self, engine: str, kinds: Sequence[BodyKind], grid: AngularGrid):
@@ -62,7 +62,7 @@ def casters(
     """
     made: dict[str, Caster] = {}
     for name in ENGINES:
-        caster = OverWorld(name, kinds, grid)
+        caster = EngineCaster(name, kinds, grid)
         opened.callback(caster.world.close)
         made[name] = caster
     skipped = []
