@@ -9,6 +9,8 @@ from textwrap import dedent
 
 import pytest
 
+from tests.helpers.forked import Forked
+
 NOWHERE = """
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
@@ -25,9 +27,12 @@ def test_without_a_folder_for_the_code_it_is_compiled_anew():
     assert done.stdout.strip() == "(1, 2, 6, 7)"
 
 
+KEPT_HERE = """
+import numba, os, sys
+numba.config.CACHE_DIR = os.path.join(os.getcwd(), "kept")
+sys.path.insert(0, os.getcwd())
+"""
 TWO_FILES = """
-import sys
-sys.path.insert(0, sys.argv[1])
 from outer_kernels import outer
 print(outer(1), sum(outer.stats.cache_hits.values()))
 """
@@ -48,8 +53,14 @@ INNER = """
 """
 
 
+@pytest.fixture(scope="module")
+def forked():
+    with Forked() as forked:
+        yield forked
+
+
 @pytest.fixture
-def outer(tmp_path):
+def outer(tmp_path, forked):
     """What the kernel `outer`, which calls one of another file that adds a number, gives for 1 in a
     new process, and how often its kept code was used.
     """
@@ -57,9 +68,8 @@ def outer(tmp_path):
 
     def run(added):
         (tmp_path / "inner_kernels.py").write_text(dedent(INNER).format(added=added))
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-        command = [sys.executable, "-c", TWO_FILES, str(tmp_path)]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        done = forked.run(KEPT_HERE + TWO_FILES, tmp_path)
+        assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 
     return run
@@ -91,16 +101,14 @@ DATA = """
         y: int
 """
 SHIFTED = """
-import sys
-sys.path.insert(0, sys.argv[1])
 import data
 from kernel import shifted
-print(shifted(getattr(data, sys.argv[2])(1, 2)), sum(shifted.stats.cache_hits.values()))
+print(shifted(data.{name}(1, 2)), sum(shifted.stats.cache_hits.values()))
 """
 
 
 @pytest.fixture
-def shifted(tmp_path):
+def shifted(tmp_path, forked):
     """What a kernel gives that adds an imported constant to a field of an imported named tuple, and
     how often its kept code was used.
     """
@@ -108,9 +116,8 @@ def shifted(tmp_path):
     def run(name, shift):
         (tmp_path / "kernel.py").write_text(dedent(KERNEL).format(name=name))
         (tmp_path / "data.py").write_text(dedent(DATA).format(name=name, shift=shift))
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-        command = [sys.executable, "-c", SHIFTED, str(tmp_path), name]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        done = forked.run(KEPT_HERE + SHIFTED.format(name=name), tmp_path)
+        assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 
     return run
@@ -129,7 +136,9 @@ from numba.core.event import install_recorder
 with install_recorder("numba:compile") as compiled:
     import care_sim
     alone = len(compiled.buffer)
-    care_sim.AngularGrid().hulls([[9.0, 0, 0, 4, 2, 2, 0]])
+    from care_sim.core.pinhole_kernels import window_around
+    import numpy
+    window_around(numpy.zeros((1, 4)), 9, 9)
 print(alone, len(compiled.buffer) > 0)
 """
 

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from typing import NamedTuple
 
+from tests.helpers.places import ROOT
+
 LIBRARIES = (
     "gymnasium",
     "highway_env.envs",
@@ -19,10 +21,9 @@ LIBRARIES = (
     "rich.console",
     "scipy.spatial.transform",
     "scipy.stats",
-    "stable_baselines3",
-    "torch",
     "tyro",
 )
+LEARNING = ("torch", "stable_baselines3")
 SERVER = """
 import gc, importlib, json, os, sys
 
@@ -70,10 +71,10 @@ class Ended(NamedTuple):
 class Forked:
     """Runs code; a context manager that ends the process from which it forks."""
 
-    def __init__(self, root):
-        paths = {"PYTHONPATH": os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])}
+    def __init__(self, libraries=LIBRARIES):
+        paths = {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
         self._server = subprocess.Popen(
-            [sys.executable, "-c", SERVER, *LIBRARIES],
+            [sys.executable, "-c", SERVER, *libraries],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | paths,

@@ -19,7 +19,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import IDS
 from care_sim.viewer.recording.entities import ENTITIES
-from tests.helpers.forked import Forked
+from tests.helpers.forked import LEARNING, LIBRARIES, Forked
 from tests.helpers.places import ROOT
 
 SITE = sorted(page for page in (ROOT / "docs").rglob("*.md") if not page.is_symlink())
@@ -53,7 +53,7 @@ LINES = [
 
 @pytest.fixture(scope="module")
 def forked():
-    with Forked(ROOT) as forked:
+    with Forked((*LIBRARIES, *LEARNING)) as forked:
         yield forked
 
 

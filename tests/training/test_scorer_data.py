@@ -5,8 +5,8 @@ import pytest
 
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
-from care_sim.sources.streets.recording import record
-from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
+from care_sim.sources.streets.recording import street_film
+from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS
 from care_sim.training.scorer import HELD_OUT
 from care_sim.training.scorer_data import (
     OTHER_CELLS,
@@ -21,7 +21,7 @@ from care_sim.training.scorer_data import (
 
 @pytest.fixture(scope="module")
 def film():
-    return record(make_street(2000))
+    return street_film(2000)
 
 
 def of_objects(shot, cells):
