@@ -3,9 +3,9 @@
 import gymnasium
 
 CLOSED_LOOP = {
-    "CARE-Dartout-v0": "care_sim.envs.closed_loop:DartoutEnv",
-    "CARE-Dense-v0": "care_sim.envs.closed_loop:DenseEnv",
-    "CARE-CutIn-v0": "care_sim.envs.closed_loop:CutInEnv",
+    "CARE-Dartout-v0": "care_sim.envs.scenarios:DartoutEnv",
+    "CARE-Dense-v0": "care_sim.envs.scenarios:DenseEnv",
+    "CARE-CutIn-v0": "care_sim.envs.scenarios:CutInEnv",
 }
 OPEN_LOOP = {
     "CARE-Street-v0": "care_sim.envs.scenes:StreetEnv",

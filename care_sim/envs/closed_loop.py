@@ -32,8 +32,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     ### Action
     `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest
-    strictly positive scores fire, ties by ascending cell index; when there are fewer, the random
-    floor shared by all policies fills up (`floor=False` leaves them unspent). No action can
+    strictly positive scores fire, ties by ascending cell index. If there are fewer, the random
+    floor that all policies share fills up (`floor=False` leaves the rest unspent). No action can
     overspend.
 
     ### Observation
@@ -48,21 +48,22 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `tracks` | (256, 13) | forecasts in the sensor frame, columns `Tracks.COLUMNS`; id -1 pads |
     | `ranges` | (E, A) | last scan in metres, 0 not fired, maximum range without a return |
 
-    What is kept of more rows, and of numbers that no sensor can tell:
-    `care_sim.core.observation_limits`.
+    `care_sim.core.observation_limits` says which rows are kept if there are more, and what becomes
+    of numbers that no sensor can tell.
 
     ### Reward
     A weighted sum of `care_sim.envs.reward.terms`: undetected time in view, clearance, collision,
     needless braking, and, with `reward_weights={"gain": ...}`, the first-detection distance against
-    the full-scan bound. Every term is at most 0, so is the best return. It knows what no
-    observation shows: a learner may learn from it, no policy may read it while it plays.
+    the full-scan bound. Every term is at most 0, and so is the best return. The reward knows what
+    no observation shows. A learner may learn from it; no policy may read it while it plays.
 
     ### Episode end
     Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes).
 
     ### Info
-    What is for scoring alone tells of the world what no observation does, with a blind camera too:
-    never a policy's input. `scoring_info=False` leaves it out, but for the `outcome`.
+    What is for scoring alone must never become a policy's input: it tells of the world what no
+    observation tells, even with a blind camera. `scoring_info=False` leaves it out, except for the
+    `outcome`.
 
     | key | content | whose |
     |---|---|---|
@@ -74,27 +75,31 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `clearance_m` | least distance to it, hull to hull, until the next keyframe | scoring alone |
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
     | `reward_terms` | `care_sim.envs.reward.terms` | scoring alone |
-    | `seed` | of `reset`: repeats the episode, and so tells all of it | scoring alone |
+    | `seed` | from `reset`: it repeats the episode, and so tells all of it | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
 
     (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector
-    environments stack arrays of one length. (2) A car knows what it detected, and has it as tracks;
-    which one the episode is about it does not know.
+    environments stack arrays of one length. (2) A car has what it detected as tracks. It does not
+    know which of them the episode is about.
 
     ### Arguments
     `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode`
-    None or "rgb_array"; `scoring_info` (above); `secret`, a text that enters everything that a seed
-    draws, so that an agent that holds this package cannot look its episodes up
-    (`care_sim.base.random_streams`; False, for none, unless given; at least 16 random bytes, since
-    a word can be tried like a seed); any field of the scenario; and the conditions, any field of
-    `care_sim.core.conditions.Conditions`. Of these, the allocator: `reserve_fraction` rho, `floor`,
-    `floor_seed`, `azimuth_margin`, `elevation_margin`. The detectors: `engine`, `min_returns`,
-    `camera_confidence`. Camera faults: `false_negative_rate`, `false_negative_per_m`,
-    `false_negative_burst` (keyframes), `false_positive_rate` (a picture), `camera_latency` and
-    `camera_jitter` (whole keyframes), `blackout_start_s`, `blackout_s`,
-    `camera_rotation_sigma_deg`, `camera_position_sigma_m`. LiDAR faults: `lidar_range_sigma` (m),
-    `lidar_dropout`, `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are off by default
-    and drawn by the seed. A value that is not allowed raises `care_sim.InvalidInput`.
+    None or "rgb_array"; `scoring_info` and `secret`; any field of the scenario; and the conditions,
+    any field of `care_sim.core.conditions.Conditions`.
+
+    A `secret` is a text that enters everything that a seed draws
+    (`care_sim.base.random_streams`). An agent that holds this package can then not look its
+    episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
+    default, means none.
+
+    Conditions of the allocator: `reserve_fraction` rho, `floor`, `floor_seed`, `azimuth_margin`,
+    `elevation_margin`. Of the detectors: `engine`, `min_returns`, `camera_confidence`. Camera
+    faults: `false_negative_rate`, `false_negative_per_m`, `false_negative_burst` (keyframes),
+    `false_positive_rate` (mean per picture), `camera_latency` and `camera_jitter` (whole
+    keyframes), `blackout_start_s`, `blackout_s`, `camera_rotation_sigma_deg`,
+    `camera_position_sigma_m`. LiDAR faults: `lidar_range_sigma` (m), `lidar_dropout`,
+    `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are off by default and drawn by the
+    seed. A value that is not allowed raises `care_sim.InvalidInput`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
@@ -216,39 +221,3 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             "reward_terms": terms,
         }
         return self.told(own, scoring)
-
-
-class DartoutEnv(ClosedLoopEnv):
-    """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty 30 km/h
-    street.
-
-    The paper's first closed-loop scene. The seed draws the speeds, the place and the timing; see
-    `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources, all of which
-    can be passed as arguments. `occluder="truck", occluder_reported=True` parks a vehicle that
-    perception reports instead.
-    """
-
-    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
-    scenario_name = "dartout"
-
-
-class DenseEnv(ClosedLoopEnv):
-    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (7) tracked ones, five in the
-    camera's view.
-
-    At 3% of the cells a reserve for every camera box starves the person; `care_sim.scenarios.dense`
-    reckons why, cell by cell.
-    """
-
-    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
-    scenario_name = "dense"
-
-
-class CutInEnv(ClosedLoopEnv):
-    """`CARE-CutIn-v0`: a car pulls out into the ego's lane from in front of a standing bus.
-
-    A large vehicle returns enough points even when starved; the paper found no separation here.
-    """
-
-    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
-    scenario_name = "cutin"

@@ -40,16 +40,16 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     ### Reward
     Minus the share of the annotated objects within 50 m that this keyframe does not find: 0 at
-    best. It knows what no observation shows: a learner may learn from it, no policy may read it
-    while it plays.
+    best. The reward knows what no observation shows. A learner may learn from it; no policy may
+    read it while it plays.
 
     ### Episode end
     Truncated after the last keyframe. `env.unwrapped.score` then holds event by event what was
     found.
 
     ### Info
-    What is for scoring alone is never a policy's input; `scoring_info=False` leaves it out, but for
-    the `outcome`.
+    What is for scoring alone must never become a policy's input. `scoring_info=False` leaves it
+    out, except for the `outcome`.
 
     | key | content | whose |
     |---|---|---|
@@ -57,17 +57,17 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     | `time_s` | time of the keyframe, seconds from the start | the car's own |
     | `objects` | how many annotated objects are within 50 m | scoring alone |
     | `found` | how many of them were found at this keyframe | scoring alone |
-    | `seed`, `scene` | of `reset`: they repeat the episode, and so tell all of it | scoring alone |
+    | `seed`, `scene` | from `reset`: they repeat the episode, so they tell all | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.evaluation.recall.Tally` | scoring alone |
 
     ### Arguments
     `budget` beta in (0, 1]; `render_mode` None or "rgb_array"; `secret` and `scoring_info` as in
     the closed loop; `detector` by name (`care_sim.perception.detectors.detector_names`) and
-    `detector_parameters`; `presence` "annotated" or "visible", who is present at scene start and so
-    never a first sighting (`care_sim.evaluation.sightings`); any field of
-    `care_sim.core.conditions.Conditions` but those for which the scene would have to be filmed
-    anew: an error of the cameras' mount, the engine. `min_returns` is the `returns` detector's. A
-    value that is not allowed raises `care_sim.InvalidInput`.
+    `detector_parameters`; `presence` "annotated" or "visible", which says who is present at scene
+    start and so never a first sighting (`care_sim.evaluation.sightings`); any field of
+    `care_sim.core.conditions.Conditions`, except those for which the scene would have to be filmed
+    anew: an error of the cameras' mount, and the engine. `min_returns` belongs to the detector
+    `returns`. A value that is not allowed raises `care_sim.InvalidInput`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 (Gymnasium's)

@@ -23,8 +23,8 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
-from care_sim.envs.closed_loop import DenseEnv
 from care_sim.envs.open_loop import FilmEnv
+from care_sim.envs.scenarios import DenseEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.dartout import Dartout

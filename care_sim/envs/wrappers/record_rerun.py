@@ -41,21 +41,21 @@ def recording(path: Path, lanes: Sequence[str]) -> "Recording":
 class RecordRerun(Watching):
     """Records every episode for the Rerun viewer: `care-sim view FILE`.
 
-    The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it; one that is
-    left before its end is kept as far as it was played. A file is there whole or not at all, once
-    its episode is over or the environment is closed. Action, observation, reward and episode stay
-    what they are.
+    The first episode becomes `path`, later ones `NAME-1.rrd`, `NAME-2.rrd` beside it. An episode
+    that is left before its end is kept as far as it was played. A file appears whole or not at all,
+    once its episode is over or the environment is closed. Action, observation, reward and episode
+    stay as they are.
 
     ### Arguments
-    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does: its demands tell
-    which cells were exploitation and which reserve. Without it only "chosen" and "floor" are known.
-    `name` of the episode in the recording, the policy's by default. Environments of a vector need a
-    file each, such as `f"out-{number}.rrd"`.
+    `path` of the file; `policy`, the `care_sim.Policy` that acts, if one does. Its demands tell
+    which cells were exploitation and which reserve; without it only "chosen" and "floor" are known.
+    `name` of the episode in the recording, the policy's by default. Environments of a vector need
+    one file each, such as `f"out-{number}.rrd"`.
 
     ### What is recorded
-    At every keyframe the street, the returns, the camera's picture and detections, the cells, the
-    measures: `care_sim.viewer.recording.entities.ENTITIES` has each with unit and frame, as has the
-    page "About" of the recording. Timelines are `keyframe` and `seconds`.
+    At every keyframe: the street, the returns, the camera's picture and detections, the cells, the
+    measures. `care_sim.viewer.recording.entities.ENTITIES` lists each with unit and frame, and so
+    does the page "About" of the recording. Timelines are `keyframe` and `seconds`.
 
     Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an
     environment that is no closed loop of CARE-Sim and for a file that is a folder or is being

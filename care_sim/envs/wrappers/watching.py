@@ -19,9 +19,10 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
     """Records the keyframes of the closed loop under it. It may stand around or inside wrappers
     that change the action.
 
-    With the `policy` that acts, the shares of exploitation and reserve are known; of raw actions
-    only what was chosen and what the floor filled up. Raises InvalidInput for an environment that
-    is no closed loop of CARE-Sim.
+    With the `policy` that acts, the shares of exploitation and reserve are known. Of raw actions it
+    is only known what was chosen and what the floor filled up.
+
+    Raises InvalidInput for an environment that is no closed loop of CARE-Sim.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Action], policy: Policy | None = None):
