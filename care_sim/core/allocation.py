@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_number, check_whole, is_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.frames import Integers
 from care_sim.core.grid import Cells, cell_indices
 from care_sim.core.types import Demand
 
@@ -135,8 +136,8 @@ class _Sets(NamedTuple):
     """Sets of cells: set s still offers `cells[places[s]:ends[s]]`."""
 
     cells: Cells
-    places: Cells
-    ends: Cells
+    places: Integers
+    ends: Integers
 
 
 class _Selection(NamedTuple):
@@ -150,7 +151,7 @@ class _Selection(NamedTuple):
 
 
 @compiled()
-def _survey(cells: Cells, ends: Cells) -> tuple[int, int, bool]:
+def _survey(cells: Cells, ends: Integers) -> tuple[int, int, bool]:
     """Lowest (at most 0) and highest (at least 0) of the cells, and whether every set is ascending.
 
     Sets lie one after the other in `cells`; set s ends at `ends[s]`.
@@ -168,7 +169,7 @@ def _survey(cells: Cells, ends: Cells) -> tuple[int, int, bool]:
 
 @compiled()
 def _fill_stages(
-    cells: Cells, ends: Cells, last_sets: Cells, limits: Cells, lowest: int, highest: int
+    cells: Cells, ends: Integers, last_sets: Integers, limits: Integers, lowest: int, highest: int
 ) -> Cells:
     """The cells taken, in order of selection.
 
@@ -197,7 +198,9 @@ def _fill_stages(
 
 
 @compiled()
-def _round_robin(sets: _Sets, waiting: Cells, selection: _Selection, count: int, limit: int) -> int:
+def _round_robin(
+    sets: _Sets, waiting: Integers, selection: _Selection, count: int, limit: int
+) -> int:
     """Take one cell per set and round, until `limit` cells are chosen or all sets have run dry.
 
     `waiting` are the numbers of the sets; `count` cells are chosen before. Returns how many are

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks
@@ -62,7 +62,7 @@ class Forgetting:
         shrunk = [hull for hull, is_low in zip(hulls, low, strict=True) if is_low]
         return [*full, *shrunk]
 
-    def margins(self, tracks: Tracks, ego: Ego) -> tuple[Cells, NDArray[np.bool_]]:
+    def margins(self, tracks: Tracks, ego: Ego) -> tuple[Integers, NDArray[np.bool_]]:
         """Advance the streaks by one keyframe: (n,) azimuth margins in columns, and (n,) which
         tracks are of low criticality. The margin in elevation is never dropped.
         """

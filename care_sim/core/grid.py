@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid_kernels import GridSpacing, rectangle_cells, silhouettes
 
 Cells = NDArray[np.int64]
@@ -116,7 +116,7 @@ class AngularGrid:
     def hulls(
         self,
         boxes: ArrayLike,
-        azimuth_margin: int | Cells = AZIMUTH_MARGIN,
+        azimuth_margin: int | Integers = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
     ) -> list[Cells]:
         """The dilated angular rectangle of every box, as ascending cells.
@@ -154,12 +154,12 @@ class AngularGrid:
         margins = np.full(len(bundles), azimuth_margin)
         return self._rectangles(azimuths, elevations, margins, elevation_margin)
 
-    def _row(self, elevation: Floats) -> Cells:
+    def _row(self, elevation: Floats) -> Integers:
         """The row whose ray is nearest to every elevation; on the grid or beyond it."""
         return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
 
     def _rectangles(
-        self, azimuths: Floats, elevations: Floats, margins: Cells, elevation_margin: int
+        self, azimuths: Floats, elevations: Floats, margins: Integers, elevation_margin: int
     ) -> list[Cells]:
         """The cells of every rectangle; see `care_sim.core.grid_kernels.rectangle_cells`."""
         spacing = self._spacing

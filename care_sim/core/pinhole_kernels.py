@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.frames import Floats
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers
 
 
 class CameraModel(NamedTuple):
@@ -62,7 +61,7 @@ def rays(pixels: Floats, camera: CameraModel) -> Floats:
 
 
 @compiled()
-def box_rays(boxes: Floats, numbers: Cells, cameras: CameraModels) -> Floats:
+def box_rays(boxes: Floats, numbers: Integers, cameras: CameraModels) -> Floats:
     """(n, 9, 3) rays through image boxes (n, 4: left, top, right, bottom) of the cameras `numbers`
     (n,); see `care_sim.core.pinhole.PinholeCamera.box_rays`.
     """

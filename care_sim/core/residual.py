@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, turned
+from care_sim.core.frames import Floats, Integers, turned
 from care_sim.core.grid import Cells
 from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
@@ -35,7 +35,7 @@ def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[
     return explaining_tracks(detections, tracks, rig) >= 0
 
 
-def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Cells:
+def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Integers:
     """(n,) the row of the first forecast that explains each image box (Eq. 2), -1 without one.
 
     Matching uses the full forecasts, never hulls that forgetting has shrunk. Raises IndexError for
@@ -78,13 +78,13 @@ def wedge_rays(detections: ImageDetections, rig: Rig) -> Floats:
 @compiled()
 def _first_explaining(
     boxes: Floats,
-    classes: Cells,
-    cameras: Cells,
+    classes: Integers,
+    cameras: Integers,
     yaw_changes: Floats,
     centres: Floats,
-    labels: Cells,
+    labels: Integers,
     models: CameraModels,
-) -> Cells:
+) -> Integers:
     """(n,) the row of the first forecast that explains each detection (Eq. 2), -1 without one.
 
     Detections are image `boxes` (n, 4) with their `classes`, `cameras` and `yaw_changes` since

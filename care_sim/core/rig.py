@@ -7,7 +7,7 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.allocation import RESERVE_FRACTION, budget_cells
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import (
     AZIMUTH_MARGIN,
     ELEVATION_MARGIN,
@@ -74,7 +74,7 @@ class Rig:
         """The cameras as one table."""
         return camera_models(self.cameras)
 
-    def hulls(self, boxes: Floats, azimuth_margins: Cells | None = None) -> list[Cells]:
+    def hulls(self, boxes: Floats, azimuth_margins: Integers | None = None) -> list[Cells]:
         """The cells of sensor-frame boxes (n, 7), one ascending array per box. They are dilated by
         the rig's margins, or by `azimuth_margins` (n,) columns and the rig's rows.
         """

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
@@ -44,9 +44,9 @@ class Detections:
     hit. `scores` (n,) are confidences from 0 to 1; None of a detector that has none.
     """
 
-    classes: Cells
+    classes: Integers
     boxes: Floats
-    returns: Cells
+    returns: Integers
     scores: Floats | None = None
 
     def __len__(self) -> int:
@@ -62,10 +62,10 @@ class ImageDetections:
     `yaw_changes` (n,) how far the car has turned since.
     """
 
-    classes: Cells
+    classes: Integers
     confidences: Floats
     boxes: Floats
-    cameras: Cells
+    cameras: Integers
     ages: Floats
     yaw_changes: Floats
 
@@ -115,12 +115,12 @@ class Tracks:
     not known and reads 0.
     """
 
-    ids: Cells
-    classes: Cells
+    ids: Integers
+    classes: Integers
     boxes: Floats
     velocities: Floats
-    misses: Cells
-    hits: Cells
+    misses: Integers
+    hits: Integers
 
     COLUMNS = (
         "id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses",

@@ -19,7 +19,7 @@ import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Integers
 from care_sim.core.types import CLASSES, Detections
 from care_sim.evaluation import matching
 from care_sim.evaluation.matching import Mask
@@ -61,8 +61,8 @@ class SceneScore:
 
     sightings: Sightings
     found: Mask
-    delays: Cells
-    chances: Cells
+    delays: Integers
+    chances: Integers
 
     @classmethod
     def of(
@@ -138,7 +138,7 @@ def score_scene(
     return SceneScore.of(sightings, masks, censored_at)
 
 
-def _ages(sightings: Sightings, censored_at: int) -> Cells:
+def _ages(sightings: Sightings, censored_at: int) -> Integers:
     """(e, r) keyframes from an event to a later row of the same object, `censored_at` for rows of
     other objects.
     """

@@ -34,8 +34,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.frames import Floats
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 
 RANGE_M = 50.0
@@ -56,16 +55,16 @@ class ObjectFrames:
     straight ahead towards the left, in the sensor frame.
     """
 
-    keyframes: Cells
-    objects: Cells
-    classes: Cells
+    keyframes: Integers
+    objects: Integers
+    classes: Integers
     ranges: Floats
     azimuths: Floats
 
     def __len__(self) -> int:
         return len(self.keyframes)
 
-    def take(self, rows: Cells | NDArray[np.bool_]) -> "ObjectFrames":
+    def take(self, rows: Integers | NDArray[np.bool_]) -> "ObjectFrames":
         """Some of the rows, by index or mask."""
         return ObjectFrames(*(getattr(self, column.name)[rows] for column in fields(self)))
 
@@ -85,8 +84,8 @@ class Sightings:
     keyframes: tuple[Annotations, ...]
     in_range: NDArray[np.bool_]
     frames: ObjectFrames
-    events: Cells
-    emerging: Cells
+    events: Integers
+    emerging: Integers
 
     @classmethod
     def of(
@@ -144,7 +143,7 @@ def check_presence(presence: object) -> None:
         )
 
 
-def _appearing(frames: ObjectFrames) -> Cells:
+def _appearing(frames: ObjectFrames) -> Integers:
     """(n,) the first row of every object that has none at the first keyframe, ascending."""
     # Rows are in order of keyframe, so the first row of an object is its first keyframe.
     _, first = np.unique(frames.objects, return_index=True)

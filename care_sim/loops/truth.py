@@ -9,8 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.types import Scan, Tracks
 from care_sim.sensors.annotated import NOBODY
 
@@ -71,7 +70,7 @@ class TrackObjects:
     def __init__(self) -> None:
         self._objects: dict[int, int] = {}
 
-    def note(self, tracks: Cells, objects: Cells) -> None:
+    def note(self, tracks: Integers, objects: Integers) -> None:
         """The tracks with the ids `tracks` (n,) were detected on `objects` (n,)."""
         # The last one counts: where the tracker changed its object, the truth changes with it.
         self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from care_sim.core.actions import shares_of
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
@@ -108,7 +108,7 @@ class EpisodeWatcher:
             situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame
         )
 
-    def _missed(self, given: Cells) -> ImageDetections:
+    def _missed(self, given: Integers) -> ImageDetections:
         """What a camera without faults would report now, less the bodies that were `given`."""
         # Through the camera as designed: what an error of its mount hides is missed, too.
         clear = faultless_detections([self._loop.picture], self._labels)

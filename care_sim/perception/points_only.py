@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
-from care_sim.core.frames import Floats, turned
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers, turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
@@ -52,7 +51,7 @@ class PointsOnly:
         self._detector = detector
         self._sensor_height_m = sensor_height_m
 
-    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `Detector`. Raises BrokenDetector where it fails or returns what is no detections."""
         # A copy: what the detector does to its points must not reach the film, which is shared.
         points = np.array(cloud.points, dtype=np.float64)
@@ -108,7 +107,7 @@ def checked(name: str, found: Any, points: int) -> Detections:
     return Detections(classes, table["boxes"], returns, table.get("scores"))
 
 
-def _objects_behind(boxes: Floats, cloud: Cloud) -> Cells:
+def _objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
     """(n,) the object that most of the returns within each box lie on, or NOBODY."""
     # Returns on nobody have no vote: a box that stands on the road holds some of it.
     named = cloud.objects != NOBODY

@@ -13,7 +13,6 @@ import numpy as np
 from care_sim.base.checks import check_whole
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.frames import Floats, Integers
-from care_sim.core.grid import Cells
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
 
@@ -21,7 +20,7 @@ from care_sim.sensors.annotated import Annotations, Cloud
 class Detector(Protocol):
     """What the open loop calls at every keyframe."""
 
-    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """Detections in the sensor frame from the returns of the fired cells, and (n,) the
         annotated object behind each, or NOBODY, for privileged policies and the scoring.
         """
@@ -66,12 +65,12 @@ class ReturnsProxy:
         check_whole("min_returns", min_returns, 1)
         self._min_returns = min_returns
 
-    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Cells]:
+    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """See `Detector`."""
         order = np.argsort(annotations.objects)
         ascending = annotations.objects[order]
 
-        def boxes_of(objects: Cells) -> Floats:
+        def boxes_of(objects: Integers) -> Floats:
             return annotations.boxes[order[np.searchsorted(ascending, objects)]]
 
         labels = dict(zip(annotations.objects.tolist(), annotations.classes.tolist(), strict=True))

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from care_sim.core.frames import Floats, Frame, turned
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Frame, Integers, turned
 from care_sim.core.types import Detections, Tracks
 
 _EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
@@ -67,7 +66,7 @@ class TrackMemory:
             tracks.ids, tracks.classes, boxes, tracks.velocities, tracks.misses, tracks.hits
         )
 
-    def update(self, detections: Detections, sensor: Frame) -> Cells:
+    def update(self, detections: Detections, sensor: Frame) -> Integers:
         """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
 
         Returns (n,) the id of the track of every detection.
@@ -89,7 +88,7 @@ class TrackMemory:
         self._start(ids[new], detections.classes[new], seen[new])
         return ids
 
-    def velocities(self, ids: Cells, sensor: Frame) -> Floats:
+    def velocities(self, ids: Integers, sensor: Frame) -> Floats:
         """(n, 2) over ground, in the axes of `sensor`, of the tracks that `update` has just told; 0
         of a new one.
         """
@@ -97,7 +96,7 @@ class TrackMemory:
         rows = np.searchsorted(self._tracks.ids, ids)
         return turned(self._tracks.velocities[rows], -sensor.yaw)
 
-    def _assign(self, classes: Cells, seen: Floats) -> tuple[Cells, Cells]:
+    def _assign(self, classes: Integers, seen: Floats) -> tuple[Integers, Integers]:
         """The rows of the forecasts and of the detections that belong together, pair by pair."""
         tracks = self._tracks
         offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
@@ -116,7 +115,7 @@ class TrackMemory:
         kept = possible[rows, columns]
         return rows[kept], columns[kept]
 
-    def _correct(self, rows: Cells, seen: Floats) -> None:
+    def _correct(self, rows: Integers, seen: Floats) -> None:
         """Give the tracks at `rows` (n,) the boxes (n, 7) on which they were detected."""
         # All tracks miss this keyframe, until those that were detected are set back to 0.
         tracks = self._tracks
@@ -142,7 +141,7 @@ class TrackMemory:
         if not alive.all():
             self._tracks = self._tracks.take(alive)
 
-    def _start(self, ids: Cells, classes: Cells, boxes: Floats) -> None:
+    def _start(self, ids: Integers, classes: Integers, boxes: Floats) -> None:
         count = len(ids)
         if not count:
             return

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.types import ImageDetections
 
@@ -24,8 +24,8 @@ class Annotations:
     ranges; the scoring chooses.
     """
 
-    objects: Cells
-    classes: Cells
+    objects: Integers
+    classes: Integers
     boxes: Floats
 
     def __len__(self) -> int:
@@ -43,7 +43,7 @@ class Cloud:
 
     cells: Cells
     points: Floats
-    objects: Cells
+    objects: Integers
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -61,7 +61,7 @@ class IdentifiedDetections:
     """
 
     detections: ImageDetections
-    objects: Cells
+    objects: Integers
 
     def __len__(self) -> int:
         return len(self.objects)

@@ -7,8 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.confidence import confidence_of, pixels_of
@@ -65,7 +64,7 @@ class BoxPool:
         times = np.repeat(picture_times, [len(detections) for detections in seen])
         return cls(rows, times, own_middles, picture_times, apart_s, near_s)
 
-    def usable(self, time_s: float) -> Cells:
+    def usable(self, time_s: float) -> Integers:
         """The rows that are usable at a time."""
         return np.flatnonzero(self._is_usable(self.times_s, time_s))
 
@@ -76,7 +75,7 @@ class BoxPool:
         usual = len(self.rows) / max(len(self.picture_times_s), 1)
         return len(self.usable(time_s)) / pictures / usual if pictures and usual else 0.0
 
-    def varied(self, rows: Cells, draws: Floats) -> Floats:
+    def varied(self, rows: Integers, draws: Floats) -> Floats:
         """(k, 9) the boxes at `rows` (k,), varied as `draws` (k, 3) from 0 to 1 say: nearer or
         farther, aside, more or less hidden.
 
@@ -98,7 +97,7 @@ class BoxPool:
         usable: NDArray[np.bool_] = is_apart & is_near
         return usable
 
-    def _moved(self, rows: Cells, departures: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def _moved(self, rows: Integers, departures: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """(k, 9) the boxes after departures (k, 3), and (k,) which of them are within the bounds of
         the pool.
         """
@@ -125,7 +124,7 @@ class BoxPool:
         within = (low >= limits[:, :2]) & (high <= limits[:, 2:]) & (low < high)
         return moved, within.all(axis=1) & (moved[:, 1] >= self.rows[:, 1].min())
 
-    def _confidences(self, rows: Cells, areas: Floats, hidden: Floats) -> Floats:
+    def _confidences(self, rows: Integers, areas: Floats, hidden: Floats) -> Floats:
         """(k,) of boxes that now have these areas: visible pixels grow with the area, hidden ones
         by the factor `hidden`.
         """

@@ -7,7 +7,6 @@ import numpy as np
 
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Floats, Integers
-from care_sim.core.grid import Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
@@ -138,7 +137,7 @@ class CameraDetector:
         return self._delay.newest(IdentifiedDetections(detections, objects[order]), heading)
 
 
-def _with_false_boxes(rows: Floats, objects: Cells, false: Floats) -> tuple[Floats, Cells]:
+def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:
     """True and `false` boxes in an order of their numbers alone.
 
     Boxes of equal confidence and left edge keep this order, so it must not tell which are false.

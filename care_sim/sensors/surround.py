@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from care_sim.core.frames import Floats, Frame, Integers
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NOBODY, Cloud, IdentifiedDetections
 from care_sim.sensors.camera import (
@@ -96,7 +96,7 @@ def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
     return np.where(ranges <= grid.range_m, ranges, np.inf)
 
 
-def numbers_of(bodies: Integers, numbers: Mapping[int, int]) -> Cells:
+def numbers_of(bodies: Integers, numbers: Mapping[int, int]) -> Integers:
     """(n,) the number of the annotated object behind each body, NOBODY where there is none."""
     # Few bodies return many rays: each is looked up once.
     found, rows = np.unique(bodies, return_inverse=True)

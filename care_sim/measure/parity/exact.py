@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.parity.answers import Answers, Millimetres
 from care_sim.measure.parity.scenes import AWAY
@@ -82,7 +82,7 @@ def _kinds(known: Primitives) -> list[BodyKind]:
     ]
 
 
-def _kind(known: Primitives, rows: Cells) -> BodyKind:
+def _kind(known: Primitives, rows: Integers) -> BodyKind:
     parts = tuple(
         Part(
             SHAPES[known.shapes[row]],

@@ -9,8 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from care_sim.core.frames import Floats
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.frames import Floats, Integers
+from care_sim.core.grid import AngularGrid
 
 NEAR_RADIUS_M = 0.3
 """Two people a metre apart, each 0.66 m wide, leave 0.34 m between them: the radius must stay
@@ -26,7 +26,7 @@ def cluster_radius(grid: AngularGrid, range_m: float) -> float:
     return max(NEAR_RADIUS_M, COLUMNS_APART * grid.column_width * range_m)
 
 
-def clusters_of(plan: Floats, grid: AngularGrid) -> list[Cells]:
+def clusters_of(plan: Floats, grid: AngularGrid) -> list[Integers]:
     """The clusters of points (P, 2) x, y in the sensor frame, as indices; every point is in one.
 
     Two points nearer than `cluster_radius` belong together, and so do those that others connect.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.frames import Floats, Integers
+from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.perception.cluster.box_fitting import DECIMALS, Sides
 from care_sim.perception.cluster.grouping import COLUMNS_APART, NEAR_RADIUS_M, cluster_radius
@@ -29,7 +29,7 @@ dimensions).
 """
 
 _CLASSED = [kind for kind in CATALOGUE.values() if kind.label in CLASSES]
-_CLASSES: Cells = np.array([CLASSES.index(kind.label or "") for kind in _CLASSED] * 2)
+_CLASSES: Integers = np.array([CLASSES.index(kind.label or "") for kind in _CLASSED] * 2)
 _SIZES: Floats = np.array([kind.size for kind in _CLASSED])
 """Length, width, height."""
 _ALONG: Floats = np.concatenate([_SIZES, _SIZES[:, [1, 0, 2]]])

@@ -16,8 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.frames import Frame, Integers
+from care_sim.core.grid import AngularGrid
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.argoverse2.feather import Columns
@@ -108,7 +108,7 @@ def _is_log(path: Path) -> bool:
     return (path / POSE_FILE).is_file() or any(path.glob(ANNOTATION_FILES))
 
 
-def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
+def _keyframes(sweeps: Integers, posed: Integers) -> Integers:
     """Timestamps every half second from the first annotated sweep to the last: of the annotated
     sweep that is nearest, or, where the sweep holds no annotation, of the nearest pose. Both
     ascend.
@@ -123,7 +123,7 @@ def _keyframes(sweeps: Cells, posed: Cells) -> Cells:
     return np.unique(chosen)
 
 
-def _nearest(stamps: Cells, moments: Cells) -> Cells:
+def _nearest(stamps: Integers, moments: Integers) -> Integers:
     """(m,) the nearest of ascending `stamps` (n,) to every one of `moments` (m,)."""
     # The first stamp that is not earlier, and the one before it; a single stamp is both. Of two
     # that are as near the earlier counts.
@@ -133,7 +133,7 @@ def _nearest(stamps: Cells, moments: Cells) -> Cells:
     return np.where(moments - before <= after - moments, before, after)
 
 
-def _car_frames(poses: Columns, moments: Cells) -> list[Frame]:
+def _car_frames(poses: Columns, moments: Integers) -> list[Frame]:
     """The car's frame at every moment, each of which has a pose. The world is the city's, moved to
     the first.
     """

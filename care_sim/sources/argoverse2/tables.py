@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from care_sim.base.errors import InvalidInput, shown, unknown
-from care_sim.core.frames import Floats
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers
 from care_sim.sources.argoverse2.feather import Columns, read_columns
 from care_sim.sources.plausible import (
     AWAY_M,
@@ -87,7 +86,7 @@ def annotation_file(log: Path) -> Path:
     return found[0]
 
 
-def read_boxes(path: Path) -> tuple[Cells, Columns]:
+def read_boxes(path: Path) -> tuple[Integers, Columns]:
     """The annotated timestamps (n,), ascending, and the checked annotations, without the recording
     car, each with the `number` of its track in the film.
 
@@ -138,7 +137,7 @@ def _seen(boxes: Columns, row: int) -> str:
     return f"the track {shown(str(boxes['track_uuid'][row]))} at {boxes['timestamp_ns'][row]}"
 
 
-def _first_again(rows: Cells) -> int | None:
+def _first_again(rows: Integers) -> int | None:
     """The first of rows (n, k) that stands further up as well."""
     # `np.unique` gives where each different row stands first; all other rows repeat one.
     repeated = np.ones(len(rows), dtype=bool)

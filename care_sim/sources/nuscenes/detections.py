@@ -16,8 +16,7 @@ import numpy as np
 
 from care_sim.base.checks import check_number, check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
-from care_sim.core.grid import Cells
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import NOBODY, Annotations, IdentifiedDetections
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
@@ -155,7 +154,7 @@ def _coco_class(number: object) -> str | None:
     return COCO.get(cast(int, number))
 
 
-def _behind(boxes: Floats, classes: Cells, shown: Floats, annotations: Annotations) -> Cells:
+def _behind(boxes: Floats, classes: Integers, shown: Floats, annotations: Annotations) -> Integers:
     """(n,) the object behind each detected box, NOBODY where no projected box (m, 4) overlaps it
     enough.
     """

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Frame, turned
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.frames import Floats, Frame, Integers, turned
+from care_sim.core.grid import AngularGrid
 from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
 
 VALUES_PER_POINT = 5
@@ -65,7 +65,7 @@ def recorded_cloud(
     return Cloud(cells[order], points[order], owners(points[order], annotations, sensor))
 
 
-def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Cells:
+def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Integers:
     """(n,) the annotated object whose box holds each point (n, 3), the smallest of several, NOBODY
     where there is none.
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from care_sim.base.random_streams import secret_entropy
-from care_sim.core.frames import Floats, Frame
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
@@ -114,7 +114,7 @@ class _StreetBodies:
             keyframe * STREET_KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
         ), hidden
 
-    def _set_up(self, keyframe: int, sensor: Frame) -> Cells:
+    def _set_up(self, keyframe: int, sensor: Frame) -> Integers:
         """Put every body that is near where it is now. Returns their numbers, ascending."""
         poses = self._street.poses[keyframe]
         # From the sensor to the circle round the footprint, which holds it however it is turned.
@@ -137,7 +137,7 @@ class _StreetBodies:
             )
         return near
 
-    def _boxes(self, keyframe: int, numbers: Cells) -> Floats:
+    def _boxes(self, keyframe: int, numbers: Integers) -> Floats:
         """(n, 7) world boxes of bodies by number."""
         x, y, yaw = self._street.poses[keyframe, numbers].T
         return np.column_stack([x, y, self._sizes[numbers, 2] / 2, self._sizes[numbers], yaw])
