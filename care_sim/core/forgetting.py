@@ -43,8 +43,10 @@ class ForgettingRules:
 
 
 class Forgetting:
-    """Algorithm 3: streak counters of the tracks, and the hulls that follow from them. One instance
-    lives as long as an episode.
+    """Algorithm 3: streak counters of the tracks, and the hulls that follow from them.
+
+    One instance lives as long as an episode. Both `next_exploitation` and `advance` move the
+    streaks on: call one of them, once per keyframe.
     """
 
     def __init__(self, rules: ForgettingRules, rig: Rig):
@@ -52,19 +54,20 @@ class Forgetting:
         self._rig = rig
         self._streaks: dict[int, int] = {}
 
-    def exploitation(self, tracks: Tracks, ego: Ego) -> list[Cells]:
-        """Advance the streaks by one keyframe: the exploitation sets for Algorithm 1, full hulls
-        first, shrunk hulls second, each in the order of the tracks.
-        """
-        margins, low = self.margins(tracks, ego)
-        hulls = self._rig.hulls(tracks.boxes, margins)
-        full = [hull for hull, is_low in zip(hulls, low, strict=True) if not is_low]
-        shrunk = [hull for hull, is_low in zip(hulls, low, strict=True) if is_low]
-        return [*full, *shrunk]
+    def next_exploitation(self, tracks: Tracks, ego: Ego) -> list[Cells]:
+        """Advance the streaks by one keyframe, and give the exploitation sets for Algorithm 1.
 
-    def margins(self, tracks: Tracks, ego: Ego) -> tuple[Integers, NDArray[np.bool_]]:
-        """Advance the streaks by one keyframe: (n,) azimuth margins in columns, and (n,) which
-        tracks are of low criticality. The margin in elevation is never dropped.
+        Full hulls come first, shrunk hulls second, each in the order of the tracks.
+        """
+        margins, low = self.advance(tracks, ego)
+        hulls = self._rig.hulls(tracks.boxes, margins)
+        return [hulls[row] for row in np.argsort(low, kind="stable")]
+
+    def advance(self, tracks: Tracks, ego: Ego) -> tuple[Integers, NDArray[np.bool_]]:
+        """Advance the streaks by one keyframe, and say how far each hull shrinks.
+
+        Returns (n,) azimuth margins in columns, and (n,) which tracks are of low criticality. The
+        margin in elevation is never dropped.
         """
         low = self._low_criticality(tracks, ego)
         ids = tracks.ids.tolist()

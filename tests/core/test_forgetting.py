@@ -19,7 +19,7 @@ def settled(tracks, ego=STANDING, keyframes=6, **rules):
     """Margins and low criticality after some keyframes of the same scene."""
     memory = forgetting(**rules)
     for _ in range(keyframes):
-        margins, low = memory.margins(tracks, ego)
+        margins, low = memory.advance(tracks, ego)
     return margins.tolist(), low.tolist()
 
 
@@ -72,7 +72,7 @@ def test_a_moving_ego_leaves_what_is_behind_it(tracks_at):
 
 def test_the_margin_decays_by_a_column_a_keyframe_down_to_none(tracks_at):
     memory, tracks = forgetting(), tracks_at(("car", 30, 0, 0, 0))
-    margins = [int(memory.margins(tracks, Ego())[0][0]) for _ in range(5)]
+    margins = [int(memory.advance(tracks, Ego())[0][0]) for _ in range(5)]
     assert margins[0] >= 1
     assert all(0 <= before - after <= 1 for before, after in pairwise(margins))
     assert margins[-1] == 0
@@ -88,10 +88,10 @@ def test_one_unsafe_keyframe_starts_the_streak_anew(tracks_at):
     memory = forgetting()
     still, moving = tracks_at(("car", 30, 0, 0, 0)), tracks_at(("car", 30, 0, 0, 5))
     for _ in range(5):
-        memory.margins(still, Ego())
-    assert memory.margins(moving, Ego())[0].tolist() == [2]
-    assert memory.margins(still, Ego())[0].tolist() == [1]
-    assert memory.margins(still, Ego())[0].tolist() == [0]
+        memory.advance(still, Ego())
+    assert memory.advance(moving, Ego())[0].tolist() == [2]
+    assert memory.advance(still, Ego())[0].tolist() == [1]
+    assert memory.advance(still, Ego())[0].tolist() == [0]
 
 
 def test_streaks_belong_to_ids_and_end_with_the_track(tracks_at):
@@ -101,10 +101,10 @@ def test_streaks_belong_to_ids_and_end_with_the_track(tracks_at):
         tracks_at(("car", 30, 5, 0, 5), ("car", 30, 0, 0, 0)),
     )
     for _ in range(5):
-        memory.margins(first, Ego())
-    assert memory.margins(first, Ego())[0].tolist() == [0]
-    memory.margins(both, Ego())
-    assert memory.margins(first, Ego())[0][0] >= 1
+        memory.advance(first, Ego())
+    assert memory.advance(first, Ego())[0].tolist() == [0]
+    memory.advance(both, Ego())
+    assert memory.advance(first, Ego())[0][0] >= 1
 
 
 @pytest.mark.parametrize(("distance", "columns"), [(10, 2), (20, 2), (30, 2), (33, 1), (50, 1)])
@@ -115,10 +115,10 @@ def test_localization_noise_keeps_the_margin_of_equation_4(tracks_at, distance, 
 
 
 def test_no_tracks_no_margins(tracks_at):
-    margins, low = forgetting().margins(tracks_at(), Ego(5.0))
+    margins, low = forgetting().advance(tracks_at(), Ego(5.0))
     assert (margins.tolist(), low.tolist()) == ([], [])
 
 
 def test_a_track_needs_two_frames_before_it_can_be_forgotten(tracks_at):
-    margins, low = forgetting().margins(tracks_at(("pedestrian", 45, 0, 0, 0), hits=1), Ego(8.0))
+    margins, low = forgetting().advance(tracks_at(("pedestrian", 45, 0, 0, 0), hits=1), Ego(8.0))
     assert (margins.tolist(), low.tolist()) == ([2], [False])

@@ -49,5 +49,5 @@ class CareSbf(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Full hulls, shrunk hulls, then the layers (U, M)."""
-        hulls = self._forgetting.exploitation(belief.tracks, belief.ego)
+        hulls = self._forgetting.next_exploitation(belief.tracks, belief.ego)
         return Demand(hulls, camera_layers(belief, self.rig))
