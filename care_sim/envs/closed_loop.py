@@ -15,6 +15,7 @@ from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.records import Keyframe
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import FRONT_CAMERA
@@ -145,13 +146,14 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         super().reset(seed=seed)
         entropy = self.entropy(seed)
         scenario, camera, lidar, floor, odometry = self.streams(entropy, count=5)
+        seeds = SensorSeeds(camera, lidar, odometry)
         self.close()
         pool = self._pool(entropy)
         world = self.scenario.build(np.random.default_rng(scenario))
         self._in_view = self._detected = False
         self._potential = rewards.Potential()
         self.keyframes = []
-        loop = ClosedLoop(world, self.rig, self.conditions, (camera, lidar, odometry), pool)
+        loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool)
         return self.begin(loop, floor), self.told({}, {"seed": entropy})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
@@ -195,10 +197,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """
         if not self.conditions.false_positive_rate:
             return EMPTY_POOL
+        # The first five are those of `reset`, however many are asked for.
         _, camera, lidar, _, odometry, another = self.streams(entropy, count=6)
+        seeds = SensorSeeds(camera, lidar, odometry)
         world = self.scenario.build(np.random.default_rng(another))
         return pool_of_another_drive(
-            world, self.scenario.duration_s, self.rig, self.conditions, (camera, lidar, odometry)
+            world, self.scenario.duration_s, self.rig, self.conditions, seeds
         )
 
     def _terms(self, frame: Keyframe, detectable: bool) -> dict[str, float]:

@@ -20,6 +20,7 @@ from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.detectors import PROXY, check_detector, make_detector
 from care_sim.viewer.pictures.scene_from_above import draw_plan
 
@@ -129,7 +130,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._sightings = _sightings(film, self.presence)
         self.keyframes = []
         self._masks = []
-        loop = OpenLoop(film, self.rig, self.conditions, (camera, lidar, odometry), self._detector)
+        seeds = SensorSeeds(camera, lidar, odometry)
+        loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
         return self.begin(loop, floor), self.told({}, {"seed": seed, "scene": film.name})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:

@@ -1,7 +1,5 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +13,7 @@ from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import ReturnsDetector
 from care_sim.perception.tracker import TrackMemory
@@ -33,22 +32,20 @@ class ClosedLoop:
         world: World,
         rig: Rig,
         sensing: Sensing,
-        seeds: Sequence[np.random.SeedSequence],
+        seeds: SensorSeeds,
         pool: BoxPool = EMPTY_POOL,
     ):
         self.world = world
         self.rig = rig
         labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
         self._reported = np.array(list(labels), np.int64)
-        # Each sensor has a stream of its own: a fault of one leaves the draws of the others.
-        camera_seed, lidar_seed, odometry_seed = seeds
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
-        self._lidar = Lidar(rig.grid, self._engine, sensing, lidar_seed)
+        self._lidar = Lidar(rig.grid, self._engine, sensing, seeds.lidar)
         self._labels = labels
         self._camera = CameraDetector(
-            list(labels), sensing, rig.keyframe_s, camera_seed, rig.cameras, pool
+            list(labels), sensing, rig.keyframe_s, seeds.camera, rig.cameras, pool
         )
-        self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
+        self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
         self._detector = ReturnsDetector(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns
         self._limits = Limits(rig)

@@ -1,6 +1,5 @@
 """Where the false boxes of an episode come from: another drive, or another time of the film."""
 
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import lru_cache
@@ -11,6 +10,7 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.sensors.box_pool import BoxPool
 from care_sim.world.world import World
 
@@ -31,7 +31,7 @@ def pool_of_another_drive(
     duration_s: float,
     rig: Rig,
     sensing: Sensing,
-    seeds: Sequence[np.random.SeedSequence],
+    seeds: SensorSeeds,
 ) -> BoxPool:
     """Drive through `world`, every cell fired, and close it: what the camera shows before misses
     and delay.

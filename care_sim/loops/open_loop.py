@@ -2,7 +2,6 @@
 react.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import Detector
 from care_sim.perception.tracker import TrackMemory
@@ -49,24 +49,22 @@ class OpenLoop:
         film: Film,
         rig: Rig,
         sensing: Sensing,
-        seeds: Sequence[np.random.SeedSequence],
+        seeds: SensorSeeds,
         detector: Detector,
     ):
         self.film = film
         self.rig = rig
-        # As in the closed loop: a fault of one sensor leaves the draws of the others.
-        camera_seed, lidar_seed, odometry_seed = seeds
         objects = sorted(
             {number for shot in film.shots for number in shot.annotations.objects.tolist()}
         )
         # The camera errs object by object, so it is told of all that the film will ever show.
         self._rows = {number: row for row, number in enumerate(objects)}
-        self._lidar = RecordedLidar(rig.grid, sensing, lidar_seed)
+        self._lidar = RecordedLidar(rig.grid, sensing, seeds.lidar)
         pool = pool_of_film(film) if sensing.false_positive_rate else EMPTY_POOL
         self._camera = CameraDetector(
-            objects, sensing, film.keyframe_s, camera_seed, film.cameras, pool
+            objects, sensing, film.keyframe_s, seeds.camera, film.cameras, pool
         )
-        self._odometry = Odometry(sensing.ego_speed_sigma, odometry_seed)
+        self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
         self._detector = detector
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)

@@ -16,6 +16,7 @@ from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 from care_sim.envs.spaces import observation_space
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -97,7 +98,11 @@ def crowd_film(count):
 def test_of_tracked_people_with_a_box_each_none_is_read_as_new(count):
     film = crowd_film(count)
     loop = OpenLoop(
-        film, RIG, Sensing(), [np.random.SeedSequence(n) for n in range(3)], ReturnsProxy()
+        film,
+        RIG,
+        Sensing(),
+        SensorSeeds(*(np.random.SeedSequence(n) for n in range(3))),
+        ReturnsProxy(),
     )
     assert len(camera_layers(read(loop.belief), RIG)[0]) == min(count, MAX_DETECTIONS), (
         "before the first scan all are"

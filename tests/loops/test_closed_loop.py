@@ -7,6 +7,7 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.tracker import MemoryRules
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.lidar import LIDAR_POSITION
@@ -51,7 +52,10 @@ def row_of_cars(street):
 
 def loop_in(world, seeds=(0, 1, 2), **sensing):
     return ClosedLoop(
-        world, RIG, Sensing(**sensing), tuple(np.random.SeedSequence(seed) for seed in seeds)
+        world,
+        RIG,
+        Sensing(**sensing),
+        SensorSeeds(*(np.random.SeedSequence(seed) for seed in seeds)),
     )
 
 

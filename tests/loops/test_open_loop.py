@@ -11,6 +11,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Detections, Ego, ImageDetections
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
+from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
@@ -53,7 +54,7 @@ def film(*, annotated=(True, True, True, True), speed=0.0, bend=0.0):
 
 
 def loop_of(film, detector=None, seeds=(0, 1, 2), **sensing):
-    children = [np.random.SeedSequence(seed) for seed in seeds]
+    children = SensorSeeds(*(np.random.SeedSequence(seed) for seed in seeds))
     return OpenLoop(film, RIG, Sensing(**sensing), children, detector or ReturnsProxy())
 
 
