@@ -15,7 +15,7 @@ from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
-from care_sim.perception.proxy import ReturnsDetector
+from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
@@ -46,7 +46,7 @@ class ClosedLoop:
             list(labels), sensing, rig.keyframe_s, seeds.camera, rig.cameras, pool
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
-        self._detector = ReturnsDetector(labels, sensing.min_returns)
+        self._returns_rule = ReturnsRule(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
@@ -73,7 +73,7 @@ class ClosedLoop:
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
-        detections, detected = self._detector.detect(bodies, self._local_boxes)
+        detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, detected)
         command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)

@@ -18,7 +18,7 @@ from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
-from care_sim.perception.proxy import Detector
+from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.box_pool import EMPTY_POOL

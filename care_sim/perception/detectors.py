@@ -12,9 +12,10 @@ from typing import Any
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printable, shown
 from care_sim.base.plugins import Plugins
+from care_sim.perception.base import Detector
 from care_sim.perception.cluster.detector import ClusterDetector
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
-from care_sim.perception.proxy import Detector, ReturnsProxy
+from care_sim.perception.proxy import ReturnsProxy
 from care_sim.perception.torchscript import TorchScriptDetector
 
 PROXY = "returns"

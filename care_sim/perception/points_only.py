@@ -40,7 +40,7 @@ class PointDetector(Protocol):
 
 
 class PointsOnly:
-    """Makes a `PointDetector` a `care_sim.perception.proxy.Detector`.
+    """Makes a `PointDetector` a `care_sim.perception.base.Detector`.
 
     The detector gets a copy of the points: neither objects nor boxes nor unfired cells can be
     reached from it. What it returns is copied and checked; only then the objects are named.
@@ -52,7 +52,10 @@ class PointsOnly:
         self._sensor_height_m = sensor_height_m
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
-        """See `Detector`. Raises BrokenDetector where it fails or returns what is no detections."""
+        """See `care_sim.perception.base.Detector`.
+
+        Raises BrokenDetector where it fails or returns what is no detections.
+        """
         # A copy: what the detector does to its points must not reach the film, which is shared.
         points = np.array(cloud.points, dtype=np.float64)
         try:

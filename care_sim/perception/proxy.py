@@ -1,12 +1,11 @@
 """The paper's proxy detector: an object is detected when enough fired rays hit it.
 
 The proxy is privileged, it reads whose return each one is. A real detector sees points alone and is
-made a `Detector` by `care_sim.perception.points_only.PointsOnly`;
+made a `care_sim.perception.base.Detector` by `care_sim.perception.points_only.PointsOnly`;
 `care_sim.perception.detectors.make_detector` gives either by name.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
 import numpy as np
 
@@ -17,18 +16,8 @@ from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
 
 
-class Detector(Protocol):
-    """What the open loop calls at every keyframe."""
-
-    def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
-        """Detections in the sensor frame from the returns of the fired cells, and (n,) the
-        annotated object behind each, or NOBODY, for privileged policies and the scoring.
-        """
-        ...
-
-
-class ReturnsDetector:
-    """Detects every reported body hit by at least `min_returns` fired rays, with its true box.
+class ReturnsRule:
+    """Every reported body hit by at least `min_returns` fired rays is detected, with its true box.
 
     The only part of perception that may see body ids; it upper-bounds a learned detector (paper,
     Sec. 5.6). `labels` maps the ids of reported bodies to classes.
@@ -40,7 +29,7 @@ class ReturnsDetector:
         self._labels = np.array([labels[body] for body in sorted(labels)], np.int64)
         self._min_returns = min_returns
 
-    def detect(
+    def detections(
         self, hits: Integers, boxes_of: Callable[[Integers], Floats]
     ) -> tuple[Detections, Integers]:
         """Detections from the body id behind every fired ray, and the detected ids for the scoring.
@@ -56,7 +45,7 @@ class ReturnsDetector:
 
 
 class ReturnsProxy:
-    """`ReturnsDetector` over a film: every annotated object with `min_returns` of the cloud's
+    """`ReturnsRule` over a film: every annotated object with `min_returns` of the cloud's
     returns on it is detected with its true box. Raises InvalidInput unless `min_returns` is a whole
     number of 1 or more.
     """
@@ -66,7 +55,7 @@ class ReturnsProxy:
         self._min_returns = min_returns
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
-        """See `Detector`."""
+        """See `care_sim.perception.base.Detector`."""
         order = np.argsort(annotations.objects)
         ascending = annotations.objects[order]
 
@@ -74,4 +63,4 @@ class ReturnsProxy:
             return annotations.boxes[order[np.searchsorted(ascending, objects)]]
 
         labels = dict(zip(annotations.objects.tolist(), annotations.classes.tolist(), strict=True))
-        return ReturnsDetector(labels, self._min_returns).detect(cloud.objects, boxes_of)
+        return ReturnsRule(labels, self._min_returns).detections(cloud.objects, boxes_of)

@@ -3,7 +3,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
-from care_sim.perception.proxy import ReturnsDetector
+from care_sim.perception.proxy import ReturnsRule
 
 LABELS = {4: 0, 9: 4}
 
@@ -15,7 +15,7 @@ def boxes_of(bodies):
 
 
 def detect(hits, **rules):
-    return ReturnsDetector(LABELS, **rules).detect(np.array(hits, dtype=np.int64), boxes_of)
+    return ReturnsRule(LABELS, **rules).detections(np.array(hits, dtype=np.int64), boxes_of)
 
 
 @pytest.mark.parametrize(("min_returns", "found"), [(1, [4, 9]), (2, [4, 9]), (3, [4]), (4, [])])

@@ -12,7 +12,7 @@ from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.envs.sensing import SensingEnv, sensing
 from care_sim.loops.closed_loop import ClosedLoop
-from care_sim.perception.proxy import ReturnsDetector
+from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
@@ -106,7 +106,7 @@ class StageByStage:
         self._camera = CameraDetector(
             list(self._labels), env.conditions, rig.keyframe_s, camera_seed, rig.cameras
         )
-        self._detector = ReturnsDetector(self._labels, env.conditions.min_returns)
+        self._returns_rule = ReturnsRule(self._labels, env.conditions.min_returns)
         self._memory = TrackMemory(rig.keyframe_s)
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
@@ -121,7 +121,7 @@ class StageByStage:
 
         # From the scan to the brake.
         _, bodies = watch("cast", self._lidar.fire, fired, self._sensor)
-        detections, _ = watch("detect", self._detector.detect, bodies, self._local_boxes)
+        detections, _ = watch("detect", self._returns_rule.detections, bodies, self._local_boxes)
         watch("track", self._memory.update, detections, self._sensor)
         tracks = watch("track", self._memory.tracks, self._sensor)
         command = watch("control", self._controller.command, tracks, ego)
