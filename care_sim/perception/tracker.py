@@ -9,6 +9,8 @@ from care_sim.core.frames import Floats, Frame, Integers, turned
 from care_sim.core.types import Detections, Tracks
 
 _EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))
+_IMPOSSIBLE_M = 1e6
+"""The cost of a pair that cannot be one object, in metres of distance: more than all others."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +22,8 @@ class MemoryRules:
     first_speed_mps: float = 15.0
     """A track seen once has no velocity: its gate grows by this much per second (54 km/h)."""
     coast_s: float = 1.5
-    """An undetected track is forecast this long, then dropped (CenterPoint's tracker: 3 frames at 2
-    Hz).
+    """An undetected track is forecast this long, then dropped: for 15 keyframes of the closed loop,
+    for 3 of the open one (CenterPoint's tracker: 3 frames at 2 Hz).
     """
 
 
@@ -44,48 +46,39 @@ class TrackMemory:
         After `predict` they are the forecasts for the coming keyframe, after `update` its
         estimates.
         """
-        # A stable sort: tracks of one distance stay in the order in which they were begun.
         tracks = self._tracks
-        boxes = sensor.boxes_to_local(tracks.boxes)
-        nearest = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
-        return Tracks(
-            tracks.ids[nearest],
-            tracks.classes[nearest],
-            boxes[nearest],
-            turned(tracks.velocities[nearest], -sensor.yaw),
-            tracks.misses[nearest],
-            tracks.hits[nearest],
+        local = tracks.moved(
+            boxes=sensor.boxes_to_local(tracks.boxes),
+            velocities=turned(tracks.velocities, -sensor.yaw),
         )
+        # A stable sort: tracks of one distance stay in the order in which they were begun.
+        return local.take(np.argsort(local.ranges, kind="stable"))
 
     def predict(self) -> None:
         """Move every track one keyframe ahead at constant velocity."""
         tracks = self._tracks
         boxes = tracks.boxes.copy()
         boxes[:, :2] += tracks.velocities * self._keyframe_s
-        self._tracks = Tracks(
-            tracks.ids, tracks.classes, boxes, tracks.velocities, tracks.misses, tracks.hits
-        )
+        self._tracks = tracks.moved(boxes=boxes, velocities=tracks.velocities)
 
     def update(self, detections: Detections, sensor: Frame) -> Integers:
         """Assign the detections of this keyframe to the forecasts, start new tracks, drop old ones.
 
         Returns (n,) the id of the track of every detection.
         """
-        # Every detection is of a track, an old one or a new one. New numbers go up without end, so
-        # that no number ever means two objects.
+        # Every detection is of a track, an old one or a new one.
         seen = sensor.boxes_to_world(detections.boxes)
-        matched, found = self._assign(detections.classes, seen)
+        rows, matched = self._assign(detections.classes, seen)
         new = np.ones(len(detections), bool)
-        new[found] = False
+        new[matched] = False
         ids = np.empty(len(detections), np.int64)
-        ids[found] = self._tracks.ids[matched]
-        ids[new] = np.arange(self._next_id, self._next_id + len(ids) - len(found))
+        ids[matched] = self._tracks.ids[rows]
 
         # In this order: rows hold only until old tracks are dropped, and `_correct` counts a miss
         # for every track that it finds.
-        self._correct(matched, seen[found])
-        self._forget()
-        self._start(ids[new], detections.classes[new], seen[new])
+        self._correct(rows, seen[matched])
+        self._drop_lost()
+        ids[new] = self._start(detections.classes[new], seen[new])
         return ids
 
     def velocities(self, ids: Integers, sensor: Frame) -> Floats:
@@ -97,7 +90,10 @@ class TrackMemory:
         return turned(self._tracks.velocities[rows], -sensor.yaw)
 
     def _assign(self, classes: Integers, seen: Floats) -> tuple[Integers, Integers]:
-        """The rows of the forecasts and of the detections that belong together, pair by pair."""
+        """The rows (k,) of the forecasts and of the detections that belong together, pair by pair.
+
+        Detections have `classes` (n,) and stand at `seen` (n, 7) in the world.
+        """
         tracks = self._tracks
         offset = tracks.boxes[:, None, :2] - seen[None, :, :2]
         distance = np.hypot(offset[..., 0], offset[..., 1])
@@ -111,12 +107,12 @@ class TrackMemory:
 
         # Impossible pairs cost more than any sum of possible ones, so the most pairs are matched,
         # and of all such matchings the one with the least sum of distances is taken.
-        rows, columns = linear_sum_assignment(np.where(possible, distance, 1e6))
+        rows, columns = linear_sum_assignment(np.where(possible, distance, _IMPOSSIBLE_M))
         kept = possible[rows, columns]
         return rows[kept], columns[kept]
 
     def _correct(self, rows: Integers, seen: Floats) -> None:
-        """Give the tracks at `rows` (n,) the boxes (n, 7) on which they were detected."""
+        """Age every track by a keyframe; set those at `rows` (n,) to the boxes `seen` (n, 7)."""
         # All tracks miss this keyframe, until those that were detected are set back to 0.
         tracks = self._tracks
         boxes = tracks.boxes.copy()
@@ -134,17 +130,20 @@ class TrackMemory:
         hits[rows] += 1
         self._tracks = Tracks(tracks.ids, tracks.classes, boxes, velocities, misses, hits)
 
-    def _forget(self) -> None:
-        """Drop the tracks that nobody has seen for too long."""
+    def _drop_lost(self) -> None:
+        """Drop the tracks that have not been detected for too long."""
         # Keyframes add up to the time with an error of last bits.
         alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
         if not alive.all():
             self._tracks = self._tracks.take(alive)
 
-    def _start(self, ids: Integers, classes: Integers, boxes: Floats) -> None:
-        count = len(ids)
+    def _start(self, classes: Integers, boxes: Floats) -> Integers:
+        """Begin a track with each of `classes` (n,) and `boxes` (n, 7); their ids (n,)."""
+        # New ids go up without end, so that no id ever means two objects.
+        count = len(classes)
+        ids = np.arange(self._next_id, self._next_id + count)
         if not count:
-            return
+            return ids
         self._next_id += count
         old = self._tracks
         self._tracks = Tracks(
@@ -155,3 +154,4 @@ class TrackMemory:
             np.concatenate([old.misses, np.zeros(count, np.int64)]),
             np.concatenate([old.hits, np.ones(count, np.int64)]),
         )
+        return ids
