@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.frames import Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
@@ -114,7 +115,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self.render_mode = render_mode
         self.presence = presence
         self.keyframes: list[OpenLoopKeyframe] = []
-        self._masks: list[matching.Mask] = []
+        self._masks: list[Mask] = []
 
     @property
     def score(self) -> SceneScore:

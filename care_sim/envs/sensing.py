@@ -23,7 +23,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.loops.truth import EpisodeTruth, Loop, Truth
-from care_sim.sensors.lidar import dead_cells
+from care_sim.sensors.lidar_faults import check_rows
 
 Observed = dict[str, NDArray[np.float32]]
 
@@ -57,7 +57,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
                 "cameras must be at least one, got none: observations tell of each what it sees"
             )
         grid = AngularGrid()
-        dead_cells(grid, conditions.lidar_dead_rows)
+        check_rows(grid, conditions.lidar_dead_rows)
         self.conditions = conditions
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""

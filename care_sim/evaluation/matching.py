@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Mask
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations
 
@@ -16,8 +16,6 @@ MATCH_M = 2.0
 """Greatest planar distance between the centres of an object and of its detection, this value
 included.
 """
-
-Mask = NDArray[np.bool_]
 
 
 def found_objects(annotations: Annotations, detections: Detections) -> Mask:

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from care_sim.core.frames import Mask
 from care_sim.core.types import CLASSES
-from care_sim.evaluation.matching import Mask
 from care_sim.evaluation.sightings import ObjectFrames
 
 NEAR_M, FAR_M = 20.0, 35.0

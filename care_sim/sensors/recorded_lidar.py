@@ -6,39 +6,27 @@ from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Floats
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import Cloud
-from care_sim.sensors.lidar import dead_cells, noisy
+from care_sim.sensors.lidar_faults import CellFaults
 
 
 class RecordedLidar:
-    """Hands out the returns of fired cells.
-
-    Noise and dropout are drawn once per cell, fired or not, so that every policy meets the same
-    (common random numbers).
-    """
+    """Hands out the returns of fired cells; `CellFaults` are applied to them."""
 
     def __init__(self, grid: AngularGrid, faults: LidarFaults, seed: np.random.SeedSequence):
         self.grid = grid
-        self._faults = faults
-        self._live = ~dead_cells(grid, faults.lidar_dead_rows)
-        self._noise = np.random.default_rng(seed)
-        self._dropout = np.random.default_rng(seed.spawn(1)[0])
+        self._faults = CellFaults(grid, faults, seed)
 
     def fire(self, cells: Cells, cloud: Cloud) -> Cloud:
         """The returns of `cells` (k,) in the recorded `cloud`, after the faults."""
         # A cell is dropped with all its returns, of which a recorded sweep may have several.
         answering = np.zeros(self.grid.size, dtype=bool)
-        answering[cells] = True
-        answering &= self._live
-        if self._faults.lidar_dropout > 0:
-            answering &= self._dropout.random(self.grid.size) >= self._faults.lidar_dropout
+        answering[cells] = ~self._faults.draw_lost(cells)
         returned = cloud.take(answering[cloud.cells])
-        if self._faults.lidar_range_sigma > 0:
-            return self._noisy(returned)
-        return returned
+        return self._noisy(returned) if self._faults.is_noisy else returned
 
     def peek(self, cloud: Cloud) -> Cloud:
         """What every cell would return, before noise and dropout, which stay undrawn."""
-        return cloud.take(self._live[cloud.cells])
+        return cloud.take(~self._faults.dead[cloud.cells])
 
     def ranges(self, cloud: Cloud) -> Floats:
         """(N,) the nearest return of every cell in metres, inf without one."""
@@ -50,10 +38,6 @@ class RecordedLidar:
 
     def _noisy(self, cloud: Cloud) -> Cloud:
         # Noise is along the ray: a point moves with its range, and stays in its cell.
-        errors = (
-            self._faults.lidar_range_sigma
-            * self._noise.standard_normal(self.grid.size)[cloud.cells]
-        )
         ranges = np.linalg.norm(cloud.points, axis=1)
-        moved = noisy(ranges, errors, self.grid.range_m) / ranges
+        moved = self._faults.draw_noisy(ranges, cloud.cells) / ranges
         return Cloud(cloud.cells, cloud.points * moved[:, None], cloud.objects)
