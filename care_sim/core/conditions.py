@@ -13,6 +13,7 @@ import numpy as np
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER, check_whole
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.allocation import RESERVE_FRACTION
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
 
@@ -62,9 +63,8 @@ class CameraFaults:
 
     def black_at(self, time_s: float) -> bool:
         """Whether a picture taken at `time_s` is black."""
-        # Times are sums of steps: a keyframe on the edge of the blackout may miss it by a last bit.
-        begin = self.blackout_start_s - 1e-9
-        end = self.blackout_start_s + self.blackout_s - 1e-9
+        begin = self.blackout_start_s - LAST_BITS_S
+        end = self.blackout_start_s + self.blackout_s - LAST_BITS_S
         return begin <= time_s < end
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.frames import Floats
 from care_sim.core.types import Command, Ego, Tracks
 
@@ -77,8 +78,7 @@ class BrakingController:
             self._braking_s += self._keyframe_s
             blocked = bool(np.any(counting & (tracks.velocities[:, 0] <= ego.speed)))
             self._free_s = 0.0 if blocked else self._free_s + self._keyframe_s
-            # Times are sums of keyframes, which may miss a round number by their last bits.
-            if self._free_s > self._rules.release_s - 1e-9:
+            if self._free_s > self._rules.release_s - LAST_BITS_S:
                 self._braking_s = None
         return self._act(ego.speed)
 
@@ -87,7 +87,7 @@ class BrakingController:
             wanted = (self._cruise_mps - speed) / self._keyframe_s
             comfort = self._rules.comfort
             return Command(float(min(max(wanted, -comfort), comfort)), False)
-        acting = self._braking_s >= self._rules.reaction_s - 1e-9
+        acting = self._braking_s >= self._rules.reaction_s - LAST_BITS_S
         return Command(-self._rules.deceleration if acting else 0.0, True)
 
     def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> NDArray[np.bool_]:

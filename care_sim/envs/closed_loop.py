@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice, check_number
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.types import Action
 from care_sim.envs import reward as rewards
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
@@ -169,8 +170,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         frame = loop.keyframe(fired)
         self.keyframes.append(frame)
         terminated = frame.impact_speed_mps is not None
-        # Time is a sum of steps and may lack the last bits of the duration.
-        truncated = loop.world.time >= self.scenario.duration_s - 1e-9
+        truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
         terms = self._terms(frame, detectable)
         info = self._info(frame, terms)

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.conditions import Sensing
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
@@ -54,8 +55,7 @@ def pool_of_another_drive(
             seen.append(loop.seen.detections)
             times_s.append(world.time)
             hit = loop.keyframe(cells).impact_speed_mps is not None
-            # The time is a sum of steps, and may lie a last bit short of the end.
-            over = hit or world.time >= duration_s - 1e-9
+            over = hit or world.time >= duration_s - LAST_BITS_S
     return BoxPool.of(seen, times_s, rig.cameras, near_s=NEAR_S)
 
 

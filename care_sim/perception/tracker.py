@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.frames import Floats, Frame, Integers, turned
 from care_sim.core.types import Detections, Tracks
 
@@ -132,8 +133,7 @@ class TrackMemory:
 
     def _drop_lost(self) -> None:
         """Drop the tracks that have not been detected for too long."""
-        # Keyframes add up to the time with an error of last bits.
-        alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + 1e-9
+        alive = self._tracks.misses * self._keyframe_s <= self._rules.coast_s + LAST_BITS_S
         if not alive.all():
             self._tracks = self._tracks.take(alive)
 

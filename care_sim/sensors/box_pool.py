@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.frames import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
@@ -24,8 +25,6 @@ MORE_HIDDEN = 0.05
 
 _BOX = slice(2, 6)
 _CAMERA = 6
-_SAME_TIME_S = 1e-9
-"""Times are sums of keyframes, equal but for the last bits."""
 
 NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
 
@@ -92,8 +91,8 @@ class BoxPool:
     def _is_usable(self, times_s: Floats, time_s: float) -> NDArray[np.bool_]:
         # Before and after alike: the film or drive of other boxes is known as a whole.
         away = np.abs(times_s - time_s)
-        is_apart = away >= self.apart_s - _SAME_TIME_S
-        is_near = away <= self.near_s + _SAME_TIME_S
+        is_apart = away >= self.apart_s - LAST_BITS_S
+        is_near = away <= self.near_s + LAST_BITS_S
         usable: NDArray[np.bool_] = is_apart & is_near
         return usable
 

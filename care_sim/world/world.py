@@ -7,6 +7,7 @@ import numpy as np
 
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
+from care_sim.base.times import LAST_BITS_S
 from care_sim.core.frames import Floats, Integers, Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
@@ -188,7 +189,7 @@ def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
 def whole_steps(duration: float) -> int:
     """World steps in `duration` seconds. Raises InvalidInput unless they are whole."""
     steps = round(duration / WORLD_STEP_S)
-    if steps < 1 or abs(steps * WORLD_STEP_S - duration) > 1e-9:
+    if steps < 1 or abs(steps * WORLD_STEP_S - duration) > LAST_BITS_S:
         raise InvalidInput(
             f"keyframe_s must be a multiple of the world step {WORLD_STEP_S} s, got {duration!r}"
         )
