@@ -11,7 +11,7 @@ from care_sim.base.checks import check_arguments, check_choice, check_number
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.types import Action
 from care_sim.envs import reward as rewards
-from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.false_box_pools import pool_of_another_drive
@@ -125,12 +125,12 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         check_arguments(
             type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__]
         )
-        conditions = conditions_of(parameters)
+        conditions, physics = split_conditions(parameters)
         check_engine(conditions.engine)
         super().__init__(
             conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info
         )
-        self.scenario = make_scenario(self.scenario_name, **parameters)
+        self.scenario = make_scenario(self.scenario_name, **physics)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
@@ -167,13 +167,13 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         # It is cast before the keyframe, which moves the world on.
         measured = bool(self._weights["gain"]) and self._potential.bound_m is None
         detectable = measured and loop.detectable()
-        frame = loop.keyframe(fired)
-        self.keyframes.append(frame)
-        terminated = frame.impact_speed_mps is not None
+        record = loop.keyframe(fired)
+        self.keyframes.append(record)
+        terminated = record.impact_speed_mps is not None
         truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
-        terms = self._terms(frame, detectable)
-        info = self._info(frame, terms)
+        terms = self._terms(record, detectable)
+        info = self._info(record, terms)
         if self._over:
             info["outcome"] = asdict(outcome(self.keyframes))
         reward = sum(self._weights[name] * value for name, value in terms.items())
@@ -205,23 +205,27 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             world, self.scenario.duration_s, self.rig, self.conditions, seeds
         )
 
-    def _terms(self, frame: Keyframe, detectable: bool) -> dict[str, float]:
-        self._in_view |= frame.in_view
-        self._detected |= frame.detected
-        lost = self._potential.lost(frame, detectable, self._over) if self._weights["gain"] else 0.0
-        return rewards.terms(frame, self._in_view, self._detected, lost)
+    def _terms(self, record: Keyframe, detectable: bool) -> dict[str, float]:
+        self._in_view |= record.in_view
+        self._detected |= record.detected
+        lost = (
+            self._potential.advance(record, detectable, self._over)
+            if self._weights["gain"]
+            else 0.0
+        )
+        return rewards.terms(record, self._in_view, self._detected, lost)
 
-    def _info(self, frame: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
+    def _info(self, record: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         own = {
-            "fired": self.reported(frame.fired),
-            "braking": frame.braking,
-            "time_s": frame.time_s,
+            "fired": self.reported(record.fired),
+            "braking": record.braking,
+            "time_s": record.time_s,
         }
         scoring = {
-            "detected": frame.detected,
-            "in_view": frame.in_view,
-            "clearance_m": frame.clearance_m,
-            "speed_mps": frame.speed_mps,
+            "detected": record.detected,
+            "in_view": record.in_view,
+            "clearance_m": record.clearance_m,
+            "speed_mps": record.speed_mps,
             "reward_terms": terms,
         }
         return self.told(own, scoring)

@@ -15,7 +15,7 @@ from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.frames import Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action
-from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, conditions_of
+from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
 from care_sim.evaluation import matching
 from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
@@ -92,7 +92,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
         check_film_arguments(type(self), parameters)
         check_presence(presence)
-        conditions = conditions_of(parameters)
+        conditions, _ = split_conditions(parameters)
         check_detector(detector)
         if detector != PROXY and conditions.min_returns != MIN_RETURNS:
             raise InvalidInput(

@@ -38,11 +38,11 @@ def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
     return {**REWARD_WEIGHTS, **{name: float(value) for name, value in changes.items()}}
 
 
-def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> dict[str, float]:
+def terms(record: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> dict[str, float]:
     """The terms of one keyframe.
 
     `in_view` and `detected` say whether the first-sighting actor has been so by now, at least once;
-    `lost` is what `Potential.lost` gives.
+    `lost` is what `Potential.advance` gives.
 
     | term | of a keyframe | of an episode |
     |---|---|---|
@@ -56,12 +56,12 @@ def terms(frame: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) -> 
     late, as the first rays that return lag behind the first pixels in view, `delay` stays below 0;
     `gain` reaches 0 there, but for faults of the LiDAR, which the bound does not know.
     """
-    closeness = 1.0 - min(max(frame.clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
+    closeness = 1.0 - min(max(record.clearance_m, 0.0), KEEP_CLEAR_M) / KEEP_CLEAR_M
     return {
         "delay": -1.0 if in_view and not detected else 0.0,
         "clearance": -closeness if in_view and closeness > 0 else 0.0,
-        "collision": -1.0 if frame.impact_speed_mps is not None else 0.0,
-        "braking": -1.0 if frame.braking and not in_view else 0.0,
+        "collision": -1.0 if record.impact_speed_mps is not None else 0.0,
+        "braking": -1.0 if record.braking and not in_view else 0.0,
         "gain": -lost,
     }
 
@@ -83,16 +83,18 @@ class Potential:
         self._lost = 0.0
         self._found = False
 
-    def lost(self, frame: Keyframe, detectable: bool, over: bool) -> float:
-        """By how much the potential grows at a keyframe. `detectable` says whether a scan of every
-        cell would detect the actor, `over` whether the episode ends with this keyframe.
+    def advance(self, record: Keyframe, detectable: bool, over: bool) -> float:
+        """Go on by a keyframe, and say by how much the potential grows.
+
+        `detectable` says whether a scan of every cell would detect the actor, `over` whether the
+        episode ends with this keyframe.
         """
         before = self._lost
-        if self.bound_m is None and (detectable or frame.detected):
-            self.bound_m = frame.distance_m
+        if self.bound_m is None and (detectable or record.detected):
+            self.bound_m = record.distance_m
         if self.bound_m is not None and not self._found:
             # A car that comes nearer loses more; one that moves away again wins nothing back.
-            all_of_it = over and not frame.detected
-            self._lost = 1.0 if all_of_it else max(before, 1.0 - frame.distance_m / self.bound_m)
-        self._found |= frame.detected
+            all_of_it = over and not record.detected
+            self._lost = 1.0 if all_of_it else max(before, 1.0 - record.distance_m / self.bound_m)
+        self._found |= record.detected
         return self._lost - before

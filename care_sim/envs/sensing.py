@@ -3,6 +3,7 @@ overspend.
 """
 
 import inspect
+from collections.abc import Mapping
 from typing import Any, Generic, TypeVar
 
 import gymnasium
@@ -147,12 +148,15 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return fired.copy() if self.conditions.floor else fired.tolist()
 
 
-def conditions_of(parameters: dict[str, Any]) -> Conditions:
-    """The conditions among keyword arguments, which are taken out of `parameters`. Raises
-    InvalidInput for a value that is not allowed.
+def split_conditions(parameters: Mapping[str, Any]) -> tuple[Conditions, dict[str, Any]]:
+    """The conditions among keyword arguments, and the other arguments.
+
+    Raises InvalidInput for a value that is not allowed.
     """
-    names = [name for name in parameters if name in Conditions.__dataclass_fields__]
-    return Conditions(**{name: parameters.pop(name) for name in names})
+    names = Conditions.__dataclass_fields__
+    given = {name: value for name, value in parameters.items() if name in names}
+    others = {name: value for name, value in parameters.items() if name not in names}
+    return Conditions(**given), others
 
 
 def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:

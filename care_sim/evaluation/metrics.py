@@ -21,21 +21,24 @@ def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
     """
     # The first detection counts from the first keyframe on, in view or not: LiDAR may find what the
     # camera does not show.
-    first = next((frame.distance_m for frame in keyframes if frame.detected), None)
-    appeared = next((n for n, frame in enumerate(keyframes) if frame.in_view), len(keyframes))
+    first = next((record.distance_m for record in keyframes if record.detected), None)
+    appeared = next((n for n, record in enumerate(keyframes) if record.in_view), len(keyframes))
 
     # What a policy lets come near is counted from when it could have been seen, not while it was
     # hidden behind something.
     seen = keyframes[appeared:]
-    missed = [frame.distance_m for frame in seen or keyframes]
-    impact = next((f.impact_speed_mps for f in keyframes if f.impact_speed_mps is not None), None)
+    missed = [record.distance_m for record in seen or keyframes]
+    impact = next(
+        (record.impact_speed_mps for record in keyframes if record.impact_speed_mps is not None),
+        None,
+    )
     return Outcome(
         detection_distance_m=first,
         undetected_to_m=min(missed) if first is None else None,
-        braked=any(frame.braking for frame in keyframes),
-        min_distance_m=min((frame.nearest_m for frame in seen), default=None),
-        clearance_m=min((frame.clearance_m for frame in seen), default=None),
+        braked=any(record.braking for record in keyframes),
+        min_distance_m=min((record.nearest_m for record in seen), default=None),
+        clearance_m=min((record.clearance_m for record in seen), default=None),
         collision=impact is not None,
         impact_speed_mps=impact,
-        rays_fired=int(np.sum([len(frame.fired) for frame in keyframes])),
+        rays_fired=int(np.sum([len(record.fired) for record in keyframes])),
     )

@@ -82,7 +82,7 @@ class ClosedLoop:
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
         self.index += 1
         self._memory.predict()
-        self._look(self._picture_of(scan))
+        self._look(self._range_image(scan))
 
         # What was near, or was hit, is of the time since the scan; the rest is of the scan itself.
         target = world.first_sighting
@@ -154,7 +154,7 @@ class ClosedLoop:
         self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
         # A rendered box lies in the picture, so the limits leave out none but the last, too many.
         self.detected_bodies = arrived.objects[: len(self.belief.detections)]
-        """(n,) the body behind each camera detection of the belief, NOBODY behind a false one.
+        """(n,) the body behind each camera detection of the belief, NO_OBJECT behind a false one.
         Truth: for people and scoring.
         """
 
@@ -162,7 +162,7 @@ class ClosedLoop:
         window = window_on(camera, boxes)
         return Picture.of(self._engine.body_ids(camera, sensor, window), window)
 
-    def _picture_of(self, scan: Scan) -> NDArray[np.float32]:
+    def _range_image(self, scan: Scan) -> NDArray[np.float32]:
         # 0 means not fired, the reach no return: a scan says inf, which no observation holds.
         ranges = np.zeros(self.rig.grid.size, np.float32)
         ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)

@@ -98,7 +98,7 @@ class OpenLoop:
         self.index += 1
         self._memory.predict()
         if not self.over:
-            self._look(self._picture_of(fired, cloud))
+            self._look(self._range_image(fired, cloud))
         return OpenLoopKeyframe(index, fired, detections, velocities)
 
     def true_boxes(self, tracks: Tracks) -> Floats:
@@ -145,7 +145,7 @@ class OpenLoop:
         distances[rows] = np.hypot(shot.annotations.boxes[:, 0], shot.annotations.boxes[:, 1])
         return distances
 
-    def _picture_of(self, fired: Cells, cloud: Cloud) -> NDArray[np.float32]:
+    def _range_image(self, fired: Cells, cloud: Cloud) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)
         ranges[fired] = np.minimum(self._lidar.ranges(cloud)[fired], self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)

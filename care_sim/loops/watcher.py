@@ -16,7 +16,7 @@ from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.camera import faultless_detections
 
 
@@ -56,7 +56,7 @@ class WatchedKeyframe:
     situation: TrueSituation
     shares: NDArray[np.uint8]
     ranges: NDArray[np.float32]
-    frame: Keyframe
+    record: Keyframe
 
     def returned(self, grid: AngularGrid) -> tuple[Cells, Floats]:
         """The cells (n,) that returned, ascending, and the points (n, 3), sensor frame."""
@@ -95,17 +95,17 @@ class EpisodeWatcher:
             target=world.actors.index(world.first_sighting) if world.first_sighting else None,
             belief=loop.belief,
             known=explained(shown, loop.belief.tracks, loop.rig),
-            false=loop.detected_bodies == NOBODY,
+            false=loop.detected_bodies == NO_OBJECT,
             missed=self._missed(loop.detected_bodies),
         )
 
     def watched(
-        self, situation: TrueSituation, action: Action, demand: Demand | None, frame: Keyframe
+        self, situation: TrueSituation, action: Action, demand: Demand | None, record: Keyframe
     ) -> WatchedKeyframe:
         """The keyframe that the loop has played since the situation."""
         loop = self._loop
         return WatchedKeyframe(
-            situation, shares_of(frame.fired, action, demand, loop.rig), loop.belief.ranges, frame
+            situation, shares_of(record.fired, action, demand, loop.rig), loop.belief.ranges, record
         )
 
     def _missed(self, given: Integers) -> ImageDetections:

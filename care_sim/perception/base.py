@@ -12,6 +12,6 @@ class Detector(Protocol):
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """Detections in the sensor frame from the returns of the fired cells, and (n,) the
-        annotated object behind each, or NOBODY, for privileged policies and the scoring.
+        annotated object behind each, or NO_OBJECT, for privileged policies and the scoring.
         """
         ...

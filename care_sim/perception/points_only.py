@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
 from care_sim.core.frames import Floats, Integers, turned
 from care_sim.core.types import CLASSES, Detections
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 MOST_DETECTIONS = 500
 """Boxes per keyframe: as many as the official nuScenes evaluation takes."""
@@ -111,15 +111,16 @@ def checked(name: str, found: Any, points: int) -> Detections:
 
 
 def _objects_behind(boxes: Floats, cloud: Cloud) -> Integers:
-    """(n,) the object that most of the returns within each box lie on, or NOBODY."""
+    """(n,) the object that most of the returns within each box lie on, or NO_OBJECT."""
     # Returns on nobody have no vote: a box that stands on the road holds some of it.
-    named = cloud.objects != NOBODY
+    named = cloud.objects != NO_OBJECT
     objects = cloud.objects[named]
     counts = [
         np.unique(objects[row], return_counts=True) for row in inside(cloud.points[named], boxes)
     ]
     return np.array(
-        [numbers[many.argmax()] if len(numbers) else NOBODY for numbers, many in counts], np.int64
+        [numbers[many.argmax()] if len(numbers) else NO_OBJECT for numbers, many in counts],
+        np.int64,
     )
 
 

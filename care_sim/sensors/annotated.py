@@ -13,7 +13,7 @@ from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.types import ImageDetections
 
-NOBODY = -1
+NO_OBJECT = -1
 """The object behind a return or a camera box that lies on no annotated object."""
 
 
@@ -38,7 +38,7 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 @dataclass(frozen=True)
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
-    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NOBODY.
+    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT.
     """
 
     cells: Cells
@@ -57,7 +57,7 @@ class Cloud:
 @dataclass(frozen=True)
 class IdentifiedDetections:
     """Camera detections, with `objects` (n,) the annotated object or the body behind each box, or
-    NOBODY.
+    NO_OBJECT.
     """
 
     detections: ImageDetections

@@ -10,7 +10,7 @@ from care_sim.core.frames import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
-from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
@@ -144,4 +144,4 @@ def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[F
     """
     together = np.concatenate([rows, false])
     order = np.lexsort(together.T)
-    return together[order], np.append(objects, np.full(len(false), NOBODY))[order]
+    return together[order], np.append(objects, np.full(len(false), NO_OBJECT))[order]

@@ -12,7 +12,7 @@ import numpy as np
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.sensors.annotated import NOBODY, Cloud, IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections
 from care_sim.sensors.camera import (
     CAMERA_FROM_LIDAR,
     CAMERA_HEIGHT,
@@ -97,7 +97,7 @@ def road_ranges(grid: AngularGrid, height_m: float) -> Floats:
 
 
 def numbers_of(bodies: Integers, numbers: Mapping[int, int]) -> Integers:
-    """(n,) the number of the annotated object behind each body, NOBODY where there is none."""
+    """(n,) the number of the annotated object behind each body, NO_OBJECT where there is none."""
     # Few bodies return many rays: each is looked up once.
     found, rows = np.unique(bodies, return_inverse=True)
-    return np.array([numbers.get(body, NOBODY) for body in found.tolist()], dtype=np.int64)[rows]
+    return np.array([numbers.get(body, NO_OBJECT) for body in found.tolist()], dtype=np.int64)[rows]

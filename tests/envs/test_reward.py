@@ -85,7 +85,9 @@ def losses(*frames):
     potential = Potential()
     last = len(frames) - 1
     return [
-        potential.lost(keyframe(distance_m=distance, detected=detected), detectable, number == last)
+        potential.advance(
+            keyframe(distance_m=distance, detected=detected), detectable, number == last
+        )
         for number, (distance, detectable, detected) in enumerate(frames)
     ]
 

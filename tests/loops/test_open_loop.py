@@ -14,7 +14,7 @@ from care_sim.loops.open_loop import OpenLoop
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.points_only import PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 RIG = Rig(cameras=SURROUND_CAMERAS, keyframe_s=0.5)
@@ -33,7 +33,7 @@ def shot(index, annotated, speed, bend):
     cells = RIG.grid.hulls(boxes, 0, 0)[0] if annotated else NOWHERE
     fired = np.concatenate([WALL, np.sort(cells)])
     ranges = np.concatenate([np.full(3, 30.0), np.full(len(cells), 10.0)])
-    objects = np.concatenate([np.full(3, NOBODY), np.full(len(cells), OTHER)])
+    objects = np.concatenate([np.full(3, NO_OBJECT), np.full(len(cells), OTHER)])
     picture = np.array([[CLASSES.index("car"), 0.9, 100.0 + index, 80, 120, 95, 0, 0, 0]])[
         : int(annotated)
     ]

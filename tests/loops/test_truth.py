@@ -3,7 +3,7 @@
 import numpy as np
 
 from care_sim.loops.truth import TrackObjects
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 
 PRESENT = {30: np.full(7, 100.0), 7: np.full(7, 200.0)}
 
@@ -30,7 +30,7 @@ def places(track_objects, tracks):
 
 def test_a_track_is_where_its_object_is_and_one_without_stays(tracks_at):
     tracks = tracks_at(*[("car", x, 0.0, 0.0, 0.0) for x in (1.0, 2.0, 3.0, 4.0)])
-    known = noted(([0, 1, 2], [7, 30, NOBODY]))
+    known = noted(([0, 1, 2], [7, 30, NO_OBJECT]))
     assert places(known, tracks) == [200, 100, -1, -1]
 
 

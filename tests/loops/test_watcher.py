@@ -87,7 +87,7 @@ def test_a_late_camera_misses_whom_it_has_not_shown_yet_and_nobody_else():
     found = counts(late)
     assert [c.missed for c in found[:2]] == late.shown[:2]
     assert all(c.false == 0 for c in found)
-    appeared = next(n for n, watched in enumerate(late.moments) if watched.frame.in_view)
+    appeared = next(n for n, watched in enumerate(late.moments) if watched.record.in_view)
     assert appeared >= 2
     assert [c.missed for c in found[2:appeared]] == [0] * (appeared - 2)
     assert [c.missed for c in found[appeared : appeared + 3]] == [1, 1, 0]
@@ -96,7 +96,7 @@ def test_a_late_camera_misses_whom_it_has_not_shown_yet_and_nobody_else():
 def test_a_moment_holds_the_truth_of_its_keyframe():
     notes = watch("CARE-Dartout-v0", seed=3)
     for watched in notes.moments:
-        situation, frame = watched.situation, watched.frame
+        situation, frame = watched.situation, watched.record
         assert situation.time_s == frame.time_s
         assert situation.names[situation.target] == "person"
         x, y = situation.bodies[situation.target, :2]
@@ -106,7 +106,7 @@ def test_a_moment_holds_the_truth_of_its_keyframe():
         np.testing.assert_array_equal(np.flatnonzero(watched.shares), frame.fired)
         np.testing.assert_array_equal(np.flatnonzero(watched.ranges), frame.fired)
     first, last = notes.moments[0].situation, notes.moments[-1].situation
-    travelled = sum(watched.frame.speed_mps * 0.1 for watched in notes.moments[:-1])
+    travelled = sum(watched.record.speed_mps * 0.1 for watched in notes.moments[:-1])
     assert last.ego[0] - first.ego[0] == pytest.approx(travelled, abs=0.5)
     assert notes.outcome is None
 

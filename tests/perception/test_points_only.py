@@ -7,7 +7,7 @@ from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.types import Detections
 from care_sim.perception.points_only import BrokenDetector, PointsOnly, inside
 from care_sim.perception.proxy import ReturnsProxy
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 from tests.helpers.made_points import HEIGHT, shell
 
 CAR = np.array([8.0, 6.0, 0.86 - HEIGHT, 4.61, 1.95, 1.72, 0.4])
@@ -23,7 +23,9 @@ def cloud(*bodies):
 
 
 SCENE = cloud(
-    (30, shell(8, 6, 0.4, 4.61, 1.95, 1.72)), (NOBODY, np.full((5, 3), 20.0)), (7, PERSON[None, :3])
+    (30, shell(8, 6, 0.4, 4.61, 1.95, 1.72)),
+    (NO_OBJECT, np.full((5, 3), 20.0)),
+    (7, PERSON[None, :3]),
 )
 
 FEW = f"returns must be whole numbers from 0 to the {len(SCENE)} points"
@@ -88,7 +90,7 @@ def test_what_it_returned_is_kept_though_it_writes_there_again():
 
 
 def test_truth_does_not_change_what_it_finds():
-    strangers = Cloud(SCENE.cells, SCENE.points, np.full(len(SCENE), NOBODY))
+    strangers = Cloud(SCENE.cells, SCENE.points, np.full(len(SCENE), NO_OBJECT))
     nobody = Annotations(np.array([], np.int64), np.array([], np.int64), np.empty((0, 7)))
     found = [
         PointsOnly("mine", Says(detections()), HEIGHT).detect(*given)[0]
@@ -103,14 +105,14 @@ def test_the_object_behind_a_detection_is_the_one_whose_returns_it_holds():
     assert PointsOnly("mine", Says(found), HEIGHT).detect(SCENE, OBJECTS)[1].tolist() == [
         7,
         30,
-        NOBODY,
+        NO_OBJECT,
     ]
 
 
 def test_most_returns_on_an_object_decide_and_those_on_the_road_do_not():
     """In the car's box: two returns of the person, three of the car, and four of the road."""
     amid = Cloud(
-        np.arange(9), np.tile(CAR[:3], (9, 1)), np.array([7, 7, 30, 30, 30, *[NOBODY] * 4])
+        np.arange(9), np.tile(CAR[:3], (9, 1)), np.array([7, 7, 30, 30, 30, *[NO_OBJECT] * 4])
     )
     assert PointsOnly("mine", Says(detections()), HEIGHT).detect(amid, OBJECTS)[1].tolist() == [30]
 

@@ -17,7 +17,7 @@ from care_sim.core.conditions import Sensing
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.scenarios.dense import Dense
-from care_sim.sensors.annotated import NOBODY, IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.false_boxes import MOST_DRAWS, FalseBoxes
@@ -400,7 +400,7 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
         orders.append(arrived.detections.boxes.tolist())
         behind.append(arrived.objects.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]
-    assert behind == [[0, NOBODY], [NOBODY, 0]]
+    assert behind == [[0, NO_OBJECT], [NO_OBJECT, 0]]
 
 
 @pytest.fixture(scope="module")

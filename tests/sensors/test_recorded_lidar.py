@@ -5,12 +5,12 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Sensing
-from care_sim.sensors.annotated import NOBODY, Cloud
+from care_sim.sensors.annotated import NO_OBJECT, Cloud
 from care_sim.sensors.recorded_lidar import RecordedLidar
 
 CELLS = np.array([100, 100, 700, 9000, 16000])
 RANGES = np.array([7.0, 12.0, 30.0, 5.0, 49.999])
-OBJECTS = np.array([4, 9, 4, NOBODY, 4])
+OBJECTS = np.array([4, 9, 4, NO_OBJECT, 4])
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def everything(grid):
 def test_only_fired_cells_return_and_all_that_fell_in_them(grid, cloud):
     returned = lidar(grid).fire(np.array([9000, 3, 100]), cloud)
     assert returned.cells.tolist() == [100, 100, 9000]
-    assert returned.objects.tolist() == [4, 9, NOBODY]
+    assert returned.objects.tolist() == [4, 9, NO_OBJECT]
     assert np.array_equal(returned.points, cloud.points[[0, 1, 3]])
     assert len(lidar(grid).fire(np.array([], np.int64), cloud)) == 0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.frames import Frame
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import NO_BODY, BulletWorld
@@ -91,5 +91,5 @@ def test_cameras_report_labelled_bodies_alone(bullet):
     both = surround_detections(bullet, SURROUND_CAMERAS, SENSOR, {bus: 2, van: 1}, boxes)
     assert set(both.objects.tolist()) == {bus, van}
     assert numbers_of(both.objects, {bus: 7}).tolist() == [
-        7 if b == bus else NOBODY for b in both.objects
+        7 if b == bus else NO_OBJECT for b in both.objects
     ]

@@ -83,7 +83,7 @@ class ExportScans(Watching):
 
     def keep(self, watched: WatchedKeyframe) -> None:
         """Write the two files of a keyframe."""
-        stem = f"{watched.frame.index:03d}"
+        stem = f"{watched.record.index:03d}"
         cells, points = watched.returned(self._closed_loop.rig.grid)
         self._write_cloud(
             self._folder / f"{stem}.pcd", points, cells, watched.shares.ravel()[cells]
@@ -120,7 +120,7 @@ class ExportScans(Watching):
 def described(watched: WatchedKeyframe) -> dict[str, Any]:
     """What stood around a scan, as plain data; see `ExportScans`."""
     situation = watched.situation
-    frame = watched.frame
+    frame = watched.record
     sensor = situation.sensor
     tracks = situation.belief.tracks
     classes = [None if label is None else CLASSES[label] for label in situation.labels]

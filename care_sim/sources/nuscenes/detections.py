@@ -18,7 +18,7 @@ from care_sim.base.checks import check_number, check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats, Integers
 from care_sim.core.types import CLASSES, ImageDetections
-from care_sim.sensors.annotated import NOBODY, Annotations, IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected
 from care_sim.sources.nuscenes.categories import class_of
 from care_sim.sources.nuscenes.table_files import JsonRow, read_json
@@ -155,11 +155,11 @@ def _coco_class(number: object) -> str | None:
 
 
 def _behind(boxes: Floats, classes: Integers, shown: Floats, annotations: Annotations) -> Integers:
-    """(n,) the object behind each detected box, NOBODY where no projected box (m, 4) overlaps it
+    """(n,) the object behind each detected box, NO_OBJECT where no projected box (m, 4) overlaps it
     enough.
     """
     if not len(boxes) or not len(shown):
-        return np.full(len(boxes), NOBODY, np.int64)
+        return np.full(len(boxes), NO_OBJECT, np.int64)
     # Intersection over union of every detection (n) with every projected box (m).
     low = np.maximum(boxes[:, None, :2], shown[:, :2])
     high = np.minimum(boxes[:, None, 2:], shown[:, 2:])
@@ -169,4 +169,4 @@ def _behind(boxes: Floats, classes: Integers, shown: Floats, annotations: Annota
         classes[:, None] == annotations.classes, common / (areas[:, None] + others - common), 0.0
     )
     best = overlap.argmax(axis=1)
-    return np.where(overlap.max(axis=1) >= SAME_OBJECT_IOU, annotations.objects[best], NOBODY)
+    return np.where(overlap.max(axis=1) >= SAME_OBJECT_IOU, annotations.objects[best], NO_OBJECT)

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Floats, Frame, Integers, turned
 from care_sim.core.grid import AngularGrid
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 VALUES_PER_POINT = 5
 """float32 x, y, z, intensity and ring."""
@@ -66,14 +66,14 @@ def recorded_cloud(
 
 
 def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Integers:
-    """(n,) the annotated object whose box holds each point (n, 3), the smallest of several, NOBODY
-    where there is none.
+    """(n,) the annotated object whose box holds each point (n, 3), the smallest of several,
+    NO_OBJECT where there is none.
 
     Boxes stand upright in the world, however the frame `sensor` of points and annotations leans.
     """
     # A ball round each box finds the few points that may lie in it. From the largest box down, so
     # that the smallest one that holds a point has the last word.
-    found = np.full(len(points), NOBODY, np.int64)
+    found = np.full(len(points), NO_OBJECT, np.int64)
     boxes = sensor.boxes_to_world(annotations.boxes)
     places = KDTree(sensor.origin + sensor.vectors_to_world(points))
     near = places.query_ball_point(boxes[:, :3], np.linalg.norm(boxes[:, 3:6], axis=1) / 2)

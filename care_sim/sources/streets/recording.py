@@ -14,7 +14,7 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
-from care_sim.sensors.annotated import NOBODY, Annotations, Cloud, IdentifiedDetections
+from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.sources.streets.draft import STREET_KEYFRAME_S
@@ -25,6 +25,9 @@ from care_sim.world.bullet import BulletWorld
 SIGHT_M = 60.0
 """Bodies whose hull is further than this from the sensor are left out: the LiDAR reaches 50 m, and
 an adult shows the camera its least number of pixels at about 50 m."""
+
+_NO_CLASS = -1
+"""The class of a body that the five classes do not hold."""
 
 
 def record(
@@ -79,7 +82,7 @@ class _StreetBodies:
         self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
         self._classes = np.array(
-            [NOBODY if label is None else CLASSES.index(label) for label in labels]
+            [_NO_CLASS if label is None else CLASSES.index(label) for label in labels]
         )
         self._bodies: dict[int, int] = {}
 
@@ -93,7 +96,7 @@ class _StreetBodies:
         near = self._set_up(keyframe, sensor)
         # Everything near may hide something; what has a class is reported and annotated.
         everything = sensor.boxes_to_local(self._boxes(keyframe, near))
-        reported = self._classes[near] != NOBODY
+        reported = self._classes[near] != _NO_CLASS
         labelled = near[reported]
         boxes = everything[reported]
         numbers = {self._bodies[number]: number for number in labelled.tolist()}

@@ -57,7 +57,7 @@ class MeasureLog:
 
     def log(self, watched: WatchedKeyframe, state: str) -> None:
         """A keyframe, with the state of the first-sighting actor."""
-        frame = watched.frame
+        frame = watched.record
         self._frames.append(frame)
         self._counts.append(np.bincount(watched.shares.ravel(), minlength=len(SHARES)))
         brake = "on" if frame.braking else "off"

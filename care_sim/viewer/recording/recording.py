@@ -84,7 +84,7 @@ class RecordedEpisode:
 
     def keep(self, watched: WatchedKeyframe) -> None:
         """Log a keyframe that was played."""
-        frame = watched.frame
+        frame = watched.record
         self._lane.at(frame.index, frame.time_s)
         state = "detected" if frame.detected else "in view" if frame.in_view else "out of view"
         self._space.log(watched, state)

@@ -3,7 +3,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.types import CLASSES
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.argoverse2.films import (
     ARGOVERSE2_CATEGORIES,
     ARGOVERSE2_SENSOR_HEIGHT_M,
@@ -37,7 +37,7 @@ def test_a_car_ahead_is_annotated_hit_and_seen_where_it_stands(tmp_path):
 
 def test_the_road_returns_the_rays_that_nothing_stopped(tmp_path):
     (shot,) = argoverse2_film(parked(tmp_path, CAR_AHEAD)).shots
-    road = returns_of(shot, NOBODY)
+    road = returns_of(shot, NO_OBJECT)
     assert road[:, 2] == pytest.approx(-ARGOVERSE2_SENSOR_HEIGHT_M)
     assert np.linalg.norm(road, axis=1).max() <= 50.0
     assert np.all(np.diff(shot.cloud.cells) > 0)
@@ -96,7 +96,7 @@ def test_only_the_five_classes_are_annotated_and_everything_occludes(tmp_path):
     assert len(shot.annotations) == 1
     assert len(returns_of(shot, 0)) == 0
     assert len(shot.seen.objects) == 0
-    assert returns_of(shot, NOBODY)[:, 2].max() > 0
+    assert returns_of(shot, NO_OBJECT)[:, 2].max() > 0
 
 
 def test_the_recording_car_and_boxes_without_a_point_are_left_out(tmp_path):
@@ -132,7 +132,7 @@ def test_boxes_without_a_point_were_present_at_the_first_keyframe(tmp_path):
 def test_a_keyframe_in_which_nobody_is_seen_shows_the_road_alone(tmp_path):
     (shot,) = argoverse2_film(parked(tmp_path, CAR_AHEAD | {"num_interior_pts": 0})).shots
     assert (len(shot.annotations), len(shot.seen.objects)) == (0, 0)
-    assert set(shot.cloud.objects.tolist()) == {NOBODY}
+    assert set(shot.cloud.objects.tolist()) == {NO_OBJECT}
 
 
 def test_every_fifth_annotated_sweep_is_a_keyframe_and_tracks_keep_their_number(tmp_path):

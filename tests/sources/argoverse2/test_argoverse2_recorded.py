@@ -6,7 +6,7 @@ from pyarrow import feather
 
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.open_loop import FilmEnv
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.argoverse2.films import ARGOVERSE2_SENSOR_HEIGHT_M, UP_LIDAR, argoverse2_film
 
 loaded = functools.cache(argoverse2_film)
@@ -103,6 +103,6 @@ def test_cast_returns_lie_where_the_recorded_sweep_has_them(recorded, sweep):
     cells = AngularGrid().cells_of(points)
     real = np.full(AngularGrid().size, np.inf)
     np.minimum.at(real, cells[cells >= 0], np.linalg.norm(points, axis=1)[cells >= 0])
-    hit = shot.cloud.objects != NOBODY
+    hit = shot.cloud.objects != NO_OBJECT
     gap = np.abs(real[shot.cloud.cells[hit]] - np.linalg.norm(shot.cloud.points[hit], axis=1))
     assert np.median(gap) < 0.4

@@ -8,7 +8,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
-from care_sim.sensors.annotated import NOBODY, Annotations
+from care_sim.sensors.annotated import NO_OBJECT, Annotations
 from care_sim.sources.nuscenes.categories import DETECTION_NAMES, NUSCENES_CATEGORIES
 from care_sim.sources.nuscenes.splits import VAL, scenes
 from care_sim.sources.nuscenes.sweeps import owners, read_points
@@ -38,7 +38,7 @@ def test_the_cloud_holds_the_recorded_points_in_their_cells_on_their_objects(tmp
     assert len(cloud) == 4, "the point on our own roof is left out"
     assert np.array_equal(cloud.cells, AngularGrid().cells_of(cloud.points))
     assert np.all(np.diff(cloud.cells) >= 0)
-    assert sorted(cloud.objects.tolist()) == [NOBODY, 0, 0, 0]
+    assert sorted(cloud.objects.tolist()) == [NO_OBJECT, 0, 0, 0]
     world = shot.sensor.origin + shot.sensor.vectors_to_world(cloud.points)
     assert sorted(map(tuple, world.round(3).tolist())) == sorted(map(tuple, WORLD[:4].tolist()))
 
@@ -49,7 +49,7 @@ def test_a_point_belongs_to_the_box_it_lies_in_as_the_box_is_turned():
     annotations = Annotations(np.array([5]), np.array([0]), boxes)
     assert owners(np.array([on_the_diagonal, across_it]), annotations, UPRIGHT).tolist() == [
         5,
-        NOBODY,
+        NO_OBJECT,
     ]
 
 
@@ -60,7 +60,7 @@ def test_boxes_stand_upright_however_the_sensor_leans():
     ends = bus[0, :3] + [[5.9 * np.cos(0.4), 5.9 * np.sin(0.4), h] for h in (1.6, -1.6, 1.8, -1.8)]
     annotations = Annotations(np.array([7]), np.array([2]), sensor.boxes_to_local(bus))
     found = owners(sensor.vectors_to_local(ends - sensor.origin), annotations, sensor)
-    assert found.tolist() == [7, 7, NOBODY, NOBODY]
+    assert found.tolist() == [7, 7, NO_OBJECT, NO_OBJECT]
 
 
 def test_a_point_in_two_boxes_belongs_to_the_smaller():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sources.nuscenes.detections import DetectionFile
 from tests.helpers.nuscenes_database import SENSORS
 from tests.helpers.nuscenes_scene import SCENE, database, first
@@ -64,7 +64,7 @@ def test_a_detection_elsewhere_or_of_another_class_lies_on_nobody(tmp_path):
     path = tmp_path / "found.json"
     path.write_text(json.dumps(rows))
     (shot,) = first(root, detections=DetectionFile(path)).shots
-    assert shot.seen.objects.tolist() == [NOBODY, NOBODY]
+    assert shot.seen.objects.tolist() == [NO_OBJECT, NO_OBJECT]
 
 
 COCO = {"image_id": "t", "bbox": [0, 0, 5, 5], "category_id": 3, "score": 1}

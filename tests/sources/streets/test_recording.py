@@ -4,7 +4,7 @@ import pytest
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Ego
 from care_sim.evaluation.sightings import Sightings
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -99,7 +99,7 @@ def test_boxes_stand_where_the_street_has_them(street, film):
 
 def test_whatever_is_seen_is_annotated_and_nothing_else(film):
     for shot in film.shots:
-        seen = {*shot.cloud.objects.tolist(), *shot.seen.objects.tolist()} - {NOBODY}
+        seen = {*shot.cloud.objects.tolist(), *shot.seen.objects.tolist()} - {NO_OBJECT}
         assert seen == set(shot.annotations.objects.tolist())
 
 
@@ -145,7 +145,7 @@ def test_a_person_behind_a_house_is_not_annotated_until_it_steps_out():
     shot = shot_of(house, ("pedestrian", 20.0, 4.0))
     assert shot.annotations.objects.tolist() == [1]
     assert CLASSES[shot.annotations.classes[0]] == "pedestrian"
-    assert set(shot.cloud.objects.tolist()) == {NOBODY, 1}
+    assert set(shot.cloud.objects.tolist()) == {NO_OBJECT, 1}
 
 
 def test_who_stands_hidden_at_first_was_present_and_is_annotated_nowhere_until_it_shows():
@@ -169,7 +169,7 @@ def test_a_car_beyond_the_lidar_is_annotated_where_a_camera_shows_it():
     shot = shot_of(("car", 55.0, 0.0))
     assert shot.seen.objects.tolist() == [0]
     assert shot.annotations.objects.tolist() == [0]
-    assert (shot.cloud.objects == NOBODY).all()
+    assert (shot.cloud.objects == NO_OBJECT).all()
     assert len(shot_of(("car", SIGHT_M + 3.0, 0.0)).annotations) == 0
 
 
