@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
@@ -112,9 +112,10 @@ class OpenLoop:
             tracks, lambda numbers: {n: present[n] for n in numbers if n in present}
         )
 
-    def true_objects(self, tracks: Tracks) -> Cells:
-        """(n,) the numbers of the objects behind tracks, NOBODY for a track without one. Truth: for
-        the training alone.
+    def true_objects(self, tracks: Tracks) -> Integers:
+        """(n,) the numbers of the objects behind tracks, NO_OBJECT for a track without one.
+
+        Truth: for the training alone.
         """
         return self._track_objects.behind(tracks)
 

@@ -11,7 +11,7 @@ import numpy as np
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Floats, Integers
 from care_sim.core.types import Scan, Tracks
-from care_sim.sensors.annotated import NOBODY
+from care_sim.sensors.annotated import NO_OBJECT
 
 
 class Truth(Protocol):
@@ -75,9 +75,9 @@ class TrackObjects:
         # The last one counts: where the tracker changed its object, the truth changes with it.
         self._objects.update(zip(tracks.tolist(), objects.tolist(), strict=True))
 
-    def behind(self, tracks: Tracks) -> Cells:
-        """(n,) the objects behind tracks, NOBODY for a track without one."""
-        objects = [self._objects.get(track, NOBODY) for track in tracks.ids.tolist()]
+    def behind(self, tracks: Tracks) -> Integers:
+        """(n,) the objects behind tracks, NO_OBJECT for a track without one."""
+        objects = [self._objects.get(track, NO_OBJECT) for track in tracks.ids.tolist()]
         return np.array(objects, np.int64)
 
     def boxes(self, tracks: Tracks, boxes_of: Callable[[list[int]], dict[int, Floats]]) -> Floats:
