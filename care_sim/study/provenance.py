@@ -93,15 +93,17 @@ def _sources_digest(root: Path) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of Python, the package, its code and the libraries that decide an episode."""
-    libraries = {
-        name: metadata.version(name) for name in (*_LIBRARIES, *filter(_is_installed, _EXTRAS))
-    }
     return {
         "python": platform.python_version(),
         "care-sim": care_sim.__version__,
         "code": code_digest(),
-        **libraries,
+        **package_versions(*_LIBRARIES, *filter(_is_installed, _EXTRAS)),
     }
+
+
+def package_versions(*packages: str) -> dict[str, str]:
+    """The versions of installed packages."""
+    return {package: metadata.version(package) for package in packages}
 
 
 def _is_installed(library: str) -> bool:
@@ -115,6 +117,12 @@ def machine() -> dict[str, str | int]:
         "processor": _processor(),
         "cores": os.cpu_count() or 1,
     }
+
+
+def machine_line() -> str:
+    """The same in a few words, for the cards of weights."""
+    here = machine()
+    return f"{here['processor']}, {here['cores']} cores, {here['system']}"
 
 
 def _processor() -> str:
