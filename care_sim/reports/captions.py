@@ -9,6 +9,7 @@ _READING = (
     "First detection: planar distance in metres from the sensor to the first-sighting actor at the "
     "first keyframe it is detected; median [quartiles]. k/n: k of n episodes, one a seed."
 )
+# How censored distances enter each statistic is decided in care_sim.evaluation.censoring.
 _CENSORING = (
     "An actor that was never detected (counted under 'never') is neither a zero nor left out. Its "
     "detection distance is at most that of the nearest scan that passed it by, and at least 0. In "
@@ -24,6 +25,7 @@ _LEVELS = (
     "policy's, mean in metres, 0 at best, and its interval; as full: episodes in which the policy "
     "detects no later."
 )
+# The resampling is in care_sim.evaluation.bootstrap, the gates in care_sim.reports.contrasts.
 _STATISTICS = (
     "Differences are means, paired by seed (common random numbers), with 95% percentile bootstrap "
     "intervals of 10,000 resamples; positive favours the first named. Bold: the interval excludes "
@@ -32,6 +34,7 @@ _STATISTICS = (
     f"road covered at 30 km/h while the brake builds up, 0.3 s) or {GATE_POINTS:.0f} points of a "
     "rate. No correction is made for the number of differences in a table."
 )
+# Measured again by tests/evaluation/test_bootstrap.py.
 _COVERAGE = (
     "The ego covers 0.8 m of road a keyframe, so differences come in such steps. How often the "
     "intervals hold the truth was measured on synthetic differences: of 30 seeds, 90 to 96 times "
@@ -39,6 +42,7 @@ _COVERAGE = (
     "and most sets of five show no difference at all. An interval without width says that all "
     "seeds differ alike, not that the estimate is exact."
 )
+# Studies of differences alone print no levels, and their captions do not explain them.
 EPISODES_CAPTION = " ".join([_READING, _CENSORING, _LEVELS, _STATISTICS, _COVERAGE])
 DIFFERENCES_CAPTION = " ".join([_READING, _CENSORING, _STATISTICS, _COVERAGE])
 
@@ -58,6 +62,7 @@ _PROTOCOL_WEIGHTS = (
     "Every event weighs the same, and every object frame; with equal scene weights every scene "
     "does. No correction is made for the number of differences in a table."
 )
+# Measured again by tests/evaluation/test_bootstrap.py.
 _PROTOCOL_COVERAGE = (
     "On synthetic scenes the intervals over scenes held the truth 93 to 95 times in 100 with 50 "
     "scenes and more, and about 80 times with 5: of fewer than about 20 scenes they are too narrow."

@@ -127,6 +127,7 @@ _ALL = (
         PLAYS,
     ),
 )
+# The names are those of the commands, which files of results carry.
 STUDIES = {study.name: study for study in _ALL}
 SWEEP = STUDIES["sweep"]
 

@@ -27,6 +27,7 @@ from care_sim.study.run_config import (
     flat,
 )
 
+# CARE-CutIn-v0 is the environment of the scenario cutin.
 ENVIRONMENT_IDS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 """Environment id of every scenario."""
 
@@ -109,6 +110,7 @@ class EpisodeConfig(Conditions, RunConfig):
     @property
     def similarity_keys(self) -> tuple[SimilarityKey, ...]:
         """Everything but the seed; scenario, policy and budget; the policy; nothing."""
+        # Episodes of one configuration differ least in how long they take.
         all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
         return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
 

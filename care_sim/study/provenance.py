@@ -128,5 +128,6 @@ def machine_line() -> str:
 def _processor() -> str:
     table = Path("/proc/cpuinfo")
     lines = table.read_text().splitlines() if table.exists() else []
+    # Each core has its lines in /proc/cpuinfo; the first one names the processor.
     models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return next(models, platform.processor() or platform.machine())

@@ -191,6 +191,7 @@ def film_hash(film: Film) -> str:
     content = hashlib.sha256(
         portable_bytes(film.name, cameras, film.sensor_height_m, film.keyframe_s)
     )
+    # What a policy or the scoring can see of a shot, in a fixed order.
     for shot in film.shots:
         seen = shot.annotations
         identified = shot.seen
@@ -227,6 +228,7 @@ def _strata(score: SceneScore) -> Row:
 
 def _sightings(score: SceneScore) -> dict[str, list[Any]]:
     """What is known of the events, as columns; metres and radians to three decimals."""
+    # Three decimals are millimetres and milliradians, finer than any sensor here.
     rows = score.event_rows()
     columns = {name: [row[name] for row in rows] for name in _EVENT_COLUMNS}
     return {

@@ -52,6 +52,7 @@ class Clip:
 
         def watch(loop: ClosedLoop, frame: Keyframe) -> None:
             if self._path is not None:
+                # Episodes of one clip have the same keyframe, because they meet the same world.
                 self._keyframe_s = loop.rig.keyframe_s
                 frames.append(frame)
                 film.append(self._draw(name, loop, frames))
@@ -79,6 +80,7 @@ def _side_by_side(films: Sequence[Sequence[Image.Image]]) -> Iterator[Image.Imag
 
 
 def _row(pictures: Sequence[Image.Image]) -> Image.Image:
+    # All pictures are of one kind and have one size.
     width, height = pictures[0].size
     canvas = Image.new("RGB", (len(pictures) * (width + _GAP) - _GAP, height), BACKGROUND)
     for number, picture in enumerate(pictures):

@@ -109,8 +109,9 @@ class _FaultPanels:
         self, axes: Axes, policy: str, style: Style, heights: Sequence[float | None]
     ) -> None:
         """Draw a policy over the strengths; None was not played, nan has no median."""
-        study = [(place, height) for place, height in enumerate(heights) if height is not None]
-        if not study:
+        # Strengths stand side by side at equal distances: their units differ from fault to fault.
+        played = [(place, height) for place, height in enumerate(heights) if height is not None]
+        if not played:
             return
         look: dict[str, Any] = {
             "color": style.colour,
@@ -120,10 +121,10 @@ class _FaultPanels:
         }
         label = self.study.marked(policy)
         axes.plot(
-            *zip(*study, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label
+            *zip(*played, strict=True), **look, linestyle=style.line, linewidth=1.3, label=label
         )
         # Matplotlib leaves nan out of the line. Open markers at the bottom show it.
-        missing = [place for place, height in study if math.isnan(height)]
+        missing = [place for place, height in played if math.isnan(height)]
         if missing:
             axes.plot(
                 missing,

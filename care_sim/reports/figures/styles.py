@@ -77,6 +77,7 @@ def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:
     made = {}
     for policy, tags in policies:
         if any(tag in tags for tag in MARKS):
+            # Grey and dashed, so that nobody takes them for contenders.
             made[policy] = Style(next(greys), next(markers), "--")
         else:
             made[policy] = (

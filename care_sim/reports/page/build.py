@@ -83,6 +83,7 @@ class Page:
                 version=care_sim.__version__,
                 charts=charts,
                 specs=_embedded([chart.spec for chart in charts]),
+                # A page without charts needs no Vega.
                 vega=Markup(vega_bundle()) if charts else "",
                 tables=[(table, blocks(table)) for table in self.findings.tables],
                 closing=self.findings.closing,
@@ -149,6 +150,7 @@ def write_page(
             )
         episodes = played_again(watched, workers, make_executor)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
+        # Halves of surrogate pairs, which names of files may hold, are written as escapes.
         unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")
     return page
 
@@ -158,6 +160,7 @@ def _no_charts(_rows: Sequence[Row]) -> list[Chart]:
 
 
 def _template() -> Any:
+    # StrictUndefined: a name that is misspelt in the template raises and is not left empty.
     loader = PackageLoader("care_sim.reports.page", "assets")
     environment = Environment(
         loader=loader,

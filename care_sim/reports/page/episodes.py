@@ -37,6 +37,7 @@ class Episode:
         """Whether the replay fired, measured and moved as the episode did (its hash), and ends as
         the row does.
         """
+        # Both are asked for: the hash holds what happened, the outcomes how it was scored.
         if self.replay is None or self.differences:
             return False
         return bool(self.replay.row["episode_hash"] == self.row.get("episode_hash"))
@@ -74,9 +75,12 @@ def played_again(
         return []
     executor = make_executor(min(workers, len(rows)))
     try:
+        # Each by itself: what was played before the death of a worker stays.
         futures = [executor.submit(answer, _replay_of, row) for row in rows]
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
     finally:
+        # After an interrupt the episodes that wait are not begun. Those that are being played end
+        # first.
         executor.shutdown(cancel_futures=True)
 
 

@@ -54,6 +54,7 @@ def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Gro
     `replay_data`.
     """
     held = {
+        # By its configuration, which is unique in the rows of a study.
         _place(episode.row): (number, episode)
         for number, episode in enumerate(_watchable(episodes))
     }
@@ -100,6 +101,7 @@ def _group(setting: Setting, rows: Sequence[Row], held: dict[Any, tuple[int, Epi
     for row in rows:
         key = marked(policy_of(row), tags_of_row(row)), percent(row["budget"])
         lines.setdefault(key, {})[row["seed"]] = _outcome(row, *held.get(_place(row), (None, None)))
+    # A seed that this configuration was not played with leaves its place empty.
     configurations = [Configuration(*key, tuple(map(own.get, seeds))) for key, own in lines.items()]
     watchable = sum(_place(row) in held for row in rows)
     return Group(setting.label, tuple(seeds), tuple(configurations), watchable)
@@ -122,8 +124,11 @@ def _place(row: Row) -> tuple[Any, ...]:
 
 
 def _world(row: Row) -> tuple[Any, ...]:
-    """What two episodes share that can be watched side by side."""
+    """What two episodes share that can be watched side by side: scenario, physics, seed."""
+    # None is a parameter that was not given; 0 is one that was.
     physics = sorted(
-        (name, repr(value)) for name, value in row.items() if name.startswith("scenario.") and value
+        (name, repr(value))
+        for name, value in row.items()
+        if name.startswith("scenario.") and value is not None
     )
     return row["scenario"], tuple(physics), row["seed"]

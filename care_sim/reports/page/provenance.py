@@ -118,6 +118,7 @@ def _unplayed(
         failed = len(description.get("failed", ()))
     except (AttributeError, TypeError):
         return [f"The configurations in {CONFIG} cannot be read."]
+    # A file may hold more rows than were asked for, when studies shared a folder; that is no lack.
     lacking = asked - failed - len(rows)
     return (
         [f"{lacking} of {asked} {kind.unit} are missing from {kind.file}."] if lacking > 0 else []

@@ -114,6 +114,7 @@ class Recorder:
         moves = loop.sensor.vectors_to_world(
             np.column_stack([tracks.velocities, np.zeros(len(tracks))])
         )
+        # Class and size once per track, as they were last: the story repeats only what moves.
         for track, label, box in zip(
             tracks.ids.tolist(), tracks.classes.tolist(), places, strict=True
         ):
@@ -128,6 +129,8 @@ class Recorder:
                 "time": _whole(world.time, _CENTI),
                 "place": _poses(np.array([world.ego.pose]))[0].tolist(),
                 "speed": _whole(loop.world.ego_motion.speed, _CENTI),
+                # Of every track its id, place, velocity, and whether it was missed and is drawn
+                # from its forecast.
                 "tracks": np.column_stack([*columns, tracks.misses > 0]).tolist(),
                 "camera": sightlines(
                     loop.belief.detections,
@@ -188,6 +191,7 @@ def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     distances = [
         _whole(f.distance_m, _CENTI) if np.isfinite(f.distance_m) else None for f in keyframes
     ]
+    # The keyframe of the first contact.
     contact = next((f.index for f in keyframes if f.impact_speed_mps is not None), None)
     return {**written, "distance": distances, "contact": contact}
 

@@ -71,6 +71,7 @@ def on_intervals(differences: Iterable[MeasuredDifference | None]) -> tuple[str,
     """What to know of the intervals of the differences shown: which are over events, and why some
     have none.
     """
+    # Each remark stands only under a table that shows such a difference.
     shown = [difference for difference in differences if difference]
     by_events = (BY_EVENTS,) if any(difference.over_events for difference in shown) else ()
     return (
@@ -93,6 +94,7 @@ def left_out(plays: SettingPlays) -> tuple[str, ...]:
 
 def papers(sources: Iterable[str]) -> tuple[str, ...]:
     """The paper's sentences, each once."""
+    # A dict keeps the order in which the table meets the sentences.
     return tuple(f'Paper: "{source}"' for source in dict.fromkeys(sources))
 
 

@@ -163,6 +163,7 @@ def _third_lines(plays: SettingPlays, third: SceneThird) -> Iterator[tuple[str, 
 
 
 def _mean_count(plays: SettingPlays, column: str, third: str, budget: float) -> str:
+    # The mean over the scenes of the third, each of which is a mean over keyframes and floor seeds.
     counts = plays.means(column, budget)
     held = [counts[scene] for scene in plays.thirds(column, budget)[third]]
     return f"{sum(held) / len(held):.1f}"

@@ -44,6 +44,7 @@ _LEVEL_WHOLE = tuple(name for name in _LEVEL_COLUMNS if name != "policy")
 
 def protocol_tables(rows: Sequence[Row]) -> list[Table]:
     """All tables, one setting after the other."""
+    # What answers the main question comes first: differences, then levels, then details.
     made: list[Callable[[SettingPlays], list[Table]]] = [
         protocol_contrast_tables,
         levels_tables,

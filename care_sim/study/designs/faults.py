@@ -46,6 +46,8 @@ def _growing(parameter: str, *values: float, start: float = 0, **given: Any) -> 
 
 
 FAULTS = (
+    # The strengths of each fault grow from the first on. Values by which results are compared with
+    # the paper are among them: misses of 0.2 and 0.4, a latency of 1 and 2 keyframes.
     Fault("missed objects", "share", _growing("false_negative_rate", 0.2, 0.4, 0.6, 0.8, 1.0)),
     Fault(
         "misses in bursts",

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.rows.reading import Key, key_of
 
+# Policies in the order in which tables show them.
 CAMERA_POLICIES = ("all-camera", "care", "care-sbf")
 _BUDGETED = ("history", *CAMERA_POLICIES)
 _POLICIES = (*_BUDGETED, "full")
@@ -144,6 +145,8 @@ PUBLISHED_RESULTS = (
     PublishedResult("dense", ("care",), (0.03,), _DENSE, detection_m=DENSE_CARE_M),
     PublishedResult("dense", ("all-camera",), (0.03,), _DENSE, detection_m=DENSE_ALL_CAMERA_M),
     PublishedResult("dense", ("full",), (1.0,), _DENSE, detection_m=DENSE_FULL_M),
+    # The caption of Figure 5 has it match the full scan throughout, so that the number is that of
+    # the full scan.
     PublishedResult("dense", ("care-sbf",), (0.03,), _CAPTION, detection_m=DENSE_FULL_M),
     PublishedResult(
         "dense", ("care", "care-sbf"), _WIDER, _CAPTION, relation=PublishedRelation.LIKE_FULL

@@ -32,6 +32,8 @@ def write_rows(
     """Write rows, the name of their study and what it lacks to a Parquet file. A column in which no
     row holds anything has the type that `schema` gives it.
     """
+    # Rows may have different columns: parameters that only some policies have are None in the
+    # others.
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [row.get(name) for row in rows] for name in names}
     write_columns(
@@ -49,6 +51,8 @@ def write_columns(
     arrays = {name: pa.array(column) for name, column in columns.items()}
     typed = {
         name: column.cast(schema.column(name).type) if column.type == pa.null() else column
+        # A column without a value has no type of its own, and readers of another file would not
+        # agree on one.
         for name, column in arrays.items()
     }
     with replacing(path) as unfinished:

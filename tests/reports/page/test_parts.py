@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.reports.page.listing import episode_groups
+from care_sim.reports.page.listing import _world, episode_groups
 from care_sim.reports.page.provenance import provenance_of, settings
 from care_sim.reports.page.tables import blocks, sort_key
 from care_sim.reports.protocol.formatting import PAPER
@@ -156,3 +156,10 @@ def test_settings_are_what_varies_or_departs_from_the_default():
         settings([row | {"seed": seed} for seed, row in enumerate(STUDY)])["seed"]
         == "0 to 19, 20 values"
     )
+
+
+def test_a_parameter_of_zero_makes_another_world_than_none():
+    usual = {"scenario": "dense", "seed": 0, "scenario.vehicles": None}
+    assert _world(usual | {"policy": "care"}) == _world(usual | {"policy": "history"})
+    assert _world(usual) != _world(usual | {"scenario.vehicles": 0})
+    assert _world(usual) != _world(usual | {"seed": 1})
