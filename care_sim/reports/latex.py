@@ -52,7 +52,6 @@ def latex(table: Table) -> str:
         "\\toprule",
         _line(table.columns),
         "\\midrule",
-        # A row of one entry is a heading over all columns.
         *(_heading(row[0], columns) if len(row) == 1 else _line(row) for row in table.rows),
         "\\bottomrule",
         "\\end{tabular}",

@@ -127,7 +127,7 @@ _ALL = (
         PLAYS,
     ),
 )
-# The names are those of the commands, which files of results carry.
+# Files of results carry these names, so that none may change.
 STUDIES = {study.name: study for study in _ALL}
 SWEEP = STUDIES["sweep"]
 

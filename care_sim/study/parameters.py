@@ -76,7 +76,7 @@ def _plain(value: Any, levels: int = _DEEPEST) -> Any:
 def _text(value: Any) -> str:
     if not isinstance(value, str):
         raise TypeError
-    # Halves of surrogate pairs, which no file can hold, raise here.
+    # Lone surrogates, which no file can hold, raise here.
     value.encode()
     # A subclass of str, such as an enum, becomes a plain str.
     return str.__str__(value)

@@ -188,7 +188,6 @@ def _draw_levels(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
         shift = OPEN_LOOP_DODGE.factor(number, len(plays.tags))
         levels = {budget: plays.level(ratio, policy, budget).by_event for budget in plays.budgets}
         known = {budget * shift: value for budget, value in levels.items() if value is not None}
-        # CARE is drawn over the others.
         order = 4 if policy == REFERENCE else 3
         line = axes.plot(
             list(known),

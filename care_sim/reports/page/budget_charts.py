@@ -99,7 +99,6 @@ def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, An
             "place": cell.budget
             * CLOSED_LOOP_DODGE.factor(policies.index(cell.policy), len(policies)),
             "median": cell.detection.median,
-            # A quartile that is not detected reaches the bottom.
             "low": cell.detection.low or 0.0,
             "high": cell.detection.high or 0.0,
             "text": spread(cell.detection),

@@ -150,7 +150,7 @@ def write_page(
             )
         episodes = played_again(watched, workers, make_executor)
         page = Page(folder.resolve().name, study, rows, findings, about, episodes)
-        # Halves of surrogate pairs, which names of files may hold, are written as escapes.
+        # Lone surrogates, which names of files may hold, are written as escapes.
         unfinished.write_text(page.html(), encoding="utf-8", errors="backslashreplace")
     return page
 

@@ -191,7 +191,6 @@ def _flags(keyframes: Sequence[Keyframe]) -> dict[str, Any]:
     distances = [
         _whole(f.distance_m, _CENTI) if np.isfinite(f.distance_m) else None for f in keyframes
     ]
-    # The keyframe of the first contact.
     contact = next((f.index for f in keyframes if f.impact_speed_mps is not None), None)
     return {**written, "distance": distances, "contact": contact}
 

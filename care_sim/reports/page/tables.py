@@ -44,7 +44,6 @@ def blocks(table: Table) -> list[Block]:
     """The rows of a table by the headings among them."""
     parts: list[tuple[str, list[Line]]] = [("", [])]
     for row in table.rows:
-        # A heading begins a block.
         if len(row) == 1 < len(table.columns):
             parts.append((row[0], []))
         else:

@@ -51,11 +51,10 @@ class MeasuredDifference:
     @property
     def sign(self) -> int:
         """1 or -1 where the interval excludes zero, else 0."""
-        return (
-            # The difference of two truth values: 1 where both ends are above zero, -1 where both
-            # are below. An interval that ends at zero holds it.
-            0 if self.interval is None else int(self.interval.low > 0) - int(self.interval.high < 0)
-        )
+        if self.interval is None:
+            return 0
+        # An interval that ends at zero holds it.
+        return int(self.interval.low > 0) - int(self.interval.high < 0)
 
     @property
     def excludes_zero(self) -> bool:

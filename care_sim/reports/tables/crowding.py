@@ -121,7 +121,7 @@ def _medians_table(crowd: Crowd) -> Table:
 
 def _medians(crowd: Crowd, vehicles: int, policies: Sequence[str], budget: float) -> str:
     medians = (crowd.median(vehicles, policy, budget) for policy in policies)
-    # Three medians share an entry, which has no room for words.
+    # Several medians share an entry, which has no room for words.
     return "/".join(medians).replace("not detected", "n.d.")
 
 
