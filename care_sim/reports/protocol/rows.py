@@ -136,8 +136,8 @@ def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
     for row in rows:
         groups.setdefault(setting_of(row), []).append(row)
     full = {
-        # Under conditions that the full scan does not feel, it is played once, in the plain setting.
-        # Its rows there are the ceiling of this setting too.
+        # Under conditions that the full scan does not feel, it is played once, in the plain
+        # setting. Its rows there are the ceiling of this setting too.
         setting: [row for row in own if row["policy"] == FULL]
         for setting, own in groups.items()
     }
