@@ -21,7 +21,7 @@ from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.reports.episodes.clips import Clip
 from care_sim.reports.episodes.timeline import text
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.episode_play import GymEnv, answer, trace
+from care_sim.study.episode_play import GymEnv, result_or_reason, trace
 from care_sim.study.run_config import Row
 from care_sim.viewer.pictures.comparison import draw_panel
 
@@ -93,7 +93,7 @@ def play_side_by_side(
 
             for config in configs:
                 # One by one, so that an interrupt leaves those that were played.
-                answers.append(answer(played, config))  # noqa: PERF401
+                answers.append(result_or_reason(played, config))  # noqa: PERF401
     finally:
         # What was played is printed whatever happens to the others.
         failures = _report(configs, answers)

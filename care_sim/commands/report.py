@@ -11,7 +11,7 @@ from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import counted, report_problems
 from care_sim.base.extras import check_page
 from care_sim.commands.shared.study_command import console
-from care_sim.reports.report import print_report, reported, write_report
+from care_sim.reports.report import print_report, read_results, write_report
 from care_sim.study.executors import CORES, MOST_WORKERS
 
 
@@ -41,7 +41,7 @@ class PrintReport:
         return self._print() if self.page is None else self._write(self.page)
 
     def _print(self) -> int:
-        rows, study, left_out = reported(self.folder)
+        rows, study, left_out = read_results(self.folder)
         print_report(rows, console(), study, left_out)
         write_report(rows, self.folder, study, left_out)
         return 0

@@ -19,7 +19,7 @@ from care_sim.study.rows.parquet import read_notes, read_rows
 from care_sim.study.run_config import Row
 
 
-def reported(folder: Path) -> tuple[list[Row], Study, list[str]]:
+def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     """The rows in a folder of results, their study, and what is missing of it.
 
     Raises InvalidInput where there are no rows of a study.

@@ -23,7 +23,7 @@ from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row
 from care_sim.world.world import World
 
-_Answer = TypeVar("_Answer")
+_Result = TypeVar("_Result")
 Watcher = Callable[[ClosedLoop, Keyframe], None]
 GymEnv = gymnasium.Env[Any, Any]
 _KIB_MB = 1024 / 1e6
@@ -33,10 +33,10 @@ def play_episodes(batch: Sequence[EpisodeConfig]) -> list[Row | str]:
     """What a worker does: play episodes, and give for each its row, or in one line why there is
     none.
     """
-    return [answer(run_episode, config) for config in batch]
+    return [result_or_reason(run_episode, config) for config in batch]
 
 
-def answer(play: Callable[..., _Answer], *arguments: object) -> _Answer | str:
+def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Result | str:
     """What `play` returns, or in one line why it returns nothing. No exception leaves the worker,
     which alone may know its class.
     """

@@ -17,7 +17,7 @@ from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoopKeyframe
-from care_sim.study.episode_play import answer, peak_rss_mb
+from care_sim.study.episode_play import peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
@@ -41,10 +41,10 @@ def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
     """What a worker does: the plays of one scene; of each its row, or in one line why there is
     none.
     """
-    scene = answer(ScenePlayer, batch[0])
+    scene = result_or_reason(ScenePlayer, batch[0])
     if isinstance(scene, str):
         return [scene] * len(batch)
-    return [answer(scene.row, config, len(batch)) for config in batch]
+    return [result_or_reason(scene.row, config, len(batch)) for config in batch]
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from care_sim.commands.shared.run_study import run_study
 from care_sim.core.conditions import Conditions
 from care_sim.evaluation.recall import Tally
 from care_sim.reports.protocol.rows import plays_by_setting
-from care_sim.reports.report import reported
+from care_sim.reports.report import read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.sources.scenes import Scene, Streets, chosen_scenes, source_of
 from care_sim.study import scene_play as plays
@@ -87,7 +87,7 @@ def test_one_policy_alone_is_read_again(source, tmp_path):
         ["differing_keyframes", "differing_cells"]
     )
     assert [str(column.type) for column in counts.columns] == ["int64", "int64"]
-    (row,) = reported(tmp_path / "out")[0]
+    (row,) = read_results(tmp_path / "out")[0]
     assert (row["differing_keyframes"], row["differing_cells"]) == (None, None)
 
 
@@ -180,7 +180,7 @@ def test_a_damaged_scene_is_named_left_out_and_the_rest_goes_on(source, tmp_path
     failures = run_study(configs, tmp_path / "out", workers=1, study=PROTOCOL)
     assert [failure.config.scene.name for failure in failures] == ["torn", "torn"]
     assert str(folder / "torn" / "annotations.feather") in failures[0].reason
-    rows, study, left_out = reported(tmp_path / "out")
+    rows, study, left_out = read_results(tmp_path / "out")
     assert study is PROTOCOL
     assert [row["scene"] for row in rows] == ["a", "a", "b", "b"]
     assert [row["tags"] for row in rows] == ["causal"] * 4
@@ -201,7 +201,7 @@ def test_the_events_are_kept_one_by_one(source, tmp_path):
         == []
     )
     events = pq.read_table(tmp_path / "events.parquet").to_pylist()
-    rows, *_ = reported(tmp_path)
+    rows, *_ = read_results(tmp_path)
     assert len(events) == 8
     for event, row in zip(events, rows, strict=True):
         assert (event["digest"], event["ttfd"]) == (row["digest"], row["ttfds"][0])

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
 from care_sim.cli import main
-from care_sim.reports.report import StudyReport, print_report, reported
+from care_sim.reports.report import StudyReport, print_report, read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.study.rows.parquet import LEFT_OUT_NOTE, STUDY_NOTE, read_rows, write_rows
 from tests.helpers import made_plays
@@ -43,7 +43,7 @@ def of_value(content, column, value):
 
 
 def shown(folder):
-    rows, study, left_out = reported(folder)
+    rows, study, left_out = read_results(folder)
     with warnings.catch_warnings(action="ignore"):
         StudyReport.of(rows, replace(study, figures=lambda _rows: {}), left_out)
         print_report(rows, Console(file=io.StringIO()), study, left_out)
@@ -51,7 +51,7 @@ def shown(folder):
 
 def complaint(folder):
     with pytest.raises(InvalidInput) as refused:
-        reported(folder)
+        read_results(folder)
     assert "\n" not in str(refused.value)
     assert len(str(refused.value)) < 1000
     return str(refused.value)
@@ -139,7 +139,7 @@ def test_a_column_of_nothing_is_of_any_type(tmp_path, kind):
     nothing = pa.nulls(content.num_rows, kind)
     place = content.column_names.index("differing_cells")
     put(content.set_column(place, "differing_cells", nothing), "protocol", tmp_path)
-    assert {row["differing_cells"] for row in reported(tmp_path)[0]} == {None}
+    assert {row["differing_cells"] for row in read_results(tmp_path)[0]} == {None}
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_files_of_other_people_are_one_line_and_further_columns_do_no_harm(tmp_p
         "sweep",
         tmp_path,
     )
-    assert len(reported(tmp_path)[0]) == content.num_rows
+    assert len(read_results(tmp_path)[0]) == content.num_rows
 
 
 def test_names_and_texts_of_broken_characters_are_damage(tmp_path):

@@ -15,7 +15,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import EpisodeConfig, grid
-from care_sim.study.episode_play import answer, run_episode, trace
+from care_sim.study.episode_play import result_or_reason, run_episode, trace
 from care_sim.study.journal import JOURNAL, Journal
 from care_sim.study.results_formats import EPISODES
 from care_sim.study.rows.parquet import read_rows
@@ -198,8 +198,8 @@ def test_what_failed_is_told_in_one_line_that_no_terminal_obeys():
     def fail(error):
         raise error
 
-    assert answer(fail, InvalidInput("no\n\x1b[2J idea")) == r"no \x1b[2J idea"
-    assert answer(fail, RuntimeError()).startswith("RuntimeError (test_runner.py, line ")
+    assert result_or_reason(fail, InvalidInput("no\n\x1b[2J idea")) == r"no \x1b[2J idea"
+    assert result_or_reason(fail, RuntimeError()).startswith("RuntimeError (test_runner.py, line ")
 
 
 def test_a_study_goes_on_when_some_episodes_fail(third_party, tmp_path):

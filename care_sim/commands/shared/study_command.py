@@ -10,7 +10,7 @@ from rich.console import Console
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import report_problems
 from care_sim.commands.shared.run_study import run_study, summary
-from care_sim.reports.report import print_report, reported
+from care_sim.reports.report import print_report, read_results
 from care_sim.reports.studies import STUDIES
 from care_sim.study import executors
 from care_sim.study.executors import CORES, MOST_WORKERS
@@ -52,7 +52,7 @@ class StudyCommand:
         failures = run_study(configs, out, self.workers, make_executor, STUDIES[study], self.force)
         # What is printed is read back from the folder, as `care-sim report` would print it.
         if len(failures) < len(configs):
-            rows, _, missing = reported(out)
+            rows, _, missing = read_results(out)
             print_report(rows, console(), STUDIES[study], missing)
             print(f"Results are in {out}")
         report_problems(

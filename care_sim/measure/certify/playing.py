@@ -12,7 +12,7 @@ from care_sim.base.extras import import_open3d
 from care_sim.measure.certify.design import CLOSED, HASH_SEED, STREET, SUBPROCESS, Drawn, drawn
 from care_sim.measure.certify.drive import write_drive
 from care_sim.measure.certify.modes import Played, play_in_mode, together
-from care_sim.study.episode_play import answer
+from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, Processes, processes
 
 Trails = dict[int, Played]
@@ -128,7 +128,7 @@ def attempt(batch: Sequence[Drawn], source: str) -> Trails:
     """
     found: Trails = {}
     for group in _alike(batch):
-        trails = answer(play_in_mode, group[0].mode, group, source)
+        trails = result_or_reason(play_in_mode, group[0].mode, group, source)
         # One text instead of trails: an exception that ended the whole group.
         if isinstance(trails, str):
             trails = [_alone(episode, source) for episode in group]
@@ -137,7 +137,7 @@ def attempt(batch: Sequence[Drawn], source: str) -> Trails:
 
 
 def _alone(episode: Drawn, source: str) -> Played:
-    trails = answer(play_in_mode, episode.mode, [episode], source)
+    trails = result_or_reason(play_in_mode, episode.mode, [episode], source)
     return trails if isinstance(trails, str) else trails[0]
 
 

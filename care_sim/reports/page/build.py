@@ -19,13 +19,13 @@ from care_sim.base.files import HTML, replacing
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts
-from care_sim.reports.page.episodes import Episode, chosen, played_again
+from care_sim.reports.page.episodes import Episode, episodes_to_watch, played_again
 from care_sim.reports.page.fault_charts import fault_charts
 from care_sim.reports.page.listing import Group, episode_groups, replay_data
 from care_sim.reports.page.protocol_charts import protocol_charts
 from care_sim.reports.page.provenance import Provenance, provenance_of
 from care_sim.reports.page.tables import blocks
-from care_sim.reports.report import reported
+from care_sim.reports.report import read_results
 from care_sim.reports.studies import Study
 from care_sim.reports.table import Table
 from care_sim.study.executors import ExecutorFactory, processes
@@ -138,12 +138,12 @@ def write_page(
 
     Raises InvalidInput where there are no results, and MissingExtra without the libraries.
     """
-    rows, study, left_out = reported(folder)
+    rows, study, left_out = read_results(folder)
     # Opened before anything is played: a path that cannot be written is told at once.
     with replacing(path, HTML) as unfinished:
         findings = Findings.of(study, rows)
         about = provenance_of(folder, rows, study.results, left_out)
-        watched = chosen(rows, most) if study.results is EPISODES else []
+        watched = episodes_to_watch(rows, most) if study.results is EPISODES else []
         if watched:
             print(
                 f"playing {counted(len(watched), 'episode')} again to be watched", file=sys.stderr

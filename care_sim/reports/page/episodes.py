@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from care_sim.loops.records import Outcome
 from care_sim.reports.page.replay import Replay, replayed
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
-from care_sim.study.episode_play import answer
+from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, processes
 from care_sim.study.parameters import Parameters
 from care_sim.study.run_config import Row
@@ -57,7 +57,7 @@ class Episode:
         ]
 
 
-def chosen(rows: Sequence[Row], most: int) -> list[Row]:
+def episodes_to_watch(rows: Sequence[Row], most: int) -> list[Row]:
     """At most so many rows: all of the first seed, then those of the next, so that policies can be
     seen side by side.
     """
@@ -76,7 +76,7 @@ def played_again(
     executor = make_executor(min(workers, len(rows)))
     try:
         # Each by itself: what was played before the death of a worker stays.
-        futures = [executor.submit(answer, _replay_of, row) for row in rows]
+        futures = [executor.submit(result_or_reason, _replay_of, row) for row in rows]
         return [Episode(row, _ending(future)) for row, future in zip(rows, futures, strict=True)]
     finally:
         # After an interrupt the episodes that wait are not begun. Those that are being played end

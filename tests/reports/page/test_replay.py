@@ -10,7 +10,7 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.reports.page.episodes import Episode, chosen, config_of, played_again
+from care_sim.reports.page.episodes import Episode, config_of, episodes_to_watch, played_again
 from care_sim.reports.page.replay import SECTORS, fullness, packed, replayed, sightlines
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
@@ -153,12 +153,12 @@ def test_a_row_gives_its_configuration_back(config):
 
 def test_seeds_are_watched_one_after_the_other():
     rows = [{"policy": policy, "seed": seed} for policy in ("history", "care") for seed in (0, 1)]
-    assert [(row["policy"], row["seed"]) for row in chosen(rows, 3)] == [
+    assert [(row["policy"], row["seed"]) for row in episodes_to_watch(rows, 3)] == [
         ("history", 0),
         ("care", 0),
         ("history", 1),
     ]
-    assert chosen(rows, 0) == []
+    assert episodes_to_watch(rows, 0) == []
 
 
 def test_an_episode_that_ends_otherwise_is_told_from_one_that_does_not(replay):

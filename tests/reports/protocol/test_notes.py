@@ -8,7 +8,7 @@ from care_sim.reports.latex import escaped
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.notes import BY_EVENTS, NO_INTERVAL
 from care_sim.reports.protocol.tables import protocol_tables
-from care_sim.reports.report import print_report, reported, write_report
+from care_sim.reports.report import print_report, read_results, write_report
 from care_sim.reports.studies import STUDIES
 from care_sim.reports.table import Bold
 from care_sim.study.results_formats import PLAYS
@@ -117,7 +117,7 @@ def test_what_a_folder_keeps_says_the_same_of_presence_and_emerging(tmp_path):
         rows = study({"care": (5, 5), "history": (4, 5)}, scenes=6, events=20, **more)
         (tmp_path / str(number)).mkdir()
         write_rows(rows, tmp_path / str(number) / PLAYS.file, "protocol")
-        kept, protocol, _ = reported(tmp_path / str(number))
+        kept, protocol, _ = read_results(tmp_path / str(number))
         assert [str(table.markdown()) for table in protocol.tables(kept)] == [
             str(table.markdown()) for table in protocol_tables(rows)
         ]
