@@ -66,11 +66,13 @@ class Belief:
             raise InvalidInput(
                 "an observation's budget must lie in [0, 1], its ranges be numbers of 0 or more"
             )
+        detections = _rows(observation, "detections", ImageDetections.COLUMNS)
+        tracks = _rows(observation, "tracks", Tracks.COLUMNS)
         return cls(
             Ego(*ego),
             round(budget * ranges.size),
-            ImageDetections.from_table(_rows(observation, "detections", ImageDetections.COLUMNS)),
-            Tracks.from_table(_rows(observation, "tracks", Tracks.COLUMNS)),
+            ImageDetections.from_checked_rows(detections),
+            Tracks.from_checked_rows(tracks),
             ranges,
         )
 

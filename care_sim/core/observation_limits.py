@@ -39,13 +39,6 @@ MAX_SIZE_M = 50.0
 MAX_TURN = 4 * np.pi
 
 _EGO = (MAX_SPEED_MPS, MAX_TURN, MAX_ACCELERATION_MPS2)
-_BOX = slice(2, 6)
-_YAW_CHANGE = 8
-"""Columns of `ImageDetections.COLUMNS`."""
-_PLACE = slice(2, 5)
-_YAW = 8
-_VELOCITY = slice(9, 11)
-"""Columns of `Tracks.COLUMNS`."""
 
 
 @dataclass(frozen=True)
@@ -113,10 +106,11 @@ class Limits:
 
         # Looked at before clipping, which would leave of a box wholly outside a line on the edge.
         rows = rows.copy()
-        left, top, right, bottom = rows[:, _BOX].T
-        width, height = most[:, _BOX][:, 2:].T
+        left, top, right, bottom = rows[:, ImageDetections.BOX].T
+        width, height = most[:, ImageDetections.BOX][:, 2:].T
         shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
-        rows[:, _YAW_CHANGE] = _without_turns(rows[:, _YAW_CHANGE])
+        yaw_change = ImageDetections.YAW_CHANGE
+        rows[:, yaw_change] = _without_turns(rows[:, yaw_change])
         return ImageDetections.from_rows(np.clip(rows, least, most)[shown][:MAX_DETECTIONS])
 
     def _limited_tracks(self, tracks: Tracks) -> Tracks:
@@ -127,8 +121,8 @@ class Limits:
 
         # Directions are kept first. Clipping alone would turn a bearing, a velocity and a heading.
         rows = rows.copy()
-        rows[:, _YAW] = _without_turns(rows[:, _YAW])
-        for columns in (_PLACE, _VELOCITY):
+        rows[:, Tracks.YAW] = _without_turns(rows[:, Tracks.YAW])
+        for columns in (Tracks.CENTRE, Tracks.VELOCITY):
             rows[:, columns] = _shortened(rows[:, columns], most[columns.start])
         return Tracks.from_rows(np.clip(rows, least, most))
 

@@ -72,6 +72,9 @@ class ImageDetections:
     COLUMNS = (
         "class", "confidence", "left", "top", "right", "bottom", "camera", "age", "yaw_change",
     )  # fmt: skip
+    CLASS, CONFIDENCE, LEFT, CAMERA, AGE, YAW_CHANGE = 0, 1, 2, 6, 7, 8
+    BOX = slice(2, 6)
+    """Places in COLUMNS."""
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -83,16 +86,21 @@ class ImageDetections:
         Raises InvalidInput for a class or a camera that is no number, or too large to be held
         exactly.
         """
-        table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        _check_whole_columns("classes and cameras", table[:, [0, 6]])
-        return cls.from_table(table)
+        table: Floats = rows[rows[:, cls.CLASS] >= 0].astype(np.float64)
+        _check_whole_columns("classes and cameras", table[:, [cls.CLASS, cls.CAMERA]])
+        return cls.from_checked_rows(table)
 
     @classmethod
-    def from_table(cls, table: Floats) -> "ImageDetections":
+    def from_checked_rows(cls, table: Floats) -> "ImageDetections":
         """The columns of rows (n, 9) without padding, whose numbers are known to be in order."""
-        classes = table[:, 0].astype(np.int64)
-        cameras = table[:, 6].astype(np.int64)
-        return cls(classes, table[:, 1], table[:, 2:6], cameras, table[:, 7], table[:, 8])
+        return cls(
+            classes=table[:, cls.CLASS].astype(np.int64),
+            confidences=table[:, cls.CONFIDENCE],
+            boxes=table[:, cls.BOX],
+            cameras=table[:, cls.CAMERA].astype(np.int64),
+            ages=table[:, cls.AGE],
+            yaw_changes=table[:, cls.YAW_CHANGE],
+        )
 
     def rows(self) -> Floats:
         """(n, 9) table in the order of `COLUMNS`, read-only."""
@@ -126,6 +134,9 @@ class Tracks:
         "id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses",
         "hits",
     )  # fmt: skip
+    ID, CLASS, YAW, MISSES, HITS = 0, 1, 8, 11, 12
+    CENTRE, BOX, VELOCITY = slice(2, 5), slice(2, 9), slice(9, 11)
+    """Places in COLUMNS."""
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -142,16 +153,22 @@ class Tracks:
         Raises InvalidInput for ids, classes, misses or hits that are no numbers, or too large to be
         held exactly.
         """
-        table: Floats = rows[rows[:, 0] >= 0].astype(np.float64)
-        _check_whole_columns("ids, classes, misses and hits", table[:, [0, 1, 11, 12]])
-        return cls.from_table(table)
+        table: Floats = rows[rows[:, cls.ID] >= 0].astype(np.float64)
+        whole = [cls.ID, cls.CLASS, cls.MISSES, cls.HITS]
+        _check_whole_columns("ids, classes, misses and hits", table[:, whole])
+        return cls.from_checked_rows(table)
 
     @classmethod
-    def from_table(cls, table: Floats) -> "Tracks":
+    def from_checked_rows(cls, table: Floats) -> "Tracks":
         """The columns of rows (n, 13) without padding, whose numbers are known to be in order."""
-        ids, classes = table[:, :2].astype(np.int64).T
-        misses, hits = table[:, 11:].astype(np.int64).T
-        return cls(ids, classes, table[:, 2:9], table[:, 9:11], misses, hits)
+        return cls(
+            ids=table[:, cls.ID].astype(np.int64),
+            classes=table[:, cls.CLASS].astype(np.int64),
+            boxes=table[:, cls.BOX],
+            velocities=table[:, cls.VELOCITY],
+            misses=table[:, cls.MISSES].astype(np.int64),
+            hits=table[:, cls.HITS].astype(np.int64),
+        )
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
         """Some of the tracks, by index or mask."""

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.frames import Floats, Integers, Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.confidence import confidence_of, pixels_of
@@ -23,8 +22,9 @@ ASIDE = 0.005
 MORE_HIDDEN = 0.05
 """Its hidden share, by this factor."""
 
-_BOX = slice(2, 6)
-_CAMERA = 6
+_BOX = ImageDetections.BOX
+_CAMERA = ImageDetections.CAMERA
+_CONFIDENCE = ImageDetections.CONFIDENCE
 
 NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
 
@@ -82,46 +82,56 @@ class BoxPool:
         way round; one that would leave them that way too is not made. So nothing heaps up at these
         bounds. An edge that the picture cuts stays cut.
         """
+        # The second choice is the opposite variation, the last the box as it was.
         departures = (2 * draws - 1) * (NEARER, ASIDE, MORE_HIDDEN)
-        there, is_possible = self._moved(rows, departures)
-        back, is_possible_back = self._moved(rows, -departures)
-        varied: Floats = np.where(is_possible_back[:, None], back, self.rows[rows])
-        return np.where(is_possible[:, None], there, varied)
+        first, first_fits = self._moved(rows, departures)
+        second, second_fits = self._moved(rows, -departures)
+        varied: Floats = np.where(second_fits[:, None], second, self.rows[rows])
+        return np.where(first_fits[:, None], first, varied)
 
-    def _is_usable(self, times_s: Floats, time_s: float) -> NDArray[np.bool_]:
+    def _is_usable(self, times_s: Floats, time_s: float) -> Mask:
         # Before and after alike: the film or drive of other boxes is known as a whole.
         away = np.abs(times_s - time_s)
         is_apart = away >= self.apart_s - LAST_BITS_S
         is_near = away <= self.near_s + LAST_BITS_S
-        usable: NDArray[np.bool_] = is_apart & is_near
+        usable: Mask = is_apart & is_near
         return usable
 
-    def _moved(self, rows: Integers, departures: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """(k, 9) the boxes after departures (k, 3), and (k,) which of them are within the bounds of
-        the pool.
+    def _moved(self, rows: Integers, departures: Floats) -> tuple[Floats, Mask]:
+        """(k, 9) the boxes at `rows` (k,) after `departures`, and (k,) which of them are within the
+        bounds of the pool.
+
+        `departures` (k, 3) are how much nearer and how much more hidden, as logarithms of the
+        factors, and between them how far to the right, as a share of the picture's width.
         """
         moved = self.rows[rows]
+        boxes = moved[:, _BOX].copy()
         middles = self.middles[rows]
         limits = self._limits[rows]
-        boxes = moved[:, _BOX].copy()
-        nearer, aside, hidden = departures.T
+        nearer, sideways, hidden = departures.T
 
         # An object that comes nearer along the camera's axis grows about the middle of the picture,
         # and its foot stays on the road: a point at the height h below the camera appears f h / d
-        # below the middle, so all of the box grows as 1 / d. The distance varies by exp(-nearer):
-        # a factor is as likely as its inverse.
-        ways = np.expm1(nearer)[:, None] * (boxes - np.tile(middles, 2))
-        ways[:, [0, 2]] += (aside * 2 * middles[:, 0])[:, None]
-        # An edge on the limit is where the picture cuts the object, which reaches beyond it.
-        after = np.where(boxes == limits, boxes, boxes + _rounded(ways, self._edge_step))
+        # below the middle, so all of the box grows as 1 / d. The distance d varies by
+        # exp(-nearer): a factor is as likely as its inverse. So an edge at e from the middle goes
+        # to exp(nearer) e, that is by (exp(nearer) - 1) e = expm1(nearer) e.
+        shifts = np.expm1(nearer)[:, None] * (boxes - np.tile(middles, 2))
+        widths = 2 * middles[:, 0]
+        shifts[:, [0, 2]] += (sideways * widths)[:, None]
+
+        # An edge on the limit is where the picture cuts the object, which reaches beyond it: this
+        # edge stays where it is.
+        is_cut = boxes == limits
+        after = np.where(is_cut, boxes, boxes + _rounded(shifts, self._edge_step))
         moved[:, _BOX] = after
-        moved[:, 1] = self._confidences(rows, box_areas(after), np.exp(hidden))
+        moved[:, _CONFIDENCE] = self._confidences(rows, box_areas(after), np.exp(hidden))
 
         # Within means inside the picture, the right way round, and no less sure than the least sure
         # box of the pool.
         low, high = after[:, :2], after[:, 2:]
         within = (low >= limits[:, :2]) & (high <= limits[:, 2:]) & (low < high)
-        return moved, within.all(axis=1) & (moved[:, 1] >= self.rows[:, 1].min())
+        sure = moved[:, _CONFIDENCE] >= self.rows[:, _CONFIDENCE].min()
+        return moved, within.all(axis=1) & sure
 
     def _confidences(self, rows: Integers, areas: Floats, hidden: Floats) -> Floats:
         """(k,) of boxes that now have these areas: visible pixels grow with the area, hidden ones
@@ -135,7 +145,7 @@ class BoxPool:
 
     @cached_property
     def _pixels(self) -> Floats:
-        return pixels_of(self.rows[:, 1])
+        return pixels_of(self.rows[:, _CONFIDENCE])
 
     @cached_property
     def _is_counted(self) -> bool:
@@ -146,7 +156,7 @@ class BoxPool:
 
     @cached_property
     def _confidence_step(self) -> float:
-        return _decimal_step(self.rows[:, 1])
+        return _decimal_step(self.rows[:, _CONFIDENCE])
 
     @cached_property
     def _edge_step(self) -> float:
@@ -156,7 +166,7 @@ class BoxPool:
         # Relative to a first box per camera: a picture that is cut or scaled begins at any number.
         firsts = np.empty((len(self.rows), 4))
         for own in self._by_camera():
-            firsts[own] = np.tile(self.rows[own][0, 2:4], 2)
+            firsts[own] = np.tile(self.rows[own][0, _BOX][:2], 2)
         return _decimal_step(self.rows[:, _BOX] - firsts)
 
     @cached_property
@@ -170,7 +180,7 @@ class BoxPool:
             limits[own] = np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
         return limits
 
-    def _by_camera(self) -> list[NDArray[np.bool_]]:
+    def _by_camera(self) -> list[Mask]:
         """(n,) the rows of each camera."""
         cameras = self.rows[:, _CAMERA]
         return [cameras == camera for camera in np.unique(cameras)]

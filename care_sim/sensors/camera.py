@@ -129,10 +129,11 @@ class CameraDetector:
             rows, objects = _with_false_boxes(rows, objects, false)
 
         # In the dark nothing is reported, false boxes included; delays go on.
-        sure = rows[:, 1] >= self._sensing.camera_confidence
+        confidences = rows[:, ImageDetections.CONFIDENCE]
+        sure = confidences >= self._sensing.camera_confidence
         reported = np.flatnonzero(sure & (not self._sensing.black_at(time_s)))
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
-        order = reported[np.lexsort((rows[reported, 2], -rows[reported, 1]))]
+        order = reported[np.lexsort((rows[reported, ImageDetections.LEFT], -confidences[reported]))]
         detections = ImageDetections.from_rows(rows[order])
         return self._delay.newest(IdentifiedDetections(detections, objects[order]), heading)
 

@@ -4,9 +4,9 @@ They ignore occlusion: one may lie where a true object of its distance would be 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats
+from care_sim.core.frames import Floats, Mask
+from care_sim.core.types import ImageDetections
 from care_sim.sensors.box_pool import NO_ROWS, BoxPool, box_areas
 
 DUPLICATE_IOU = 0.5
@@ -60,16 +60,22 @@ class FalseBoxes:
         return shown[len(true) :]
 
 
-def _lie_on(boxes: Floats, others: Floats) -> NDArray[np.bool_]:
+def _lie_on(boxes: Floats, others: Floats) -> Mask:
     """(k,) which of the rows `boxes` (k, 9) lie on one of `others` (n, 9) of their class and
     picture.
     """
-    ours, theirs = boxes[:, None], others[None]
-    low = np.maximum(ours[..., 2:4], theirs[..., 2:4])
-    high = np.minimum(ours[..., 4:6], theirs[..., 4:6])
+    columns = ImageDetections
+    ours = boxes[:, None]
+    theirs = others[None]
+
+    # Left and top, then right and bottom, of what two boxes have in common.
+    low = np.maximum(ours[..., columns.BOX][..., :2], theirs[..., columns.BOX][..., :2])
+    high = np.minimum(ours[..., columns.BOX][..., 2:], theirs[..., columns.BOX][..., 2:])
     common = np.prod(np.clip(high - low, 0, None), axis=-1)
-    union = box_areas(boxes[:, 2:6])[:, None] + box_areas(others[:, 2:6]) - common
-    alike = (ours[..., 0] == theirs[..., 0]) & (ours[..., 6] == theirs[..., 6])
+    areas = box_areas(boxes[:, columns.BOX])[:, None] + box_areas(others[:, columns.BOX])
+    union = areas - common
+    alike = ours[..., columns.CLASS] == theirs[..., columns.CLASS]
+    alike &= ours[..., columns.CAMERA] == theirs[..., columns.CAMERA]
     # Multiplied out, so that boxes without an area divide nothing.
-    lies: NDArray[np.bool_] = (alike & (common >= DUPLICATE_IOU * union)).any(axis=1)
+    lies: Mask = (alike & (common >= DUPLICATE_IOU * union)).any(axis=1)
     return lies
