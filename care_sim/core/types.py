@@ -27,27 +27,28 @@ Action = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Ego:
-    """The car's own motion: speed m/s along its heading (below 0 backwards), yaw rate rad/s,
-    acceleration m/s^2.
-    """
+    """The car's own motion."""
 
     speed: float = 0.0
+    """Along its heading, m/s; below 0 backwards."""
     yaw_rate: float = 0.0
+    """rad/s, above 0 to the left."""
     acceleration: float = 0.0
+    """Along its heading, m/s^2."""
 
 
 @dataclass(frozen=True)
 class Detections:
-    """3D detections of one keyframe, in the sensor frame; `len()` is their number n.
-
-    `classes` (n,) index into `CLASSES`, `boxes` (n, 7), `returns` (n,) count the fired rays that
-    hit. `scores` (n,) are confidences from 0 to 1; None of a detector that has none.
-    """
+    """3D detections of one keyframe, in the sensor frame; `len()` is their number n."""
 
     classes: Integers
+    """(n,) places in `CLASSES`."""
     boxes: Floats
+    """(n, 7)."""
     returns: Integers
+    """(n,) how many fired rays hit each."""
     scores: Floats | None = None
+    """(n,) confidences from 0 to 1; None of a detector that has none."""
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -55,19 +56,20 @@ class Detections:
 
 @dataclass(frozen=True)
 class ImageDetections:
-    """2D camera detections as columns of one table; `len()` is their number n.
-
-    `classes` (n,), `confidences` (n,), `boxes` (n, 4: left, top, right, bottom in pixels),
-    `cameras` (n,) index into `Rig.cameras`, `ages` (n,) seconds since the picture was taken and
-    `yaw_changes` (n,) how far the car has turned since.
-    """
+    """2D camera detections as columns of one table; `len()` is their number n."""
 
     classes: Integers
+    """(n,) places in `CLASSES`."""
     confidences: Floats
+    """(n,) from 0 to 1."""
     boxes: Floats
+    """(n, 4) left, top, right, bottom in pixels."""
     cameras: Integers
+    """(n,) places in `Rig.cameras`."""
     ages: Floats
+    """(n,) seconds since the picture was taken."""
     yaw_changes: Floats
+    """(n,) how far the car has turned since, radians."""
 
     COLUMNS = (
         "class", "confidence", "left", "top", "right", "bottom", "camera", "age", "yaw_change",
@@ -115,20 +117,20 @@ class ImageDetections:
 
 @dataclass(frozen=True)
 class Tracks:
-    """Tracked objects as columns of one table; `len()` is their number n.
-
-    The nearest comes first. `ids` (n,), `classes` (n,), `boxes` (n, 7) in the sensor frame and
-    `velocities` (n, 2) over ground. `misses` (n,) are the keyframes since the object was last
-    detected, `hits` (n,) the keyframes at which it was. With fewer than two hits the velocity is
-    not known and reads 0.
-    """
+    """Tracked objects as columns of one table, the nearest first; `len()` is their number n."""
 
     ids: Integers
+    """(n,) 0 or more; no id ever means two objects of an episode."""
     classes: Integers
+    """(n,) places in `CLASSES`."""
     boxes: Floats
+    """(n, 7) in the sensor frame."""
     velocities: Floats
+    """(n, 2) over ground, m/s; 0 for fewer than two hits, since it is not known then."""
     misses: Integers
+    """(n,) keyframes since the object was last detected."""
     hits: Integers
+    """(n,) keyframes at which it was detected."""
 
     COLUMNS = (
         "id", "class", "x", "y", "z", "length", "width", "height", "yaw", "vx", "vy", "misses",
@@ -211,29 +213,29 @@ def _table(*columns: NDArray[np.generic]) -> Floats:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a policy asks of the allocator (Algorithm 1).
-
-    `exploitation` are sets of cells, nearest object first; `layers` are the reserve layers in order
-    of priority, each a sequence of sets of cells.
-    """
+    """What a policy asks of the allocator (Algorithm 1)."""
 
     exploitation: Sequence[Cells] = ()
+    """Sets of cells, that of the nearest object first."""
     layers: Sequence[Sequence[Cells]] = ()
+    """The reserve layers in order of priority, each a sequence of sets of cells."""
 
 
 @dataclass(frozen=True)
 class Scan:
-    """Returns of the fired cells: `cells` (n,) ascending and `ranges` (n,) in metres, inf without
-    return.
-    """
+    """What came back from the fired cells."""
 
     cells: Cells
+    """(n,) the fired ones, ascending."""
     ranges: Floats
+    """(n,) in metres, inf without a return."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """What the controller asks of the car: acceleration in m/s^2 and whether the brake is on."""
+    """What the controller asks of the car."""
 
     acceleration: float
+    """m/s^2, below 0 to slow down."""
     braking: bool
+    """Whether the brake is on; before it acts the acceleration is 0."""

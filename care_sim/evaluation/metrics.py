@@ -8,17 +8,7 @@ from care_sim.loops.records import Keyframe, Outcome
 
 
 def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
-    """The result of an episode.
-
-    `detection_distance_m`: planar distance from the sensor to the centre of the first-sighting
-    actor at the first keyframe it is detected; None if it never is. Such an episode is censored:
-    `undetected_to_m` is then the least distance at which a scan passed it by since it came into
-    view (in the whole episode, if it never did), the most that its detection distance can have
-    been; else None. `braked`: the brake was on at any keyframe. `min_distance_m` (ego centre to
-    actor centre) and `clearance_m` (hull to hull, negative for overlap): the least from the first
-    keyframe the camera has it in view, None if it never comes into view. `impact_speed_mps`: the
-    ego's speed at its first contact with any body, None without `collision`.
-    """
+    """The result of an episode; the fields of `Outcome` say what each number is."""
     # The first detection counts from the first keyframe on, in view or not: LiDAR may find what the
     # camera does not show.
     first = next((record.distance_m for record in keyframes if record.detected), None)

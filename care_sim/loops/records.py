@@ -7,38 +7,64 @@ from care_sim.core.grid import Cells
 
 @dataclass(frozen=True)
 class Keyframe:
-    """The record of one keyframe, from which every metric is computed. Scoring only: it holds
-    truth.
+    """The record of one keyframe of the closed loop, from which every metric is computed.
 
-    `in_view`: the unimpaired camera shows the first-sighting actor; `detected`: the detector
-    reported it. `distance_m`: planar, sensor to its centre, at the scan. The rest holds for the
-    time until the next keyframe: `nearest_m` (centre to centre) and `clearance_m` (hull to hull) at
-    their smallest, `impact_speed_mps` the car's speed at its first contact with any body, else
-    None.
+    Scoring only: it holds truth. The first-sighting actor is the one whom the episode is about.
+    Without one, distances are inf.
     """
 
     index: int
+    """The number of the keyframe, from 0."""
     time_s: float
+    """Of the scan, seconds from the start."""
     fired: Cells
+    """(n,) the cells that were fired, ascending."""
     in_view: bool
+    """Whether the unimpaired camera shows the first-sighting actor at the scan."""
     detected: bool
+    """Whether the detector reported that actor."""
     braking: bool
+    """Whether the brake was on after this scan."""
     speed_mps: float
+    """The car's true speed at the scan."""
     distance_m: float
+    """From the sensor to the actor's centre at the scan, in the plane."""
     nearest_m: float
+    """Least distance from the car's centre to the actor's until the next keyframe."""
     clearance_m: float
+    """Least distance between their hulls until the next keyframe, below 0 where they overlap."""
     impact_speed_mps: float | None
+    """The car's speed at its first contact with any body until the next keyframe, else None."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of an episode; see `care_sim.evaluation.metrics.outcome` for the definitions."""
+    """The result of an episode of the closed loop.
+
+    An episode whose actor is never detected is censored: its detection distance is not known, only
+    the most that it can have been.
+    """
 
     detection_distance_m: float | None
+    """From the sensor to the first-sighting actor's centre, in the plane, at the first keyframe at
+    which it is detected; None if it never is.
+    """
     undetected_to_m: float | None
+    """Of an actor that is never detected, the least distance at which a scan passed it by since it
+    came into view, or in the whole episode if it never did. It is the most that the detection
+    distance can have been. Else None.
+    """
     braked: bool
+    """Whether the brake was on at any keyframe."""
     min_distance_m: float | None
+    """Least distance from the car's centre to the actor's from the first keyframe at which the
+    camera has it in view; None if it never comes into view.
+    """
     clearance_m: float | None
+    """Least distance between their hulls over the same time, below 0 where they overlap."""
     collision: bool
+    """Whether the car touched any body."""
     impact_speed_mps: float | None
+    """The car's speed at its first contact with any body, None without a collision."""
     rays_fired: int
+    """Cells fired in all."""

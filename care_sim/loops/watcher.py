@@ -26,37 +26,45 @@ class TrueSituation:
 
     Truth: for people and scoring, never for a policy.
 
-    `sensor` is the LiDAR in the world. Boxes are those of the world frame: `ego` (7,), `bodies` (n,
-    7) of all actors, with `names` and `labels` (n), an index into `CLASSES` or None; `target` is
-    the row of the first-sighting actor, None without one. `belief` is all that the policy was
-    shown. Of its detections, `known` (k,) says which a forecast explains and `false` (k,) which
-    show nothing; `missed` are those that the camera without its faults would have given besides.
+    Boxes are in the world frame.
     """
 
     time_s: float
+    """Seconds from the start."""
     sensor: Frame
+    """The LiDAR in the world."""
     ego: Floats
+    """(7,) the box of the car."""
     names: tuple[str, ...]
+    """(n,) of all actors."""
     labels: tuple[int | None, ...]
+    """(n,) places in `CLASSES`; None where perception does not report the actor."""
     bodies: Floats
+    """(n, 7) the boxes of all actors."""
     target: int | None
+    """The row of the first-sighting actor, None without one."""
     belief: Belief
+    """All that the policy was shown."""
     known: NDArray[np.bool_]
+    """(k,) which detections of the belief a forecast explains."""
     false: NDArray[np.bool_]
+    """(k,) which of them show nothing."""
     missed: ImageDetections
+    """Those that the camera without its faults would have given besides."""
 
 
 @dataclass(frozen=True)
 class WatchedKeyframe:
-    """A keyframe: the situation before it, `shares` (E, A) of the fired cells (see
-    `care_sim.core.actions`), `ranges` (E, A) of the scan in metres (0 not fired, maximum range no
-    return), and the record for the scoring.
-    """
+    """A keyframe with all that is true about it."""
 
     situation: TrueSituation
+    """How things stood before it."""
     shares: NDArray[np.uint8]
+    """(E, A) the share of the budget of each cell, a place in `care_sim.core.actions.SHARES`."""
     ranges: NDArray[np.float32]
+    """(E, A) the scan in metres: 0 not fired, maximum range without a return."""
     record: Keyframe
+    """For the scoring."""
 
     def returned(self, grid: AngularGrid) -> tuple[Cells, Floats]:
         """The cells (n,) that returned, ascending, and the points (n, 3), sensor frame."""
