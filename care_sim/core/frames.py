@@ -31,20 +31,6 @@ _LOCKED = 1 - 1e-13
 """Sine of a pitch (89.99997 degrees) at which yaw and roll turn about one axis: all of it is told
 as yaw.
 """
-_AROUND = ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
-_CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in _AROUND])
-
-# A corner is joined to the one above it, and to the next and the one before in its own square of
-# four: their numbers there differ by 1 or 3.
-BOX_EDGES = np.array(
-    [(a, b) for b in range(8) for a in range(b) if a + 4 == b or (a // 4 == b // 4 and (b - a) % 2)]
-)
-"""(12, 2) the edges of a box, as pairs of `box_corners`."""
-
-
-def box_corners(boxes: Floats) -> Floats:
-    """(n, 8, 3) corners of boxes (n, 7): four below, then the four above them."""
-    return boxes[:, None, :3] + turned(_CORNERS * boxes[:, None, 3:6], boxes[:, 6:7])
 
 
 @dataclass(frozen=True)

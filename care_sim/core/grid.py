@@ -71,6 +71,13 @@ class AngularGrid:
         return (self.top - self.bottom) / (self.rows - 1)
 
     @cached_property
+    def spacing(self) -> GridSpacing:
+        """What of the grid compiled code is told."""
+        top = float(self.top)
+        height = float(self.row_height)
+        return GridSpacing(self.columns, self.rows, self.column_width, top, height)
+
+    @cached_property
     def fan(self) -> tuple[Floats, Floats]:
         """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of
         every row (rows, 2).
@@ -162,15 +169,8 @@ class AngularGrid:
         self, azimuths: Floats, elevations: Floats, margins: Integers, elevation_margin: int
     ) -> list[Cells]:
         """The cells of every rectangle; see `care_sim.core.grid_kernels.rectangle_cells`."""
-        spacing = self._spacing
-        cells, ends = rectangle_cells(azimuths, elevations, margins, elevation_margin, spacing)
+        cells, ends = rectangle_cells(azimuths, elevations, margins, elevation_margin, self.spacing)
         return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
-
-    @cached_property
-    def _spacing(self) -> GridSpacing:
-        top = float(self.top)
-        height = float(self.row_height)
-        return GridSpacing(self.columns, self.rows, self.column_width, top, height)
 
 
 def cell_indices(cells: Sequence[int] | Cells, name: str = "a set of cells") -> NDArray[np.integer]:

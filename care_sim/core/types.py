@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 
@@ -146,7 +147,7 @@ class Tracks:
     @property
     def ranges(self) -> Floats:
         """(n,) planar distance of the centres from the sensor."""
-        return np.hypot(self.boxes[:, 0], self.boxes[:, 1])
+        return planar_ranges(self.boxes)
 
     @classmethod
     def from_rows(cls, rows: NDArray[np.floating]) -> "Tracks":

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
+from care_sim.core.boxes import half_extents
 from care_sim.core.frames import Floats
 from care_sim.core.types import Command, Ego, Tracks
 
@@ -67,7 +68,7 @@ class BrakingController:
 
     def command(self, tracks: Tracks, ego: Ego) -> Command:
         """Decide from the tracks of this keyframe, in the sensor frame, and the ego's motion."""
-        halves = _half_extents(tracks)
+        halves = half_extents(tracks.boxes)
         counting = self._counting(tracks, *halves)
         if self._braking_s is None:
             gaps = tracks.boxes[:, 0] - halves[0] - self._front_m
@@ -107,11 +108,3 @@ class BrakingController:
         own = speed * rules.reaction_s + speed**2 / (2 * rules.deceleration) + rules.standstill_m
         theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.deceleration)
         return own - theirs
-
-
-def _half_extents(tracks: Tracks) -> tuple[Floats, Floats]:
-    """Half the extent of every box along x and along y."""
-    length, width, yaw = tracks.boxes[:, 3], tracks.boxes[:, 4], tracks.boxes[:, 6]
-    # A turned rectangle reaches so far along each axis: its sides, each projected on the axis.
-    cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
-    return (length * cos + width * sin) / 2, (length * sin + width * cos) / 2

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.belief import Belief
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import Cells
@@ -17,6 +19,7 @@ from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
@@ -25,7 +28,27 @@ from care_sim.world.world import World
 
 
 class ClosedLoop:
-    """A world, the sensors and the car's software over the keyframes of one episode."""
+    """A world, the sensors and the car's software over the keyframes of one episode.
+
+    Its attributes are of the coming keyframe: they change with every call of `keyframe`.
+    """
+
+    index: int
+    """The number of the coming keyframe, from 0."""
+    sensor: Frame
+    """Where the LiDAR is."""
+    belief: Belief
+    """All that a policy may know when it chooses the cells."""
+    picture: Picture
+    """What the camera as it was designed shows. Truth: for scoring and people."""
+    seen: IdentifiedDetections
+    """What the camera as it is mounted shows, before misses, false boxes and delay. Truth: for
+    scoring and people.
+    """
+    detected_bodies: Integers
+    """(n,) the body behind each camera detection of the belief, NO_OBJECT behind a false one.
+    Truth: for scoring and people.
+    """
 
     def __init__(
         self,
@@ -37,11 +60,10 @@ class ClosedLoop:
     ):
         self.world = world
         self.rig = rig
-        labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
+        self._labels = labels = world.labels()
         self._reported = np.array(list(labels), np.int64)
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, seeds.lidar)
-        self._labels = labels
         self._camera = CameraDetector(
             list(labels), sensing, rig.keyframe_s, seeds.camera, rig.cameras, pool
         )
@@ -132,7 +154,6 @@ class ClosedLoop:
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the camera's picture and form the belief on which the next cells are chosen."""
         self.sensor = sensor = Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
-        """Where the LiDAR is now."""
         boxes = self._local_boxes(self._reported)
         (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
         self.picture = self._photograph(nominal, sensor, boxes)
@@ -140,23 +161,15 @@ class ClosedLoop:
         # that is mounted; without an error of the mount one picture serves both.
         taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
         self.seen = faultless_detections([taken], self._labels)
-        """What the camera as it is mounted shows, before misses, false boxes and delay. Truth: for
-        people and scoring.
-        """
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
-        arrived = self._camera.detect(
-            self.seen, sensor.yaw, np.hypot(boxes[:, 0], boxes[:, 1]), self.world.time
-        )
+        arrived = self._camera.detect(self.seen, sensor.yaw, planar_ranges(boxes), self.world.time)
         ego = self._odometry.reading(self.world.ego_motion)
         tracks = self._memory.tracks(sensor)
         self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
         # A rendered box lies in the picture, so the limits leave out none but the last, too many.
         self.detected_bodies = arrived.objects[: len(self.belief.detections)]
-        """(n,) the body behind each camera detection of the belief, NO_OBJECT behind a false one.
-        Truth: for people and scoring.
-        """
 
     def _photograph(self, camera: PinholeCamera, sensor: Frame, boxes: Floats) -> Picture:
         window = window_on(camera, boxes)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.belief import Belief
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
@@ -42,7 +44,15 @@ class OpenLoopKeyframe:
 
 
 class OpenLoop:
-    """A film, the sensors and the car's software over its keyframes."""
+    """A film, the sensors and the car's software over its keyframes.
+
+    Its attributes are of the coming keyframe: they change with every call of `keyframe`.
+    """
+
+    index: int
+    """The number of the coming keyframe, from 0."""
+    belief: Belief
+    """All that a policy may know when it chooses the cells."""
 
     def __init__(
         self,
@@ -143,7 +153,7 @@ class OpenLoop:
         """
         distances = np.zeros(len(self._rows))
         rows = [self._rows[number] for number in shot.annotations.objects.tolist()]
-        distances[rows] = np.hypot(shot.annotations.boxes[:, 0], shot.annotations.boxes[:, 1])
+        distances[rows] = planar_ranges(shot.annotations.boxes)
         return distances
 
     def _range_image(self, fired: Cells, cloud: Cloud) -> NDArray[np.float32]:

@@ -84,9 +84,7 @@ class EpisodeWatcher:
     def __init__(self, loop: ClosedLoop, confidence: float):
         self._loop = loop
         self._confidence = confidence
-        self._labels = {
-            actor.body: actor.label for actor in loop.world.actors if actor.label is not None
-        }
+        self._labels = loop.world.labels()
 
     def situation(self) -> TrueSituation:
         """How things stand before the next keyframe."""

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.belief import Belief
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.envs.open_loop import FilmEnv
@@ -87,7 +88,7 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     """
     cloud = loop.shot.cloud
     annotations = loop.shot.annotations
-    in_range = np.hypot(annotations.boxes[:, 0], annotations.boxes[:, 1]) <= RANGE_M
+    in_range = planar_ranges(annotations.boxes) <= RANGE_M
     tracked = np.isin(annotations.objects, loop.true_objects(loop.belief.tracks))
     wanted = np.isin(cloud.objects, annotations.objects[in_range & ~tracked])
     cells, first = np.unique(cloud.cells[wanted], return_index=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from care_sim.core.boxes import half_extents
 from care_sim.core.frames import Floats, Integers, Pose
 from care_sim.world.bodies import Part, Shape, Triple
 
@@ -38,12 +39,7 @@ class Footprints:
         boxes[:, :2] = poses[:, :2]
         boxes[:, 6] = poses[:, 2]
         self.boxes[bodies] = boxes
-        length, width = boxes[:, 3:5].T
-
-        # A turned rectangle reaches so far along x and y: its sides, each projected on the axis.
-        cos, sin = np.abs(np.cos(poses[:, 2])), np.abs(np.sin(poses[:, 2]))
-        extents = [length * cos + width * sin, length * sin + width * cos]
-        self._halves[bodies] = np.stack(extents, axis=1) / 2
+        self._halves[bodies] = np.stack(half_extents(boxes), axis=1)
 
     def near(self, body: int, within: float) -> Integers:
         """Ids of the other bodies that may be within `within` metres of one. None of those is

@@ -61,17 +61,24 @@ class World:
     World frame: x along the road, y left, z up; the ego starts with its centre at the origin.
     """
 
+    time: float
+    """Seconds from the start."""
+    actors: list[Actor]
+    """All bodies but the ego, in the order in which they were added."""
+    first_sighting: Actor | None
+    """The actor whom the episode is about; its scenario sets it."""
+
     def __init__(self, traffic: Traffic, ego_speed: float):
         self.bullet = BulletWorld()
         self.traffic = traffic
         self.time = 0.0
-        self.actors: list[Actor] = []
+        self.actors = []
         self.ego_kind = CATALOGUE["ego"]
         self.ego = traffic.add_ego(0.0, ego_speed, self.ego_kind)
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
-        self.first_sighting: Actor | None = None
+        self.first_sighting = None
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._ego_motion = Ego(ego_speed)
@@ -112,6 +119,10 @@ class World:
     def ego_motion(self) -> Ego:
         """The car's own motion, as its odometry reports it."""
         return self._ego_motion
+
+    def labels(self) -> dict[int, int]:
+        """The class of every body that perception reports, by body id; an index into `CLASSES`."""
+        return {actor.body: actor.label for actor in self.actors if actor.label is not None}
 
     def boxes(self, actors: Sequence[Actor]) -> Floats:
         """(n, 7) boxes of actors in the world frame."""

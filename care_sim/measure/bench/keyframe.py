@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.frames import Floats, Frame, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.types import Ego, ImageDetections, Tracks
@@ -95,9 +96,7 @@ class StageByStage:
         self._rig = rig = env.rig
         self.world = world = env.loop.world
         self._sensor = env.loop.sensor
-        self._labels = {
-            actor.body: actor.label for actor in world.actors if actor.label is not None
-        }
+        self._labels = world.labels()
         self._bodies = np.array(list(self._labels), np.int64)
         # Sensors without faults draw nothing from their seeds, so that any seeds give the episode.
         camera_seed, lidar_seed = np.random.SeedSequence(0).spawn(2)
@@ -141,7 +140,7 @@ class StageByStage:
         ids = watch("camera", self._engine.body_ids, camera, self._sensor, window)
         picture = watch("camera", Picture.of, ids, window)
         seen = faultless_detections([picture], self._labels)
-        ranges = np.hypot(boxes[:, 0], boxes[:, 1])
+        ranges = planar_ranges(boxes)
         heading = self._sensor.yaw
         arrived = watch("camera", self._camera.detect, seen, heading, ranges, self.world.time)
         return arrived.detections

@@ -3,6 +3,7 @@
 import numpy as np
 
 from care_sim.core.belief import Belief
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.types import Demand
 from care_sim.policies.base import PrivilegedPolicy
 
@@ -20,5 +21,5 @@ class HistoryOracle(PrivilegedPolicy):
         """Hulls of the true boxes, nearest first."""
         boxes = self.truth.boxes(belief.tracks)
         # True places may be in another order than the forecasts were; equal ones keep theirs.
-        nearest_first = np.argsort(np.hypot(boxes[:, 0], boxes[:, 1]), kind="stable")
+        nearest_first = np.argsort(planar_ranges(boxes), kind="stable")
         return Demand(self.rig.hulls(boxes[nearest_first]))

@@ -25,13 +25,7 @@ class Fast:
         self._cells = grid.size
         self._reach = float(grid.range_m)
         self._fan = grid.fan
-        self._spacing = (
-            grid.columns,
-            grid.rows,
-            float(grid.column_width),
-            float(grid.top),
-            float(grid.row_height),
-        )
+        self._spacing = (*grid.spacing,)
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         """Ranges and body ids; see `care_sim.sensors.engines.RayEngine`."""

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from care_sim.core.frames import Floats, box_corners
+from care_sim.core.boxes import box_corners
+from care_sim.core.frames import Floats
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.sensors.annotated import Cloud
