@@ -101,9 +101,11 @@ def watched(address):
 
 
 @pytest.fixture
-def dask_cluster(tmp_path, monkeypatch):
+def dask_cluster(request, tmp_path, monkeypatch):
+    """A cluster that plays a task of a dead worker once more, or as often as the parameter says."""
     pytest.importorskip("dask.distributed")
-    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "1")
+    retries = getattr(request, "param", 1)
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", str(retries))
     started = Cluster(tmp_path)
     try:
         started.wait()
@@ -201,7 +203,9 @@ def installed(site):
     (info / "entry_points.txt").write_text("[care_sim.policies]\ndies = deadly:Dies\n")
 
 
+# Every death costs the start of a worker, three seconds; that a task is retried is tested above.
 @pytest.mark.slow
+@pytest.mark.parametrize("dask_cluster", [0], indirect=True)
 def test_a_policy_that_the_workers_lack_fails_and_one_that_kills_them_does_too(
     dask_cluster, tmp_path, monkeypatch
 ):

@@ -341,7 +341,7 @@ def test_the_page_of_the_papers_study_is_small_and_quick(opened, tmp_path):
     made = write_page(ROOT / "results" / "closed-loop-5", path, 400, 2)
     assert made.watchable == len(made.rows) == 245
     assert path.stat().st_size < MOST_BYTES
-    assert min(opened(path, READY).evaluate("performance.now()") for _ in range(3)) < MOST_MS
+    assert any(opened(path, READY).evaluate("performance.now()") < MOST_MS for _ in range(3))
 
 
 def contrast(one, other):
