@@ -26,13 +26,17 @@ NO_LIMIT_MPS = 2 * SPEED_LIMIT_MPS
 USUAL_EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
 """30 km/h, give or take the 1 km/h by which a driver's speed varies."""
 LANE_WIDTH_M = 3.5
+"""Of a traffic lane (German RASt 06)."""
 PARKING_WIDTH_M = 2.5
-"""Traffic lanes, and parking lanes that lorries may use (German RASt 06)."""
+"""Of a parking lane that lorries may use (RASt 06)."""
 PAVEMENT_WIDTH_M = 2.5
 """Between parking lane and houses (RASt 06)."""
 RIGHT_PARKING_Y = -(LANE_WIDTH_M + PARKING_WIDTH_M) / 2
+"""Middle of the right parking lane of a two-lane street, from the middle of the ego's lane."""
 LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
-"""Middle of the parking lanes of a two-lane street, from the middle of the ego's lane."""
+"""Middle of the left one."""
+FIRST_HOUSE_X = -30.0
+"""Where the houses begin: behind the ego's first position."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,6 @@ def line_with_terraces(world: World, right_y: float, left_y: float) -> None:
     view.
     """
     length, depth, _ = CATALOGUE["terrace"].size
-    # They begin 30 m behind the ego's first position.
-    middle = length / 2 - 30.0
+    middle = length / 2 + FIRST_HOUSE_X
     world.add("terrace right", "terrace", (middle, right_y - depth / 2, 0.0), backdrop=True)
     world.add("terrace left", "terrace", (middle, left_y + depth / 2, 0.0), backdrop=True)

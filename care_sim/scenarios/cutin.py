@@ -19,6 +19,12 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
+RIGHT_FRONT_Y = -LANE_WIDTH_M - 6.0
+LEFT_FRONT_Y = LANE_WIDTH_M + 3.0
+"""The house fronts, from the middle of the ego's lane. Beside the two lanes this leaves pavements
+of 4.25 m on the right, where the stop is, and of 4.75 m on the left.
+"""
+
 
 @dataclass(frozen=True)
 class CutIn(Scenario):
@@ -53,11 +59,13 @@ class CutIn(Scenario):
         world.add("occluder", "bus", stop, reported=self.occluder_reported)
 
         rear_x = stop_x + draw(rng, self.gap_m)
-        driver = traffic.add_parked_driver(rear_x + car.size[0] / 2, -1, car, SPEED_LIMIT_MPS)
+        driver = traffic.add_parked_driver(
+            rear_x + car.size[0] / 2, lane=-1, kind=car, target_speed=SPEED_LIMIT_MPS
+        )
         world.first_sighting = world.add("cutting-in car", "car", driver)
         # When the bumper of an ego that never brakes comes to where the rear of the car stands.
         arrival = (rear_x - world.ego_kind.size[0] / 2) / ego_speed
-        world.at(arrival - draw(rng, self.pull_out_s), lambda: driver.pull_out(0))
+        world.at(arrival - draw(rng, self.pull_out_s), lambda: driver.pull_out(lane=0))
 
-        line_with_terraces(world, -LANE_WIDTH_M - 6.0, LANE_WIDTH_M + 3.0)
+        line_with_terraces(world, RIGHT_FRONT_Y, LEFT_FRONT_Y)
         return world

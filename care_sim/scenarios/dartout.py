@@ -1,4 +1,7 @@
-"""Dart-out: a person runs out from behind a parked trailer into an empty street."""
+"""Dart-out: a person runs out from behind a parked trailer into an empty street.
+
+All its numbers are in `care_sim.scenarios.crossing`.
+"""
 
 from dataclasses import dataclass
 
@@ -13,4 +16,4 @@ class Dartout(CrossingScenario):
     """The street of `CrossingScenario`, with nobody else in it."""
 
     def furnish(self, world: World, crossing_x: float, rng: np.random.Generator) -> None:
-        """Nothing."""
+        """Leave the street empty."""
