@@ -1,5 +1,8 @@
-"""The action of the environments: scores of the cells, which of them fire, and which share of the
-budget each of these came from.
+"""The action of the environments: scores of the cells, which of them fire, and why.
+
+Every action passes `fired_cells`, whatever made it: a policy's demand, a network or a mask. There
+the budget is a hard cap for all of them, and the random floor, line 6 of Algorithm 1, is spent.
+Lines 1 to 5 are `care_sim.core.allocation.allocate`, which a policy calls.
 """
 
 import numpy as np

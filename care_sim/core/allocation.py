@@ -1,7 +1,8 @@
-"""Algorithm 1 of the paper: the shared allocator, and the only place where a budget is enforced.
+"""Algorithm 1 of the paper, the shared allocator, and Eq. 1, the budget in cells.
 
-Exploitation comes first, then the reserve layers, then the shared random floor. Eq. 1, the budget
-in cells, stands here as well.
+Exploitation comes first, then the reserve layers, then the shared random floor. In the environments
+a policy calls `allocate` for lines 1 to 5, without a floor. Line 6, the floor, and the hard cap are
+those of `care_sim.core.actions.fired_cells`, which every action passes, whatever made it.
 """
 
 from collections.abc import Sequence
@@ -9,12 +10,11 @@ from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number, check_whole, is_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.frames import Integers
+from care_sim.core.frames import Integers, Mask
 from care_sim.core.grid import Cells, cell_indices
 from care_sim.core.types import Demand
 
@@ -93,7 +93,8 @@ class RandomFloor:
 
 def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
     """A part of a demand. Raises InvalidInput unless it is a sequence."""
-    if not (given.ndim if isinstance(given, np.ndarray) else isinstance(given, Sequence)):
+    is_sequence = given.ndim if isinstance(given, np.ndarray) else isinstance(given, Sequence)
+    if not is_sequence:
         raise InvalidInput(f"{name} must be {form}, got {shown(given)}")
     sequence: Sequence[Any] = given
     return sequence
@@ -102,20 +103,22 @@ def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
 def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     """Stage after stage, round-robin over its sets, up to its limit in all."""
     # The sets of all stages lie in one array. Compiled code takes it at once, where a list of
-    # arrays would be converted one by one at every call.
+    # arrays would be converted one by one at every call. A stage of the sets [3, 5] and [5, 9] and
+    # a stage of the set [7] are cells [3, 5, 5, 9, 7], set_ends [2, 4, 5] and stage_ends [2, 3].
     sets = [cell_indices(cells) for stage in stages for cells in stage]
     cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
-    ends = np.array([*accumulate(map(len, sets))], np.int64)
-    lowest, highest, ascending = _survey(cells, ends)
+    set_ends = np.array([*accumulate(map(len, sets))], np.int64)
+    stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
+    lowest, highest, ascending = _survey(cells, set_ends)
 
     # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
     if not ascending:
-        cells = np.concatenate([np.sort(part) for part in np.split(cells, ends)])
-    last_sets = np.array([*accumulate(map(len, stages))], np.int64)
-    return _fill_stages(cells, ends, last_sets, np.array(limits, np.int64), lowest, highest)
+        cells = np.concatenate([np.sort(part) for part in np.split(cells, set_ends)])
+    most = np.array(limits, np.int64)
+    return _fill_stages(cells, set_ends, stage_ends, most, lowest, highest)
 
 
 def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
@@ -133,10 +136,10 @@ def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
 
 
 class _Sets(NamedTuple):
-    """Sets of cells: set s still offers `cells[places[s]:ends[s]]`."""
+    """Sets of cells: set s still offers `cells[next_places[s]:ends[s]]`."""
 
     cells: Cells
-    places: Integers
+    next_places: Integers
     ends: Integers
 
 
@@ -146,20 +149,20 @@ class _Selection(NamedTuple):
     """
 
     chosen: Cells
-    taken: NDArray[np.bool_]
+    taken: Mask
     lowest: int
 
 
 @compiled()
-def _survey(cells: Cells, ends: Integers) -> tuple[int, int, bool]:
+def _survey(cells: Cells, set_ends: Integers) -> tuple[int, int, bool]:
     """Lowest (at most 0) and highest (at least 0) of the cells, and whether every set is ascending.
 
-    Sets lie one after the other in `cells`; set s ends at `ends[s]`.
+    Sets lie one after the other in `cells`; set s ends at `set_ends[s]`.
     """
     # One pass over all cells. Policies hand in ascending sets; only others pay for a sort.
     lowest = highest = start = 0
     ascending = True
-    for end in ends:
+    for end in set_ends:
         for n in range(start, end):
             lowest, highest = min(lowest, cells[n]), max(highest, cells[n])
             ascending &= n == start or cells[n - 1] <= cells[n]
@@ -169,62 +172,69 @@ def _survey(cells: Cells, ends: Integers) -> tuple[int, int, bool]:
 
 @compiled()
 def _fill_stages(
-    cells: Cells, ends: Integers, last_sets: Integers, limits: Integers, lowest: int, highest: int
+    cells: Cells,
+    set_ends: Integers,
+    stage_ends: Integers,
+    limits: Integers,
+    lowest: int,
+    highest: int,
 ) -> Cells:
     """The cells taken, in order of selection.
 
     Sets lie as in `_survey`, each ascending. Stages of sets follow each other likewise: stage k
-    ends at set `last_sets[k]` and fills up to `limits[k]` cells in all. No cell is lower than
+    ends at set `stage_ends[k]` and fills up to `limits[k]` cells in all. No cell is lower than
     `lowest` (at most 0) or higher than `highest`.
     """
     # A set offers its cells from its own start, which is where the set before it ends.
-    places = np.empty(len(ends), np.int64)
-    places[:1] = 0
-    places[1:] = ends[:-1]
-    sets = _Sets(cells, places, ends)
+    next_places = np.empty(len(set_ends), np.int64)
+    next_places[:1] = 0
+    next_places[1:] = set_ends[:-1]
+    sets = _Sets(cells, next_places, set_ends)
 
-    # Negative indices are refused later by whoever knows the grid. The table of what is taken must
-    # hold them until then, hence the offset.
+    # The grid is not known here: `care_sim.policies.base.Policy` refuses cells below 0 or beyond
+    # the grid afterwards. The table of what is taken must hold them until then, hence the offset.
     taken = np.zeros(highest - lowest + 1, np.bool_)
     chosen = np.empty(max(0, min(limits.max(), len(cells))), np.int64)
     selection = _Selection(chosen, taken, lowest)
 
     # A stage goes on where the one before it stopped, with the same cells taken.
-    count = first = 0
-    for stage, last in enumerate(last_sets):
-        count = _round_robin(sets, np.arange(first, last), selection, count, limits[stage])
-        first = last
+    count = first_set = 0
+    for stage, end in enumerate(stage_ends):
+        open_sets = np.arange(first_set, end)
+        count = _round_robin(sets, open_sets, selection, count, limits[stage])
+        first_set = end
     return chosen[:count]
 
 
 @compiled()
 def _round_robin(
-    sets: _Sets, waiting: Integers, selection: _Selection, count: int, limit: int
+    sets: _Sets, open_sets: Integers, selection: _Selection, count: int, limit: int
 ) -> int:
     """Take one cell per set and round, until `limit` cells are chosen or all sets have run dry.
 
-    `waiting` are the numbers of the sets; `count` cells are chosen before. Returns how many are
-    chosen afterwards.
+    `open_sets` are the numbers of the sets, and are overwritten; `count` cells are chosen before.
+    Returns how many are chosen afterwards.
     """
-    # The first `left` of `waiting` are the sets that still have cells. Each pass of the loop is one
-    # round: one cell of every such set, in their order.
-    left = len(waiting)
-    while left and count < limit:
-        going = 0
-        for one in waiting[:left]:
+    # The first `open_count` of `open_sets` still have cells. Each pass of the loop is one round:
+    # one cell of every such set, in their order.
+    open_count = len(open_sets)
+    while open_count and count < limit:
+        served = 0
+        for number in open_sets[:open_count]:
             # Cells that are already taken are passed over, and cost the set no turn.
-            place = sets.places[one]
-            while place < sets.ends[one] and selection.taken[sets.cells[place] - selection.lowest]:
+            place = sets.next_places[number]
+            end = sets.ends[number]
+            while place < end and selection.taken[sets.cells[place] - selection.lowest]:
                 place += 1
-            sets.places[one] = place + 1
+            sets.next_places[number] = place + 1
 
-            # A set that gave a cell waits for the next round, in the same order. Writing it back
-            # into `waiting` is safe: `going` never overtakes the place that is being read.
-            if place < sets.ends[one] and count < limit:
+            # A set that gave a cell is open in the next round, in the same order. Writing it back
+            # into `open_sets` is safe: `served` never overtakes the place that is being read.
+            if place < end and count < limit:
                 selection.taken[sets.cells[place] - selection.lowest] = True
                 selection.chosen[count] = sets.cells[place]
                 count += 1
-                waiting[going] = one
-                going += 1
-        left = going
+                open_sets[served] = number
+                served += 1
+        open_count = served
     return count

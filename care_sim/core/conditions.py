@@ -111,7 +111,7 @@ class Sensing(CameraFaults, LidarFaults):
     """Fired rays that must hit an object for it to be detected."""
     camera_confidence: float = bounded(CAMERA_CONFIDENCE, 0, 1)
     """Least confidence of a camera detection, 0 to 1; visible pixels decide, and the least box has
-    0.25.
+    0.25 (`care_sim.sensors.confidence`).
     """
 
     def __post_init__(self) -> None:

@@ -31,13 +31,14 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[np.bool_]:
-    """(n,) whether a same-class forecast centre projects into each image box (Eq. 2)."""
+    """(n,) whether a forecast explains each image box; see `explaining_tracks`."""
     return explaining_tracks(detections, tracks, rig) >= 0
 
 
 def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Integers:
-    """(n,) the row of the first forecast that explains each image box (Eq. 2), -1 without one.
+    """(n,) the row of the first forecast that explains each image box, -1 without one.
 
+    A forecast explains a box of its class in which its centre appears (Eq. 2, `_first_explaining`).
     Matching uses the full forecasts, never hulls that forgetting has shrunk. Raises IndexError for
     a detection of a camera that the rig does not have.
     """
@@ -85,7 +86,8 @@ def _first_explaining(
     labels: Integers,
     models: CameraModels,
 ) -> Integers:
-    """(n,) the row of the first forecast that explains each detection (Eq. 2), -1 without one.
+    """Eq. 2: (n,) the row of the first forecast of the class of each detection whose centre lies in
+    its image box, -1 without one.
 
     Detections are image `boxes` (n, 4) with their `classes`, `cameras` and `yaw_changes` since
     their pictures. Forecasts are `centres` (m, 3) with their classes, `labels`.
