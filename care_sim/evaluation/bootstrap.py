@@ -2,6 +2,11 @@
 
 Episodes differ far more among each other than two policies do in one of them. In the difference of
 a pair that drops out. So pairs are resampled, never each policy by itself.
+
+`paired_difference` gives the intervals of the closed loop, over episodes, by way of
+`care_sim.evaluation.censoring`. `ratio_of_sums` gives the main intervals of the open-loop protocol,
+over scenes, in which every event weighs alike (`care_sim.evaluation.scene_contrasts`); beside them
+`paired_difference` gives those in which every scene does, and those over events.
 """
 
 from collections.abc import Sequence
@@ -47,11 +52,12 @@ def paired_difference(
     """
     a = np.atleast_1d(np.asarray(ours, float))
     b = np.atleast_1d(np.asarray(theirs, float))
-    differences = _differences(a, b)
+    _check_pairs(a, b)
+    differences = a - b
 
     # Equal differences have equal resamples, and nothing is to be drawn. Subtraction leaves an
-    # error of the last bits of the samples, hence a tolerance relative to their size.
-    if np.ptp(differences) <= 1e-12 * max(1.0, float(np.abs(a).max())):
+    # error of the last bits of the samples, so it is their size that counts.
+    if _are_equal(differences, like=a):
         mean = float(differences.mean())
         return Interval(mean, mean, mean)
     return _resampled(tuple(differences.tolist()), confidence, resamples, seed)
@@ -82,7 +88,8 @@ def ratio_of_sums(
     value = _difference_of_ratios(groups, [np.arange(len(numerators)) for numerators, _ in groups])
 
     # Where all scenes of a group have one ratio, every resample of it has that ratio, too.
-    if all(_constant(*sums) for sums in groups):
+    ratios = [numerators / denominators for numerators, denominators in groups]
+    if all(_are_equal(each, like=each) for each in ratios):
         return Interval(float(value), float(value), float(value))
     if any(len(numerators) < 2 for numerators, _ in groups):
         raise InvalidInput("a group of scenes to be drawn from must have at least two")
@@ -113,10 +120,9 @@ def _difference_of_ratios(
     return np.asarray(first - sum(second))
 
 
-def _constant(numerators: Floats, denominators: Floats) -> bool:
-    ratios = numerators / denominators
-    # Equal but for the last bits of their division.
-    return bool(np.ptp(ratios) <= 1e-12 * max(1.0, float(np.abs(ratios).max())))
+def _are_equal(values: Floats, like: Floats) -> bool:
+    """Whether all values are one number but for the last bits of numbers as large as `like`."""
+    return bool(np.ptp(values) <= 1e-12 * max(1.0, float(np.abs(like).max())))
 
 
 def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Floats]:
@@ -148,11 +154,6 @@ def _resampled(
     )
     low, high = result.confidence_interval
     return Interval(float(np.mean(differences)), float(low), float(high))
-
-
-def _differences(ours: Floats, theirs: Floats) -> Floats:
-    _check_pairs(ours, theirs)
-    return ours - theirs
 
 
 def _check_pairs(ours: Floats, theirs: Floats) -> None:

@@ -1,10 +1,17 @@
 """Detection distances of actors that were never detected: censored, no zeros, and not dropped.
 
-All that is known of such a distance is that it is at most that of the nearest scan that passed the
-actor by, and not below 0. In medians and quartiles it ranks below every detection, and nothing is
-interpolated with it. In a paired difference it enters at that most, the reading that favours the
-policy that missed; the difference is then a bound on the true one, and says so. A difference is
-claimed only when it holds wherever in its range each censored distance lies.
+All that is known of such a distance is that it lies between 0 and that of the nearest scan that
+passed the actor by. In medians and quartiles it ranks below every detection, and nothing is
+interpolated with it.
+
+In a paired difference it enters at the upper end of its range, the reading that favours the policy
+that missed. The difference is then a bound on the true one, and says so. It is claimed only when it
+holds wherever in its range each censored distance lies. An example with one episode: ours detects
+at 15 m, theirs never, and the nearest scan of theirs passed at 4 m. Theirs lies between 0 and 4 m,
+so the true difference between 11 and 15 m. It is printed as "≥ 11 m". The cautious reading asks for
+the range's end that speaks most against us: theirs at 4 m, 11 m again, which is above 0. Had ours
+missed instead, at 4 m, against 15 m of theirs, the difference would lie between -15 and -11 m:
+"≤ -11 m".
 """
 
 from collections.abc import Sequence
@@ -97,11 +104,22 @@ def difference(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Difference
     interval = paired_difference(_most(ours), _most(theirs))
     # What speaks most against a difference: ours as small as may be where ours seems larger.
     against = (_least(ours), _most(theirs)) if interval.mean > 0 else (_most(ours), _least(theirs))
-    missed = any(reading.censored for reading in ours), any(reading.censored for reading in theirs)
-    bounds = {(True, False): Bound.AT_MOST, (False, True): Bound.AT_LEAST, (True, True): Bound.OPEN}
-    return Difference(
-        interval, bounds.get(missed, Bound.EXACT), len(ours), paired_difference(*against)
-    )
+    cautious = paired_difference(*against)
+    return Difference(interval, _bound(ours, theirs), len(ours), cautious)
+
+
+def _bound(ours: Sequence[Reading], theirs: Sequence[Reading]) -> Bound:
+    """How the mean of `ours - theirs`, each censored value at its most, bounds the true mean."""
+    # The true value of a censored one is at most that. Where only ours has some, the true
+    # difference is smaller or equal; where only theirs has some, larger or equal; where both have
+    # some, either.
+    ours_missed = any(reading.censored for reading in ours)
+    theirs_missed = any(reading.censored for reading in theirs)
+    if ours_missed and theirs_missed:
+        return Bound.OPEN
+    if ours_missed:
+        return Bound.AT_MOST
+    return Bound.AT_LEAST if theirs_missed else Bound.EXACT
 
 
 def _most(readings: Sequence[Reading]) -> list[float]:
