@@ -100,9 +100,13 @@ def _end(*_: object) -> None:
 
 def _raise(number: int, frame: FrameType | None) -> None:
     # An import may catch what is raised within it and raise an error of its own. So an interrupt
-    # waits for its end, asking by the alarm; a second one typed meanwhile is not put off.
-    again = number != signal.SIGALRM and signal.getitimer(signal.ITIMER_REAL)[0] > 0
-    if _imports(frame) and not again:
+    # that falls into one is put off: an alarm calls this handler again, until the import has ended.
+    # While an alarm is set one interrupt is put off already, and a second one, typed meanwhile, is
+    # raised at once.
+    is_alarm = number == signal.SIGALRM
+    one_waits = signal.getitimer(signal.ITIMER_REAL)[0] > 0
+    is_second = one_waits and not is_alarm
+    if _imports(frame) and not is_second:
         signal.setitimer(signal.ITIMER_REAL, SOON_S)
     else:
         raise KeyboardInterrupt

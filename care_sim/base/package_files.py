@@ -38,9 +38,12 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
     project = _project(entry)
     first = entry.module.partition(".")[0]
 
-    # The list of tops grows while it is gone through: code of the project imports more of it.
-    tops = [first]
-    for top in tops:
+    # A worklist of packages and modules: code of the project may import more of the project, which
+    # is then looked into as well, each once.
+    known = [first]
+    waiting = [first]
+    while waiting:
+        top = waiting.pop(0)
         roots = _roots(top)
         if top == first and not roots:
             return None
@@ -48,7 +51,9 @@ def shipped_files(entry: EntryPoint) -> dict[str, Path] | None:
             new = _files_at(root, beside=top == first and root.name not in files)
             files |= new
             if project:
-                tops += _further_tops(new.values(), project, tops)
+                further = _further_tops(new.values(), project, known)
+                known += further
+                waiting += further
 
     site = Path(str(entry.dist.locate_file(""))) if entry.dist else None
     return {

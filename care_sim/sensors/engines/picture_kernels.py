@@ -179,23 +179,28 @@ def _rows(corners: Floats, body: BodyInCamera, lens: Lens, nearest: float) -> tu
 
 @compiled(error_model="numpy")
 def _planes(faces: Floats, body: BodyInCamera, lens: Lens) -> Floats:
-    """(f, 4) what is added per column and per row to the inverse depth of each face, what that is
-    at pixel (0, 0), and the distance of the face before the camera, negative where it is turned
-    towards it.
+    """(f, 4) the inverse depth of each face over the picture, and where the face is.
+
+    Column 0 is by how much the inverse depth grows per column of the picture, column 1 per row,
+    column 2 what it is at pixel (0, 0). Column 3 is the distance of the plane from the camera along
+    its outward normal: negative for a face that is turned towards the camera.
     """
     turn = body.turn
     shift = body.shift
     planes = np.empty((len(faces), 4))
     for n, face in enumerate(faces):
-        # The plane n . p = d of the body is n' . q = d + n' . shift for q = turn . p + shift, with
-        # the normal n' = turn . n: the parts ahead, left and up.
+        # A point p of the body is q = turn . p + shift in the camera's frame. The plane n . p = d
+        # of the body becomes n' . q = h there, with the normal n' = turn . n, here its parts
+        # (ahead, left, up), and h = d + n' . shift, here `offset`.
         ahead = dot(turn[0], face)
         left = dot(turn[1], face)
         up = dot(turn[2], face)
         offset = face[3] + ahead * shift[0] + left * shift[1] + up * shift[2]
 
-        # The ray of pixel (u, v) is (1, (across - u) / focal, (down - v) / focal). It meets the
-        # plane at the inverse depth (n' . ray) / offset: so much per column, per row, and the rest.
+        # The ray of pixel (u, v) at the depth z is q = z * (1, (across - u) / focal,
+        # (down - v) / focal). Put into n' . q = h and solved for 1 / z:
+        #     1 / z = (ahead + left * (across - u) / focal + up * (down - v) / focal) / h.
+        # What stands with u, what stands with v, and the rest:
         planes[n, 0] = -left / lens.focal / offset
         planes[n, 1] = -up / lens.focal / offset
         planes[n, 2] = (ahead + (left * lens.across + up * lens.down) / lens.focal) / offset
@@ -205,11 +210,14 @@ def _planes(faces: Floats, body: BodyInCamera, lens: Lens) -> Floats:
 
 @compiled()
 def _outline(planes: Floats, edges: Integers) -> tuple[Floats, Floats]:
-    """The planes that are turned towards the camera, and the outline: lines (m, 3) that are
-    positive inside.
+    """The rows of `planes` that are turned towards the camera, and the outline of the body.
+
+    The outline is lines (m, 3): per column, per row, and at pixel (0, 0), a number that is positive
+    inside, 0 on the line and negative outside.
     """
-    # Along an edge its two faces have one inverse depth, so their difference is 0 there, and inside
-    # the face towards the camera has the smaller one.
+    # An edge is on the outline where one of its two faces is turned towards the camera (distance
+    # below 0) and the other is not. Along the edge both have one inverse depth, so that their
+    # difference is 0 there; inside, the face towards the camera has the smaller one.
     lines = np.empty((len(edges), 3))
     count = 0
     for one, other in edges:
