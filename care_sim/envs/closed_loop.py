@@ -128,13 +128,24 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         conditions, physics = split_conditions(parameters)
         check_engine(conditions.engine)
         super().__init__(
-            conditions, (FRONT_CAMERA,), LIDAR_POSITION[2], budget, keyframe_s, secret, scoring_info
+            conditions,
+            cameras=(FRONT_CAMERA,),
+            sensor_height_m=LIDAR_POSITION[2],
+            budget=budget,
+            keyframe_s=keyframe_s,
+            secret=secret,
+            scoring_info=scoring_info,
         )
         self.scenario = make_scenario(self.scenario_name, **physics)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
         self._weights = rewards.weights(reward_weights)
+        # Of the running episode: whether the first-sighting actor was ever in view or detected,
+        # and what was lost of the full-scan bound.
+        self._in_view = False
+        self._detected = False
+        self._potential = rewards.Potential()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -144,29 +155,30 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         `info` holds the seed that repeats the episode, unless `scoring_info` is off. There are no
         `options`.
         """
-        super().reset(seed=seed)
-        entropy = self.entropy(seed)
-        scenario, camera, lidar, floor, odometry = self.streams(entropy, count=5)
+        self._reseed(seed)
+        entropy = self._draw_entropy(seed)
+        scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
         seeds = SensorSeeds(camera, lidar, odometry)
         self.close()
         pool = self._pool(entropy)
         world = self.scenario.build(np.random.default_rng(scenario))
-        self._in_view = self._detected = False
+        self._in_view = False
+        self._detected = False
         self._potential = rewards.Potential()
         self.keyframes = []
         loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool)
-        return self.begin(loop, floor), self.told({}, {"seed": entropy})
+        return self._begin(loop, floor), self._info_of({}, {"seed": entropy})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as
-        `chosen` does.
+        """Fire the cells that `action` scores highest and go on to the next keyframe.
+
+        Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
+        gymnasium.error.ResetNeeded before `reset` and after the end.
         """
         loop = self.loop
-        fired = self.chosen(action)
-        # A scan of every cell costs rays, so it is cast only while the term counts and is unknown.
-        # It is cast before the keyframe, which moves the world on.
-        measured = bool(self._weights["gain"]) and self._potential.bound_m is None
-        detectable = measured and loop.detectable()
+        fired = self._choose_cells(action)
+        # Asked before the keyframe, which moves the world on.
+        detectable = self._detectable()
         record = loop.keyframe(fired)
         self.keyframes.append(record)
         terminated = record.impact_speed_mps is not None
@@ -198,12 +210,21 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         if not self.conditions.false_positive_rate:
             return EMPTY_POOL
         # The first five are those of `reset`, however many are asked for.
-        _, camera, lidar, _, odometry, another = self.streams(entropy, count=6)
+        _, camera, lidar, _, odometry, another = self._streams(entropy, count=6)
         seeds = SensorSeeds(camera, lidar, odometry)
         world = self.scenario.build(np.random.default_rng(another))
         return pool_of_another_drive(
             world, self.scenario.duration_s, self.rig, self.conditions, seeds
         )
+
+    def _detectable(self) -> bool:
+        """Whether a scan of every cell would detect the first-sighting actor now.
+
+        The scan costs rays, so it is cast only while the reward's bound is needed and not yet
+        known; otherwise the answer is False.
+        """
+        needed = bool(self._weights["gain"]) and self._potential.bound_m is None
+        return needed and self.loop.detectable()
 
     def _terms(self, record: Keyframe, detectable: bool) -> dict[str, float]:
         self._in_view |= record.in_view
@@ -217,7 +238,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
 
     def _info(self, record: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         own = {
-            "fired": self.reported(record.fired),
+            "fired": self._fired_as_info(record.fired),
             "braking": record.braking,
             "time_s": record.time_s,
         }
@@ -228,4 +249,4 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             "speed_mps": record.speed_mps,
             "reward_terms": terms,
         }
-        return self.told(own, scoring)
+        return self._info_of(own, scoring)

@@ -99,7 +99,13 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
                 f"min_returns is of the detector {PROXY}, {detector} does not know it"
             )
         super().__init__(
-            conditions, cameras, sensor_height_m, budget, keyframe_s, secret, scoring_info
+            conditions,
+            cameras=cameras,
+            sensor_height_m=sensor_height_m,
+            budget=budget,
+            keyframe_s=keyframe_s,
+            secret=secret,
+            scoring_info=scoring_info,
         )
         # The proxy has a threshold that is a condition; other detectors have parameters of their
         # own.
@@ -122,25 +128,27 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         """What was found of the scene; complete once the episode is over."""
         return SceneScore.of(self._sightings, self._masks)
 
-    def start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
+    def _start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode over a film. Camera faults, noise and floor have independent streams,
         which the scene's name and the seed decide.
         """
         # By name: recorded scenes are all played with one seed, and should not share their faults.
-        camera, lidar, floor, odometry = self.streams(seed, crc32(film.name.encode()), count=4)
+        camera, lidar, floor, odometry = self._streams(seed, crc32(film.name.encode()), count=4)
         self._sightings = _sightings(film, self.presence)
         self.keyframes = []
         self._masks = []
         seeds = SensorSeeds(camera, lidar, odometry)
         loop = OpenLoop(film, self.rig, self.conditions, seeds, self._detector)
-        return self.begin(loop, floor), self.told({}, {"seed": seed, "scene": film.name})
+        return self._begin(loop, floor), self._info_of({}, {"seed": seed, "scene": film.name})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Fire the cells that `action` scores highest and go on to the next keyframe; raises as
-        `chosen` does.
+        """Fire the cells that `action` scores highest and go on to the next keyframe.
+
+        Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
+        gymnasium.error.ResetNeeded before `reset` and after the end.
         """
         loop = self.loop
-        fired = self.chosen(action)
+        fired = self._choose_cells(action)
         shot = loop.shot
         record = loop.keyframe(fired)
         found = matching.found_objects(shot.annotations, record.detections)
@@ -148,8 +156,8 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         self._masks.append(found)
         scored = found[self._sightings.scored(record.index)]
         self._over = loop.over
-        own = {"fired": self.reported(fired), "time_s": shot.time_s}
-        info = self.told(own, {"objects": len(scored), "found": int(scored.sum())})
+        own = {"fired": self._fired_as_info(fired), "time_s": shot.time_s}
+        info = self._info_of(own, {"objects": len(scored), "found": int(scored.sum())})
         if self._over:
             info["outcome"] = asdict(self.score.tally())
         # A keyframe without annotated objects misses none of them.
@@ -184,8 +192,8 @@ class FilmEnv(OpenLoopEnv):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin the scene anew. `info` holds what repeats the episode; there are no `options`."""
-        super().reset(seed=seed)
-        return self.start(self.film, self.entropy(seed))
+        self._reseed(seed)
+        return self._start(self.film, self._draw_entropy(seed))
 
 
 def check_film_arguments(kind: type[OpenLoopEnv], parameters: Collection[str]) -> None:

@@ -33,9 +33,9 @@ class StreetEnv(OpenLoopEnv):
         """Begin an episode in the street of a seed. `info` holds what repeats it; there are no
         `options`.
         """
-        super().reset(seed=seed)
-        entropy = self.entropy(seed)
-        return self.start(street_film(entropy, self._secret), entropy)
+        self._reseed(seed)
+        entropy = self._draw_entropy(seed)
+        return self._start(street_film(entropy, self._secret), entropy)
 
 
 class ReplayEnv(FilmEnv):

@@ -27,8 +27,6 @@ from care_sim.loops.truth import EpisodeTruth, Loop, Truth
 from care_sim.sensors.lidar_faults import check_rows
 
 Observed = dict[str, NDArray[np.float32]]
-
-
 AnyLoop = TypeVar("AnyLoop", bound=Loop)
 
 
@@ -63,14 +61,14 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""
         self.rig = Rig(
-            grid,
-            cameras,
-            budget_cells(budget, grid.size),
-            conditions.reserve_fraction,
-            keyframe_s,
-            conditions.azimuth_margin,
-            conditions.elevation_margin,
-            sensor_height_m,
+            grid=grid,
+            cameras=cameras,
+            budget=budget_cells(budget, grid.size),
+            reserve_fraction=conditions.reserve_fraction,
+            keyframe_s=keyframe_s,
+            azimuth_margin=conditions.azimuth_margin,
+            elevation_margin=conditions.elevation_margin,
+            sensor_height_m=sensor_height_m,
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
@@ -89,29 +87,33 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
         return EpisodeTruth(lambda: self.loop)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Begin the environment's own generator anew if a seed is given. Raises InvalidInput unless
-        it is a whole number from 0 to 2^63 - 1.
+    def _reseed(self, seed: int | None) -> None:
+        """Begin the environment's own generator anew if a seed is given.
+
+        Raises InvalidInput unless it is a whole number from 0 to 2^63 - 1.
         """
         if seed is not None:
             check_seed(seed)
             super().reset(seed=int(seed))
 
-    def entropy(self, seed: int | None) -> int:
+    def _draw_entropy(self, seed: int | None) -> int:
         """The seed of an episode: the given one, or else a draw of the own generator."""
         return int(seed) if seed is not None else int(self.np_random.integers(2**32))
 
-    def streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
-        """`count` independent streams of an episode; see `care_sim.base.random_streams`."""
+    def _streams(self, *entropy: int, count: int) -> list[np.random.SeedSequence]:
+        """`count` independent streams of an episode; see `care_sim.base.random_streams`.
+
+        No policy enters the seed, so all meet the same world, faults and floor.
+        """
         return streams(entropy, count, self._secret)
 
-    def told(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
+    def _info_of(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
         """`info`: what the car itself knows and, unless `scoring_info` is off, what only the
         scoring may know.
         """
         return own | scoring if self.scoring_info else own
 
-    def begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
+    def _begin(self, loop: AnyLoop, floor: np.random.SeedSequence) -> Observed:
         """Start an episode over a loop and a floor; its first observation."""
         self._running = loop
         self._over = False
@@ -127,8 +129,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """What the environment itself observes, without wrappers. Raises as `loop` does."""
         return Belief.from_observation(self.observed())
 
-    def chosen(self, action: Action) -> Cells:
-        """The cells that `action` fires at the coming keyframe.
+    def _choose_cells(self, action: Action) -> Cells:
+        """Take an action: the cells that it fires at the coming keyframe.
 
         Raises InvalidInput for an action of the wrong shape or with values that are not finite, and
         gymnasium.error.ResetNeeded before `reset` and after the end.
@@ -141,9 +143,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         floor = self._floor.next()
         return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
 
-    def reported(self, fired: Cells) -> Cells | list[int]:
-        """The fired cells as `info` holds them, a copy: without the floor a list, since Gymnasium's
-        vector environments stack arrays of one length.
+    def _fired_as_info(self, fired: Cells) -> Cells | list[int]:
+        """The fired cells as `info` holds them, a copy.
+
+        Without the floor it is a list, since Gymnasium's vector environments stack arrays of one
+        length.
         """
         return fired.copy() if self.conditions.floor else fired.tolist()
 
@@ -168,6 +172,7 @@ def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
         if issubclass(one, SensingEnv) and "__init__" in vars(one)
     ]
     named = [each for make in made for each in inspect.signature(make).parameters.values()]
+    # Positional ones are what a class of the family fills in for its base: cameras, keyframes.
     own = [each.name for each in named if each.kind is each.KEYWORD_ONLY]
     return [*dict.fromkeys([*own, *Conditions.__dataclass_fields__])]
 
