@@ -11,6 +11,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.base.checks import check_path
 from care_sim.base.errors import InvalidInput
@@ -18,6 +19,7 @@ from care_sim.base.extras import import_open3d
 from care_sim.base.files import replacing, why_unwritable, write_text
 from care_sim.core.actions import SHARES
 from care_sim.core.frames import Floats
+from care_sim.core.grid import Cells
 from care_sim.core.types import CLASSES, Action
 from care_sim.envs.wrappers.watching import Watching, numbered
 from care_sim.loops.closed_loop import ClosedLoop
@@ -26,13 +28,10 @@ from care_sim.policies.base import Policy
 
 _UNITS_NOTE = (
     "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x "
-    "along the road, y "
-    "left, z up. Sensor frame, that of points and tracks: x forward, y left, z up; "
-    "sensor_in_world is its origin, "
-    "then yaw, pitch and roll, turned about z, then y, then x. Cells: row * columns + column; "
-    "row 0 is the highest, "
-    "column 0 straight behind, then to the right, ahead, left. Ego and bodies are truth, in the "
-    "world frame."
+    "along the road, y left, z up. Sensor frame, that of points and tracks: x forward, y left, "
+    "z up; sensor_in_world is its origin, then yaw, pitch and roll, turned about z, then y, then "
+    "x. Cells: row * columns + column; row 0 is the highest, column 0 straight behind, then to the "
+    "right, ahead, left. Ego and bodies are truth, in the world frame."
 )
 POINT_BYTES = 4 * 3 + 4 + 1
 """Bytes per point of a cloud: three coordinates, cell and share."""
@@ -60,6 +59,15 @@ class ExportScans(Watching):
     that acts, as for `RecordRerun`. Raises `care_sim.MissingExtra` without the extra `open3d`,
     `care_sim.InvalidInput` for an environment that is no closed loop of CARE-Sim and for a folder
     that holds scans already, OSError where nothing can be written.
+
+    ### Example
+    ```python
+    env = gymnasium.make("CARE-Dartout-v0")
+    policy = care_sim.make_policy("history", env)
+    with ExportScans(env, "scans", policy=policy) as env:
+        observation, info = env.reset(seed=0)
+        env.step(policy(observation))  # and so on, until terminated or truncated
+    ```
     """
 
     def __init__(
@@ -104,7 +112,9 @@ class ExportScans(Watching):
         }
         write_text(self._folder / "episode.json", json.dumps(content, indent=1) + "\n")
 
-    def _write_cloud(self, file: Path, points: Floats, cells: Any, shares: Any) -> None:
+    def _write_cloud(
+        self, file: Path, points: Floats, cells: Cells, shares: NDArray[np.uint8]
+    ) -> None:
         tensor = self._open3d.core.Tensor
         cloud = self._open3d.t.geometry.PointCloud(tensor(points.astype(np.float32)))
         cloud.point["cell"] = tensor(cells.astype(np.int32)[:, None])
@@ -120,14 +130,14 @@ class ExportScans(Watching):
 def described(watched: WatchedKeyframe) -> dict[str, Any]:
     """What stood around a scan, as plain data; see `ExportScans`."""
     situation = watched.situation
-    frame = watched.record
+    record = watched.record
     sensor = situation.sensor
     tracks = situation.belief.tracks
     classes = [None if label is None else CLASSES[label] for label in situation.labels]
     columns = zip(tracks.ids, tracks.classes, tracks.boxes, tracks.velocities, strict=True)
     return {
-        "keyframe": frame.index,
-        "time_s": frame.time_s,
+        "keyframe": record.index,
+        "time_s": record.time_s,
         "sensor_in_world": [sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.pitch, sensor.roll],
         "ego": situation.ego.tolist(),
         "bodies": [
@@ -143,8 +153,8 @@ def described(watched: WatchedKeyframe) -> dict[str, Any]:
             }
             for number, label, box, velocity in columns
         ],
-        "fired": frame.fired.tolist(),
-        "detected": frame.detected,
-        "braking": frame.braking,
-        "speed_mps": frame.speed_mps,
+        "fired": record.fired.tolist(),
+        "detected": record.detected,
+        "braking": record.braking,
+        "speed_mps": record.speed_mps,
     }

@@ -54,6 +54,15 @@ class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], Record
     Raises `care_sim.InvalidInput` for blocks that do not divide the grid, for an environment that
     is none of CARE-Sim or that shows another form of observation, and for an observation that no
     sensor can give.
+
+    ### Example
+    ```python
+    env = GridObservation(SectorReserve(gymnasium.make("CARE-Dense-v0", budget=0.03)))
+    observation, info = env.reset(seed=0)
+    pictures = observation["grid"].reshape(env.features.shape)  # (6, 8, 64)
+    forecasts = pictures[0]  # row 0 highest, column 0 straight behind
+    observation["ego"]  # (4,) the car's own motion and the budget
+    ```
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], columns: int = 64, rows: int = 8):

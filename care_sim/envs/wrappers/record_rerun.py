@@ -60,6 +60,15 @@ class RecordRerun(Watching):
     Raises `care_sim.MissingExtra` without the extra `viewer`, `care_sim.InvalidInput` for an
     environment that is no closed loop of CARE-Sim and for a file that is a folder or is being
     written already, OSError where it cannot be written.
+
+    ### Example
+    ```python
+    env = gymnasium.make("CARE-Dartout-v0")
+    policy = care_sim.make_policy("history", env)
+    with RecordRerun(env, "out.rrd", policy=policy) as env:
+        observation, info = env.reset(seed=0)
+        env.step(policy(observation))  # and so on, until terminated or truncated
+    ```
     """
 
     def __init__(

@@ -66,6 +66,15 @@ class SectorReserve(_Sectors):
     Raises `care_sim.InvalidInput` for other numbers, for an action of another shape or with values
     that are not finite, for an environment that is none of CARE-Sim or whose observation no longer
     tells the forecasts.
+
+    ### Example
+    ```python
+    env = SectorReserve(gymnasium.make("CARE-Dense-v0", budget=0.03))
+    observation, info = env.reset(seed=0)
+    scores = np.zeros(env.action_space.shape, np.float32)
+    scores[1, 16] = 1.0  # one sector: just left of ahead, from level to 9 degrees down
+    observation, reward, terminated, truncated, info = env.step(scores)
+    ```
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], azimuths: int = 32, elevations: int = 4):
@@ -121,6 +130,15 @@ class SectorScores(_Sectors):
 
     ### Arguments
     As of `SectorReserve`.
+
+    ### Example
+    ```python
+    env = SectorScores(gymnasium.make("CARE-Dense-v0", budget=0.03), azimuths=16, elevations=2)
+    env.reset(seed=0)
+    scores = env.action_space.sample()  # (2, 16), one score per sector
+    observation, reward, terminated, truncated, info = env.step(scores)
+    info["fired"]  # the 492 cells that were fired
+    ```
     """
 
     def action(self, action: NDArray[np.float32]) -> Action:

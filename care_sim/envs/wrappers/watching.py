@@ -41,6 +41,23 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         self._begun = False
         self._episodes = 0
 
+    @abstractmethod
+    def begin(self, loop: ClosedLoop, episode: int) -> None:
+        """An episode begins, number `episode` from 0: its first keyframe is about to be played."""
+
+    def look(self, loop: ClosedLoop) -> None:
+        """A keyframe is about to be played."""
+
+    @abstractmethod
+    def keep(self, watched: WatchedKeyframe) -> None:
+        """A keyframe was played."""
+
+    @abstractmethod
+    def end(self, outcome: Mapping[str, Any] | None) -> None:
+        """The episode is over; `outcome` has the fields of `care_sim.loops.records.Outcome`, None
+        for one that was left.
+        """
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -61,20 +78,20 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         if not self._begun:
             self.begin(loop, self._episodes)
             self._begun = True
-            self._episodes = self._episodes + 1
+            self._episodes += 1
         # Where everything stands is asked before the step, which moves the world on.
         situation = self._watcher.situation()
         self.look(loop)
-        answer = super().step(action)
+        observation, reward, terminated, truncated, info = super().step(action)
         demand = self._policy.demanded if self._policy is not None else None
         self.keep(
             self._watcher.watched(
                 situation, self._closed_loop.acted, demand, self._closed_loop.keyframes[-1]
             )
         )
-        if answer[2] or answer[3]:
-            self._leave(answer[4].get("outcome"))
-        return answer
+        if terminated or truncated:
+            self._leave(info.get("outcome"))
+        return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
         """Close what is kept, then the environment."""
@@ -89,23 +106,6 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
         self._watcher = None
         if begun:
             self.end(outcome)
-
-    @abstractmethod
-    def begin(self, loop: ClosedLoop, episode: int) -> None:
-        """An episode begins, number `episode` from 0: its first keyframe is about to be played."""
-
-    def look(self, loop: ClosedLoop) -> None:
-        """A keyframe is about to be played."""
-
-    @abstractmethod
-    def keep(self, watched: WatchedKeyframe) -> None:
-        """A keyframe was played."""
-
-    @abstractmethod
-    def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """The episode is over; `outcome` has the fields of `care_sim.loops.records.Outcome`, None
-        for one that was left.
-        """
 
 
 def numbered(path: Path, episode: int) -> Path:

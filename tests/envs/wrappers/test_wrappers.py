@@ -1,5 +1,6 @@
 """Sectors as actions and coarse pictures as observation, over the environments of both loops."""
 
+import inspect
 import warnings
 from dataclasses import replace
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import care_sim
+import care_sim.wrappers
 from care_sim.base.errors import InvalidInput
 from care_sim.core.belief import Belief
 from care_sim.core.types import ImageDetections
@@ -218,3 +220,15 @@ def test_before_the_first_reset_there_is_nothing_to_act_on():
 def test_they_document_themselves(wrapper):
     for heading in ("### Action", "### Observation", "### Arguments"):
         assert heading in wrapper.__doc__
+
+
+@pytest.mark.parametrize("name", care_sim.wrappers.__all__)
+def test_their_examples_run(name, tmp_path, monkeypatch):
+    for extra in {"RecordRerun": ["rerun"], "ExportScans": ["open3d"]}.get(name, []):
+        pytest.importorskip(extra)
+    monkeypatch.chdir(tmp_path)
+    document = inspect.cleandoc(getattr(care_sim.wrappers, name).__doc__)
+    _, example = document.split("### Example\n```python\n")
+    given = {"gymnasium": gymnasium, "np": np, "care_sim": care_sim, **vars(care_sim.wrappers)}
+    exec(example.removesuffix("```"), given)
+    given["env"].close()
