@@ -85,23 +85,48 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     know which of them the episode is about.
 
     ### Arguments
-    `budget` beta in (0, 1]; `keyframe_s`; `reward_weights`, a mapping of changes; `render_mode`
-    None or "rgb_array"; `scoring_info` and `secret`; any field of the scenario; and the conditions,
-    any field of `care_sim.core.conditions.Conditions`.
+    The arguments are these, any field of the scenario, and the conditions below. A value that is
+    not allowed raises `care_sim.InvalidInput`.
+
+    | argument | default | meaning |
+    |---|---|---|
+    | `budget` | 0.10 | beta, the share of the cells that may fire, in (0, 1] |
+    | `keyframe_s` | 0.1 | seconds between two decisions, at most 1 |
+    | `reward_weights` | None | a mapping of changes to `care_sim.envs.reward.REWARD_WEIGHTS` |
+    | `render_mode` | None | None or "rgb_array" |
+    | `secret` | False | a text that enters everything that a seed draws, see below |
+    | `scoring_info` | True | whether `info` holds what is for scoring alone |
 
     A `secret` is a text that enters everything that a seed draws
     (`care_sim.base.random_streams`). An agent that holds this package can then not look its
     episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
     default, means none.
 
-    Conditions of the allocator: `reserve_fraction` rho, `floor`, `floor_seed`, `azimuth_margin`,
-    `elevation_margin`. Of the detectors: `engine`, `min_returns`, `camera_confidence`. Camera
-    faults: `false_negative_rate`, `false_negative_per_m`, `false_negative_burst` (keyframes),
-    `false_positive_rate` (mean per picture), `camera_latency` and `camera_jitter` (whole
-    keyframes), `blackout_start_s`, `blackout_s`, `camera_rotation_sigma_deg`,
-    `camera_position_sigma_m`. LiDAR faults: `lidar_range_sigma` (m), `lidar_dropout`,
-    `lidar_dead_rows`. Odometry: `ego_speed_sigma` (m/s). Faults are off by default and drawn by the
-    seed. A value that is not allowed raises `care_sim.InvalidInput`.
+    The conditions are the fields of `care_sim.core.conditions.Conditions`, which says more of each.
+    Faults are off by default and drawn by the seed.
+
+    | condition | of | meaning |
+    |---|---|---|
+    | `reserve_fraction` | allocator | rho, the share of the budget kept for the reserve |
+    | `floor` | allocator | whether the random floor spends what the policy leaves |
+    | `floor_seed` | allocator | which of the random floors that the seed holds |
+    | `azimuth_margin`, `elevation_margin` | allocator | cells by which hulls are dilated |
+    | `engine` | sensors | what casts the rays, "fast" or "bullet" |
+    | `min_returns` | LiDAR detector | fired rays that must hit an object |
+    | `camera_confidence` | camera detector | least confidence of a detection |
+    | `false_negative_rate` | camera | share of the objects that it misses |
+    | `false_negative_per_m` | camera | growth of that share with distance, 1/m |
+    | `false_negative_burst` | camera | keyframes that a miss lasts |
+    | `false_positive_rate` | camera | mean number of false boxes per picture |
+    | `camera_latency` | camera | age of its detections, keyframes |
+    | `camera_jitter` | camera | most keyframes by which a picture comes later still |
+    | `blackout_start_s`, `blackout_s` | camera | begin and length of a blackout, s |
+    | `camera_rotation_sigma_deg` | camera | spread of the mount's error in yaw and pitch, degrees |
+    | `camera_position_sigma_m` | camera | spread of the mount's error in x, y and z, m |
+    | `lidar_range_sigma` | LiDAR | noise on every range, m |
+    | `lidar_dropout` | LiDAR | share of the returns that are lost |
+    | `lidar_dead_rows` | LiDAR | elevation rows that return nothing; row 0 is the highest |
+    | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
