@@ -18,8 +18,8 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True)
 class Plugins(Generic[Made]):
-    """All things of one `kind`, such as "detector": the `built_in` makers by name, and the entries
-    of the entry-point `group`.
+    """All things of one `kind`, such as "detector": the `built_in` makers by name, or entry points
+    that name them, and the entries of the entry-point `group`.
 
     `faults` says in which ways a loaded object makes nothing of the kind; each is the end of a
     sentence that begins with the object's place.
@@ -27,7 +27,7 @@ class Plugins(Generic[Made]):
 
     kind: str
     group: str
-    built_in: Mapping[str, Callable[..., Made]]
+    built_in: Mapping[str, Callable[..., Made] | EntryPoint]
     faults: Callable[[Any], Iterable[str]]
 
     def names(self) -> list[str]:
@@ -48,7 +48,8 @@ class Plugins(Generic[Made]):
         Raises InvalidInput with the reason for one that cannot be loaded, and for an unknown name.
         """
         if name in self.built_in:
-            return self.built_in[name]
+            built_in = self.built_in[name]
+            return self.load(built_in) if isinstance(built_in, EntryPoint) else built_in
         self.check(name)
         return self.load(self.entries()[name])
 

@@ -2,12 +2,13 @@
 (`care_sim.policies.makers`).
 """
 
+from importlib.metadata import EntryPoint
+
 import gymnasium
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.seed_finder import SeedFinder
 from care_sim.policies.learned.learned_scorer import LearnedScorer
 from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
 from care_sim.policies.makers import (
@@ -40,7 +41,7 @@ __all__ = [
     "tags_of",
 ]
 
-BUILT_IN: dict[str, PolicyMaker] = {
+BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
     policy.name: policy
     for policy in (
         Full,
@@ -59,9 +60,13 @@ BUILT_IN: dict[str, PolicyMaker] = {
         LearnedScorer,
         PpoPolicy,
         PpoDartoutPolicy,
-        SeedFinder,
     )
 }
+# Loaded when it is asked for, as those of installed packages are: it plays scenarios by itself, and
+# their traffic (highway-env, which brings pandas and Matplotlib) doubles the time of every import.
+BUILT_IN["seed-finder"] = EntryPoint(
+    "seed-finder", "care_sim.policies.controls.seed_finder:SeedFinder", "care_sim.policies"
+)
 
 POLICIES: Plugins[Policy] = Plugins("policy", "care_sim.policies", BUILT_IN, policy_faults)
 

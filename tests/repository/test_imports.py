@@ -53,6 +53,14 @@ def test_an_episode_loads_nothing_heavy_that_it_does_not_use(engine):
     assert "scipy.stats" not in loaded
 
 
+def test_the_package_alone_loads_neither_bullet_nor_traffic():
+    """They come with the first scenario, and would double the time of every command."""
+    line = "import sys, care_sim.cli; print(*sys.modules)"
+    told = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in told.stdout.split()}
+    assert loaded & {"highway_env", "matplotlib", "pandas", "pybullet"} == set()
+
+
 def test_the_wrapper_that_records_loads_rerun_only_when_it_is_used():
     line = (
         "import sys; from care_sim.wrappers import RecordRerun; import care_sim.cli; "

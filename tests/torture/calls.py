@@ -235,14 +235,14 @@ def _check_cells(cells, budget, size):
 def policy(case):
     """Make a policy and ask it."""
     from care_sim import make_policy, policy_names
-    from care_sim.policies import BUILT_IN
+    from care_sim.policies import BUILT_IN, maker
     from care_sim.policies.makers import settable
 
     name = case.rng.choice([*policy_names(), some(case)])
     with suppress(TypeError):
         case.tell(name)
     env = good_env() if case.rng.random() < 0.9 else some(case)
-    make = BUILT_IN.get(name) if isinstance(name, str) else None
+    make = maker(name) if isinstance(name, str) and name in BUILT_IN else None
     known = {one.name: None for one in settable(make)} if make else {}
     made = make_policy(
         name, env, **draw(case, known | dict.fromkeys(("path", "k_safe", "unknown")))

@@ -334,7 +334,7 @@ def _is(hint, kind):
 
 def _parameter_names(option):
     """Parameters that there are, of scenarios, policies and detectors."""
-    from care_sim.policies import BUILT_IN
+    from care_sim.policies import BUILT_IN, maker
     from care_sim.policies.listing import parameter_texts
     from care_sim.scenarios import SCENARIOS
 
@@ -353,7 +353,7 @@ def _parameter_names(option):
         ]
     if option == "detector_parameters":
         return ["file", "min_returns", "grid", "x", "self"]
-    names = [text.partition("=")[0] for make in BUILT_IN.values() for text in parameter_texts(make)]
+    names = [text.partition("=")[0] for name in BUILT_IN for text in parameter_texts(maker(name))]
     return [
         *names,
         *(f"care-sbf.{name}" for name in names),

@@ -12,7 +12,7 @@ from functools import cache
 from random import Random
 from typing import Any
 
-from care_sim.policies import BUILT_IN
+from care_sim.policies import maker
 from care_sim.policies.makers import is_privileged
 
 CLOSED = ("CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0")
@@ -148,7 +148,7 @@ def modes(environment: str, policy: str) -> list[str]:
     times.
     """
     # Truth does not travel between processes, and every interpreter makes a street anew.
-    apart = _IN_OTHER_PROCESSES if is_privileged(BUILT_IN[policy]) else ()
+    apart = _IN_OTHER_PROCESSES if is_privileged(maker(policy)) else ()
     elsewhere = (HASH_SEED,) if environment == STREET else ()
     return [
         mode
