@@ -142,8 +142,7 @@ def _check_unwrapped(name: str, env: gymnasium.Env) -> None:
     if (env.observation_space, env.action_space) != (inner.observation_space, inner.action_space):
         raise InvalidInput(
             f"policy {name} plays the environment itself, not behind wrappers that change what "
-            "is seen or done: "
-            "give and step env.unwrapped"
+            "is seen or done: give and step env.unwrapped"
         )
 
 

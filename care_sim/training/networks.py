@@ -149,14 +149,14 @@ class SectorPolicy(ActorCriticPolicy):
 
     def arrays(self) -> Arrays:
         """The actor's weights by the names of `care_sim.policies.learned.score_map`."""
-        # The 1 x 1 convolution is a matrix, and its kernel axes are dropped.
         named = {**self.mlp_extractor.actor.state_dict(), **self.action_net.state_dict()}
         arrays: Arrays = {name: tensor.cpu().numpy().copy() for name, tensor in named.items()}
-        return arrays | {
-            "hidden.weight": arrays["hidden.weight"][:, :, 0, 0],
-            "score.weight": arrays.pop("weight"),
-            "place": arrays["place"].reshape(self._sectors),
-        }
+        # The head calls its parameter `weight` alone.
+        arrays["score.weight"] = arrays.pop("weight")
+        # The 1 x 1 convolution is a matrix, and its kernel axes are dropped.
+        arrays["hidden.weight"] = arrays["hidden.weight"][:, :, 0, 0]
+        arrays["place"] = arrays["place"].reshape(self._sectors)
+        return arrays
 
 
 def _parts(features: Tensor) -> tuple[Tensor, Tensor]:

@@ -91,8 +91,10 @@ def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
     in_range = planar_ranges(annotations.boxes) <= RANGE_M
     tracked = np.isin(annotations.objects, loop.true_objects(loop.belief.tracks))
     wanted = np.isin(cloud.objects, annotations.objects[in_range & ~tracked])
+    # Each cell once, for the object of its first return: those of a recorded sweep may share one.
     cells, first = np.unique(cloud.cells[wanted], return_index=True)
-    # Per object: how many cells return from it. Fewer than MIN_RETURNS would not detect it.
+    # `sizes` (objects,): how many of the cells an object has; `group` (cells,): a cell's place in
+    # it. Fewer than MIN_RETURNS would not detect the object.
     _, group, sizes = np.unique(
         cloud.objects[wanted][first], return_inverse=True, return_counts=True
     )

@@ -1,3 +1,5 @@
-"""`care-sim certify`: whether this machine plays a published list of episodes as they were
-played.
+"""`care-sim certify`: whether this machine plays a list of episodes as it was published.
+
+What is played is in `design`, what of it is hashed in `trail`, and how the published trails in
+`published.parquet` are read in `published`.
 """

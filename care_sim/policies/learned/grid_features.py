@@ -1,5 +1,6 @@
-"""What an agent sees: a belief as a few coarse pictures of the angular grid, with values from 0 to
-1.
+"""What a learned agent sees of a belief: coarse pictures of the angular grid, and its own motion.
+
+The pictures hold values from 0 to 1, the motion values from -1 to 1.
 """
 
 from dataclasses import dataclass
@@ -31,9 +32,9 @@ of bridges and the crowns of trees. The tallest of the five classes are lower.
 
 @dataclass(frozen=True)
 class GridFeatures:
-    """Beliefs of a rig as `CHANNELS` over `columns` x `rows` blocks of the grid, and the vector
-    `EGO_INPUTS`.
+    """Beliefs of a rig as pictures and a vector.
 
+    The pictures are `CHANNELS` over `columns` x `rows` blocks of the grid, the vector `EGO_INPUTS`.
     A block of `nearness` takes the largest value of its cells, one of the other channels a share of
     them. Raises InvalidInput unless the blocks divide the grid. Not for several threads at once,
     since it reuses its memory.

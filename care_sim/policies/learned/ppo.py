@@ -1,4 +1,8 @@
-"""A learned allocator: a small network, trained by proximal policy optimisation, scores sectors."""
+"""A learned allocator: a small network, trained by proximal policy optimisation, scores sectors.
+
+What it reads is in `care_sim.policies.learned.grid_features`, the network in `score_map`, the file
+of weights in `weights`, and the training in `care_sim.training`.
+"""
 
 from os import PathLike
 from typing import ClassVar

@@ -164,14 +164,20 @@ class Database:
         return indexed_rows(self.path(table), read_json(self.path(table), taken), kinds)
 
     def _is_needed(self, table: str, row: JsonRow) -> bool:
-        # What lacks the field stays, to be refused with its name. Poses are recorded for every
-        # sweep and picture; those of keyframes are needed.
+        """Whether a row is kept. A row that lacks the field that decides stays, to be refused with
+        its name.
+        """
         if table == "sample_data":
             return row.get("is_key_frame") is not False
-        return table != "ego_pose" or "token" not in row or str(row["token"]) in self._poses_read
+        if table == "ego_pose" and "token" in row:
+            # Poses are recorded for every sweep and picture, and only those of keyframes are
+            # needed. The first pose therefore has `sample_data` read, if it was not yet.
+            return str(row["token"]) in self._poses_of_keyframes
+        return True
 
     @cached_property
-    def _poses_read(self) -> frozenset[str]:
+    def _poses_of_keyframes(self) -> frozenset[str]:
+        """The pose tokens of the recordings of keyframes."""
         return frozenset(row["ego_pose_token"] for row in self.rows("sample_data").values())
 
     @cached_property

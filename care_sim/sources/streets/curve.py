@@ -35,13 +35,13 @@ class Curve:
         s, d, heading = np.moveaxis(np.asarray(places, dtype=float), -1, 0)
         along = np.clip(s - self.bend_at, 0.0, self.bend_length)
         turn = self.curvature * along
-        # An arc of length `along` that turns by `turn` has the chord along * sin(turn/2) /
-        # (turn/2).
+        # The chord of a circle's arc, 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
+        # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.
         chord = along * np.sinc(turn / (2 * np.pi))
         before = np.minimum(s, self.bend_at)
         after = np.maximum(s - self.bend_at - self.bend_length, 0.0)
-        # The straight before lies along x, and the chord turned by half the bend. The straight
-        # after it points along the whole turn, and d lies across that.
+        # Three parts, one after the other: the straight before lies along x, the chord at half the
+        # turn, the straight after at the whole turn. d goes to the left of where the line points.
         x = before + chord * np.cos(turn / 2) + after * np.cos(turn) - d * np.sin(turn)
         y = chord * np.sin(turn / 2) + after * np.sin(turn) + d * np.cos(turn)
         world = turned(np.stack([x, y], axis=-1), self.start[2]) + self.start[:2]

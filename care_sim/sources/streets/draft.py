@@ -67,18 +67,21 @@ class PlacedBodies:
         self.berths.append(berth)
 
     def meets(self, way: Floats, size: Footprint) -> bool:
-        """Whether a footprint on `way` ever comes too close to one of these."""
+        """Whether a footprint on `way` (1, 3) or (t, 3) ever comes closer to one of these than its
+        berth, along every axis.
+        """
         if not self.ways:
             return False
-        sizes = np.array(self.sizes)
-        berths = np.array(self.berths)
-        # First by circles round both: they hold the rectangles with a berth along every axis, which
-        # reaches sqrt(2) times as far in a corner. Few pairs are left for the exact test.
-        places = np.stack(self.ways)
+        sizes = np.array(self.sizes)  # (n, 2)
+        berths = np.array(self.berths)  # (n,)
+        places = np.stack(self.ways)  # (n, 1 or t, 3)
+        # First by centres, which leaves few pairs for the exact test. Rectangles that touch have
+        # centres no farther apart than half of both diagonals. The exact test moves every side out
+        # by the berth, and a corner then moves by sqrt(2) berths at most, at a right angle.
         apart = np.hypot(places[..., 0] - way[:, 0], places[..., 1] - way[:, 1])
         reach = (np.hypot(*sizes.T) + np.hypot(*size)) / 2 + np.sqrt(2) * berths
-        # What stands has one pose, which holds at every time.
         who, when = np.nonzero(apart < reach[:, None])
+        # What stands has one pose, which holds at every time.
         mine = way[when if len(way) > 1 else np.zeros_like(when)]
         theirs = places[who, when if places.shape[1] > 1 else np.zeros_like(when)]
         return bool(
