@@ -14,11 +14,7 @@ the camera does not: their hulls are large and take their turns. And neither the
 right kerb beyond the person's line holds a vehicle: a person in front of a tracked vehicle lies
 inside its hull, where every policy fires, and would be no first sighting to tell policies apart.
 
-This layout was chosen for a collapse at 3%, the paper's budget, by this reckoning among about
-twenty; most of them, five vehicles of common sizes and none beside the ego, put it at 2 to 2.5%.
-The first one had been reckoned from the sum of cells alone, which forgets that round-robin serves
-small hulls first: policies ran in it, all-camera did not collapse at 3%, and so the error was
-found. The crowding study shows both sides.
+How this layout was chosen: docs/environments/dense.md.
 """
 
 from dataclasses import dataclass
