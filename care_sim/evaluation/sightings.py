@@ -116,7 +116,7 @@ class Sightings:
         # nor as appearing there.
         in_range = rows.ranges <= range_m
         frames = rows.take(in_range)
-        appearing = _appearing(frames)
+        appearing = _newcomer_rows(frames)
         present = np.isin(frames.objects[appearing], start.objects[start.ranges <= range_m])
         events = appearing[~present] if presence == ANNOTATED else appearing
         return cls(scene, tuple(keyframes), in_range, frames, events, appearing[present])
@@ -143,7 +143,7 @@ def check_presence(presence: object) -> None:
         )
 
 
-def _appearing(frames: ObjectFrames) -> Integers:
+def _newcomer_rows(frames: ObjectFrames) -> Integers:
     """(n,) the first row of every object that has none at the first keyframe, ascending."""
     # Rows are in order of keyframe, so the first row of an object is its first keyframe.
     _, first = np.unique(frames.objects, return_index=True)
