@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.allocation import allocate
+from care_sim.core.arrays import Mask
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
@@ -26,9 +27,7 @@ def scores_of(cells: Cells, shape: tuple[int, int]) -> Action:
     return scores.reshape(shape)
 
 
-def fired_cells(
-    scores: NDArray[np.floating] | NDArray[np.bool_], budget: int, floor: Cells | None
-) -> Cells:
+def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Cells | None) -> Cells:
     """The cells that an action fires, ascending.
 
     They are the `budget` highest strictly positive `scores` (E, A), ties by ascending index. Where

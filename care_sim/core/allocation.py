@@ -14,7 +14,7 @@ import numpy as np
 from care_sim.base.checks import check_number, check_whole, is_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.frames import Integers, Mask
+from care_sim.core.arrays import Integers, Mask
 from care_sim.core.grid import Cells, cell_indices
 from care_sim.core.types import Demand
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
 
 MAX_DETECTIONS = 128

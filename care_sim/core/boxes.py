@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from care_sim.core.frames import Floats, turned
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import turned
 
 _AROUND = ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
 _CORNERS = np.array([[x, y, z] for z in (-0.5, 0.5) for x, y in _AROUND])

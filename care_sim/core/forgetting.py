@@ -6,10 +6,9 @@ The hulls of harmless tracks shrink and are served after the full ones.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks
@@ -63,7 +62,7 @@ class Forgetting:
         hulls = self._rig.hulls(tracks.boxes, margins)
         return [hulls[row] for row in np.argsort(low, kind="stable")]
 
-    def advance(self, tracks: Tracks, ego: Ego) -> tuple[Integers, NDArray[np.bool_]]:
+    def advance(self, tracks: Tracks, ego: Ego) -> tuple[Integers, Mask]:
         """Advance the streaks by one keyframe, and say how far each hull shrinks.
 
         Returns (n,) azimuth margins in columns, and (n,) which tracks are of low criticality. The
@@ -85,7 +84,7 @@ class Forgetting:
         shrunk = np.clip(np.maximum(decayed, self._uncertainty(tracks.ranges)), 0, margin)
         return np.where(low, shrunk, margin).astype(np.int64), low
 
-    def _low_criticality(self, tracks: Tracks, ego: Ego) -> NDArray[np.bool_]:
+    def _low_criticality(self, tracks: Tracks, ego: Ego) -> Mask:
         """(n,) which tracks recede or stand still, beyond the guard distance."""
         ranges = np.maximum(tracks.ranges, 1e-9)
         # Velocities are over ground, but what recedes does so from the car, which drives along x.
@@ -94,7 +93,7 @@ class Forgetting:
         receding = range_rate > self.rules.receding_mps
         static = np.hypot(*tracks.velocities.T) < self.rules.static_mps
         # A track seen once has no velocity yet: its 0 says nothing.
-        harmless: NDArray[np.bool_] = (receding | static) & (tracks.hits > 1)
+        harmless: Mask = (receding | static) & (tracks.hits > 1)
         return harmless & (ranges > self.rules.guard_distance(ego.speed))
 
     def _uncertainty(self, ranges: Floats) -> Floats:

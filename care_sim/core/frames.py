@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from care_sim.core.arrays import Floats
+
 Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
 

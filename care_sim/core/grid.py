@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid_kernels import GridSpacing, rectangle_cells, silhouettes
 
 Cells = NDArray[np.int64]

@@ -6,10 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 
 
 class GridSpacing(NamedTuple):
@@ -25,7 +24,7 @@ class GridSpacing(NamedTuple):
 
 
 @compiled()
-def silhouettes(boxes: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def silhouettes(boxes: Floats) -> tuple[Floats, Floats, Mask]:
     """What of boxes (n, 7) bounds their hulls, seen from the origin, and which of them surround it.
 
     Returns x and y (n, 5, 2) of the centre and the four corners. Then (n, 2, 2) the heights of

@@ -15,7 +15,8 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core import pinhole_kernels as kernels
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Frame
 from care_sim.core.pinhole_kernels import CameraModel, CameraModels
 
 NEAR_M = 0.1

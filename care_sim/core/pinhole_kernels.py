@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 
 
 class CameraModel(NamedTuple):

@@ -3,11 +3,11 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, Integers, turned
+from care_sim.core.frames import turned
 from care_sim.core.grid import Cells
 from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
@@ -30,7 +30,7 @@ def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
     return unexplained, by_memory
 
 
-def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> NDArray[np.bool_]:
+def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Mask:
     """(n,) whether a forecast explains each image box; see `explaining_tracks`."""
     return explaining_tracks(detections, tracks, rig) >= 0
 

@@ -6,8 +6,8 @@ from functools import cached_property
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.allocation import RESERVE_FRACTION, budget_cells
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import (
     AZIMUTH_MARGIN,
     ELEVATION_MARGIN,

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.boxes import planar_ranges
-from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 
 CLASSES = ("car", "truck", "bus", "bicycle", "pedestrian")
@@ -173,7 +173,7 @@ class Tracks:
             hits=table[:, cls.HITS].astype(np.int64),
         )
 
-    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "Tracks":
+    def take(self, rows: NDArray[np.int64] | Mask) -> "Tracks":
         """Some of the tracks, by index or mask."""
         # Each column by its name: a loop over `fields` would take as long as the rest of it.
         return Tracks(

@@ -15,11 +15,10 @@ least `reaction_s` later. It stays on while any counting track is not faster tha
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.times import LAST_BITS_S
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import half_extents
-from care_sim.core.frames import Floats
 from care_sim.core.types import Command, Ego, Tracks
 
 
@@ -91,7 +90,7 @@ class BrakingController:
         acting = self._braking_s >= self._rules.reaction_s - LAST_BITS_S
         return Command(-self._rules.deceleration if acting else 0.0, True)
 
-    def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> NDArray[np.bool_]:
+    def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> Mask:
         """(n,) which tracks count; `half_x` and `half_y` (n,) are the half extents of boxes."""
         rules = self._rules
         ahead = tracks.boxes[:, 0] + half_x > self._front_m

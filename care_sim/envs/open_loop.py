@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.arrays import Mask
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.frames import Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions

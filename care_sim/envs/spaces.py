@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats
 from care_sim.core.belief import MAX_DETECTIONS, MAX_TRACKS
-from care_sim.core.frames import Floats
 from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig
 

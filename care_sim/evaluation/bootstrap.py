@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 
 RESAMPLES = 10_000
 """Paired resamples (paper, Remark 1)."""

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Mask
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Integers, Mask
+from care_sim.core.arrays import Integers, Mask
 from care_sim.core.types import CLASSES, Detections
 from care_sim.evaluation import matching
 from care_sim.evaluation.sightings import Sightings

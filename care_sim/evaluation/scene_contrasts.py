@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.evaluation.bootstrap import Interval, paired_difference, ratio_of_sums
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.recall import Tally

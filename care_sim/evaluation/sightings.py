@@ -30,11 +30,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.checks import check_number
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
 
 RANGE_M = 50.0
@@ -64,7 +63,7 @@ class ObjectFrames:
     def __len__(self) -> int:
         return len(self.keyframes)
 
-    def take(self, rows: Integers | NDArray[np.bool_]) -> "ObjectFrames":
+    def take(self, rows: Integers | Mask) -> "ObjectFrames":
         """Some of the rows, by index or mask."""
         return ObjectFrames(*(getattr(self, column.name)[rows] for column in fields(self)))
 
@@ -82,7 +81,7 @@ class Sightings:
 
     scene: str
     keyframes: tuple[Annotations, ...]
-    in_range: NDArray[np.bool_]
+    in_range: Mask
     frames: ObjectFrames
     events: Integers
     emerging: Integers
@@ -121,13 +120,13 @@ class Sightings:
         events = appearing[~present] if presence == ANNOTATED else appearing
         return cls(scene, tuple(keyframes), in_range, frames, events, appearing[present])
 
-    def scored(self, keyframe: int) -> NDArray[np.bool_]:
+    def scored(self, keyframe: int) -> Mask:
         """(n,) which annotations of a keyframe are in range."""
         # The mask runs through all keyframes, one after the other.
         start = sum(map(len, self.keyframes[:keyframe]))
         return self.in_range[start : start + len(self.keyframes[keyframe])]
 
-    def appearing(self, keyframe: int) -> NDArray[np.bool_]:
+    def appearing(self, keyframe: int) -> Mask:
         """(n,) which annotations of a keyframe are first sightings."""
         # Events are rows of the scored objects: their marks go to the scored ones, in their order.
         appears = self.scored(keyframe).copy()

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_sim.core.frames import Mask
+from care_sim.core.arrays import Mask
 from care_sim.core.types import CLASSES
 from care_sim.evaluation.sightings import ObjectFrames
 

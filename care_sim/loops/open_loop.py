@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Floats, Integers
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.rig import Rig

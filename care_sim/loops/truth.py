@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, Integers
 from care_sim.core.types import Scan, Tracks
 from care_sim.sensors.annotated import NO_OBJECT
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.actions import shares_of
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
@@ -45,9 +46,9 @@ class TrueSituation:
     """The row of the first-sighting actor, None without one."""
     belief: Belief
     """All that the policy was shown."""
-    known: NDArray[np.bool_]
+    known: Mask
     """(k,) which detections of the belief a forecast explains."""
-    false: NDArray[np.bool_]
+    false: Mask
     """(k,) which of them show nothing."""
     missed: ImageDetections
     """Those that the camera without its faults would have given besides."""

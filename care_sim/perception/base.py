@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from care_sim.core.frames import Integers
+from care_sim.core.arrays import Integers
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
 

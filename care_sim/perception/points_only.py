@@ -7,10 +7,10 @@ goes through it.
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_sim.base.errors import InvalidInput, MissingExtra, error_line
-from care_sim.core.frames import Floats, Integers, turned
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
@@ -70,7 +70,7 @@ class PointsOnly:
         return detections, _objects_behind(detections.boxes, cloud)
 
 
-def inside(points: Floats, boxes: Floats) -> NDArray[np.bool_]:
+def inside(points: Floats, boxes: Floats) -> Mask:
     """(n, P) whether each of points (P, 3) lies in each of boxes (n, 7). Raises InvalidInput for
     other boxes.
     """
@@ -141,7 +141,7 @@ def _faults(
     points: int, classes: Floats, boxes: Floats, returns: Floats, scores: Floats | None = None
 ) -> list[str]:
     # What must hold, each beside the sentence for whoever breaks it.
-    rules: dict[str, NDArray[np.bool_] | bool] = {
+    rules: dict[str, Mask | bool] = {
         f"at most {MOST_DETECTIONS} detections are allowed, got {len(classes)}": len(classes)
         <= MOST_DETECTIONS,
         f"classes must be whole numbers from 0 to {len(CLASSES) - 1}": _is_count(classes)
@@ -154,5 +154,5 @@ def _faults(
     return [rule for rule, kept in rules.items() if not np.all(kept)]
 
 
-def _is_count(numbers: Floats) -> NDArray[np.bool_]:
+def _is_count(numbers: Floats) -> Mask:
     return np.asarray((numbers >= 0) & (numbers % 1 == 0))

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from care_sim.base.checks import check_whole
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.frames import Floats, Integers
 from care_sim.core.types import Detections
 from care_sim.sensors.annotated import Annotations, Cloud
 

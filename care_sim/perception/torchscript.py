@@ -25,7 +25,7 @@ import numpy as np
 
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_torch
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.types import Detections
 from care_sim.perception.points_only import inside
 

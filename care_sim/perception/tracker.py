@@ -6,7 +6,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.frames import Floats, Frame, Integers, turned
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Detections, Tracks
 
 _EMPTY = Tracks.from_rows(np.empty((0, len(Tracks.COLUMNS))))

@@ -7,9 +7,8 @@ The objects are truth: for the scoring and privileged policies.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.grid import Cells
 from care_sim.core.types import ImageDetections
 
@@ -48,7 +47,7 @@ class Cloud:
     def __len__(self) -> int:
         return len(self.cells)
 
-    def take(self, kept: NDArray[np.bool_]) -> "Cloud":
+    def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
         rows = np.flatnonzero(kept)
         return Cloud(self.cells[rows], self.points.take(rows, axis=0), self.objects[rows])

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.frames import Floats, Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.confidence import confidence_of, pixels_of

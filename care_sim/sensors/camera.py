@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
-from care_sim.core.frames import Floats, Integers
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import CameraFaults
-from care_sim.core.frames import Floats
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
@@ -33,7 +32,7 @@ class Misses:
         """(n,) keyframes for which each object's burst still lasts."""
         self._started = False
 
-    def draw(self, ranges: Floats) -> NDArray[np.bool_]:
+    def draw(self, ranges: Floats) -> Mask:
         """(n,) who is missed at this keyframe; `ranges` (n,) are distances in metres."""
         faults = self._faults
         if not (faults.false_negative_rate or faults.false_negative_per_m):

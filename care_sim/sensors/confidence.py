@@ -4,7 +4,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 
 MIN_PIXELS = 12
 """Visible pixels below which an object has no box. At 320 x 180 this is 4 x 12 pixels at 640 x 360,

@@ -5,7 +5,7 @@ They ignore occlusion: one may lie where a true object of its distance would be 
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Mask
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.box_pool import NO_ROWS, BoxPool, box_areas
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from care_sim.core.arrays import Integers
 from care_sim.core.conditions import LidarFaults
-from care_sim.core.frames import Frame, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.rig import LIDAR_HEIGHT_M
 from care_sim.core.types import Scan

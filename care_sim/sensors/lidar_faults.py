@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.conditions import LidarFaults
-from care_sim.core.frames import Floats, Mask
 from care_sim.core.grid import AngularGrid, Cells
 
 NEAREST_M = 0.01

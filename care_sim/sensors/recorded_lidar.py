@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from care_sim.core.arrays import Floats
 from care_sim.core.conditions import LidarFaults
-from care_sim.core.frames import Floats
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.lidar_faults import CellFaults

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.annotated import NO_OBJECT, Cloud, IdentifiedDetections

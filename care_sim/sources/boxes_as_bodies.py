@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections

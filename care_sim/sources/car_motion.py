@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Frame
 from care_sim.core.types import Ego
 
 SPAN_S = 0.5

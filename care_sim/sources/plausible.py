@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 
 ValueRange = tuple[float, float]
 

@@ -20,8 +20,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
 from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import MIN_RETURNS
@@ -49,7 +49,7 @@ class Examples:
     """
 
     inputs: Float32s
-    positive: NDArray[np.bool_]
+    positive: Mask
     weights: Float32s
 
     def __len__(self) -> int:

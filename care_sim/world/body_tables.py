@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.boxes import half_extents
-from care_sim.core.frames import Floats, Integers, Pose
+from care_sim.core.frames import Pose
 from care_sim.world.bodies import Part, Shape, Triple
 
 SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")

@@ -10,7 +10,8 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats, Frame, Integers, Pose
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame, Pose
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.body_tables import Primitives

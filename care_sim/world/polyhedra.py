@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.world.bodies import Part
 
 RING = 32

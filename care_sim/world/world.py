@@ -8,7 +8,8 @@ import numpy as np
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.frames import Floats, Integers, Pose
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints

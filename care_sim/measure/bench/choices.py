@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from care_sim.core.allocation import allocate
+from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief, Observation
-from care_sim.core.frames import Floats
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks

@@ -6,8 +6,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.boxes import planar_ranges
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.types import Ego, ImageDetections, Tracks
 from care_sim.driving.braking import BrakingController

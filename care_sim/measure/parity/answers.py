@@ -10,10 +10,10 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.engines import RayEngine
 from care_sim.sensors.engines.bullet import Bullet
@@ -65,11 +65,9 @@ class Millimetres:
         self._world.close()
 
 
-def same(one: Answers, other: Answers) -> NDArray[np.bool_]:
+def same(one: Answers, other: Answers) -> Mask:
     """(n,) which rays meet the same body, ranges within `SAME_RANGE_M`."""
-    alike: NDArray[np.bool_] = (one[1] == other[1]) & np.isclose(
-        one[0], other[0], rtol=0.0, atol=SAME_RANGE_M
-    )
+    alike: Mask = (one[1] == other[1]) & np.isclose(one[0], other[0], rtol=0.0, atol=SAME_RANGE_M)
     return alike
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import CLASSES
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part, sized

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from care_sim.core.frames import Frame, Integers
+from care_sim.core.arrays import Integers
+from care_sim.core.frames import Frame
 from care_sim.measure.parity.answers import SAME_RANGE_M, Answers
 from care_sim.measure.parity.verdicts import LOST, UNEXPLAINED, VERDICTS, JudgedRays
 from care_sim.world.bodies import BodyKind

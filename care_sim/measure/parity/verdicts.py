@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Frame, Integers
+from care_sim.core.arrays import Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.measure.parity.answers import Answers, aside, same
 from care_sim.sensors.engines import RayEngine

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 
 STEP_DEG = 1.0
 """Between two headings tried: over half a car's length it is 4 cm."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.frames import Floats, turned
+from care_sim.core.frames import turned
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import Detections
 from care_sim.perception.cluster.box_fitting import DECIMALS, fit_sides

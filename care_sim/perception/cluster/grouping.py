@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import AngularGrid
 
 NEAR_RADIUS_M = 0.3

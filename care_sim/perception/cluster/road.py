@@ -3,10 +3,9 @@ the road is.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats, Mask
 
 STEEPEST = 0.03
 """The most by which the road may slope against the car's own plane: 1 degree of pitch, as under
@@ -66,7 +65,7 @@ def _bounded(free: Floats) -> tuple[Floats, Floats]:
     return departure, derivatives
 
 
-def _could_be_road(points: Floats, level: Floats) -> NDArray[np.bool_]:
+def _could_be_road(points: Floats, level: Floats) -> Mask:
     # As far off the level plane as the road may be at most at this range, and its roughness.
     reach = SETTLING_M + ROUGHNESS_M + STEEPEST * np.hypot(points[:, 0], points[:, 1])
     return np.asarray(np.abs(heights_above(points, level)) <= reach)

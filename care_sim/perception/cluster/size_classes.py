@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES
 from care_sim.perception.cluster.box_fitting import DECIMALS, Sides

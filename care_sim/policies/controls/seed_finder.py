@@ -9,8 +9,9 @@ import numpy as np
 
 from care_sim.base.checks import check_known, check_whole
 from care_sim.base.random_streams import streams
+from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy

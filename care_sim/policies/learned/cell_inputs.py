@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, wedges
@@ -132,7 +133,7 @@ class CellInputs:
         cells = np.concatenate([np.empty(0, np.int64), *sets])
         return cells, np.cumsum([*map(len, sets)], dtype=np.int64), marks.astype(np.uint8)
 
-    def _covered(self) -> NDArray[np.bool_]:
+    def _covered(self) -> Mask:
         """(N,) whether a point at the end of a cell's ray lies in a picture. So far out the offset
         of a camera from the LiDAR no longer matters.
         """

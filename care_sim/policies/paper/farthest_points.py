@@ -1,7 +1,7 @@
 """Farthest point sampling of the full scan: saves no sensing."""
 
 from care_sim.base.extras import import_open3d
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.loops.truth import Truth

@@ -4,8 +4,8 @@ from abc import abstractmethod
 
 import numpy as np
 
+from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
 from care_sim.policies.base import PrivilegedPolicy

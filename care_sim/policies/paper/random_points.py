@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.base.checks import check_seed
 from care_sim.base.portable_hash import portable_bytes
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.loops.truth import Truth

@@ -1,10 +1,10 @@
 """History with a reserve on returns that no detection explains."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Floats, Frame, turned
+from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import Cells
 from care_sim.core.types import Demand, Ego
 from care_sim.policies.base import Policy
@@ -72,8 +72,8 @@ def _travelled(ego: Ego, duration: float) -> Frame:
     return Frame(way * np.cos(yaw / 2), way * np.sin(yaw / 2), 0.0, yaw)
 
 
-def _inside(points: Floats, box: Floats) -> NDArray[np.bool_]:
+def _inside(points: Floats, box: Floats) -> Mask:
     """(n,) which points (n, 3) lie in the widened box (7,)."""
     local = np.abs(turned(points - box[:3], -box[6]))
-    inside: NDArray[np.bool_] = np.all(local <= box[3:6] / 2 + BOX_MARGIN_M, axis=1)
+    inside: Mask = np.all(local <= box[3:6] / 2 + BOX_MARGIN_M, axis=1)
     return inside

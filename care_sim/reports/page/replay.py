@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats, Pose
+from care_sim.core.arrays import Floats, Mask
+from care_sim.core.frames import Pose
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
@@ -166,7 +167,7 @@ def fullness(fired: Cells, grid: AngularGrid) -> str:
     )
 
 
-def sightlines(detections: ImageDetections, known: NDArray[np.bool_], rig: Rig) -> list[list[int]]:
+def sightlines(detections: ImageDetections, known: Mask, rig: Rig) -> list[list[int]]:
     """The left and right azimuth of every camera box in the sensor frame, and 1 where a track
     explains it.
     """

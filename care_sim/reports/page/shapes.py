@@ -8,7 +8,7 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 
 _LETTERS = {
     Path.MOVETO: "M",

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.evaluation.bootstrap import Interval, paired_difference
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import (

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
 from care_sim.evaluation.scene_contrasts import Ratio, RatioLevel, Tallies, averaged, ratio_level

@@ -1,6 +1,7 @@
 """The engine `bullet`: PyBullet's own rays and renderer, the reference for every other engine."""
 
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.world.bullet import BulletWorld, PixelWindow

@@ -4,7 +4,8 @@ can cover.
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 from care_sim.sensors.engines.picture_kernels import render_bodies

@@ -1,7 +1,7 @@
 """Vectors and turns that the kernels of rays and of pictures share, compiled."""
 
 from care_sim.base.compiled import compiled
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 
 Vector = tuple[float, float, float]
 Axes = tuple[Vector, Vector, Vector]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.sensors.engines.geometry_kernels import body_axes, dot
 from care_sim.world.bullet import NO_BODY, PixelWindow
 

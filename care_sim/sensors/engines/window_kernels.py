@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from care_sim.base.compiled import compiled
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid_kernels import GridSpacing
 from care_sim.sensors.engines.geometry_kernels import Axes, body_axes, dot
 

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Frame, Integers
+from care_sim.core.arrays import Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.surround import SURROUND_CAMERAS

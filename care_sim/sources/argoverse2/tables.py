@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from care_sim.base.errors import InvalidInput, shown, unknown
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.sources.argoverse2.feather import Columns, read_columns
 from care_sim.sources.plausible import (
     AWAY_M,

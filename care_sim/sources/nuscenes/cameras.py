@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import Annotations, IdentifiedDetections

@@ -16,7 +16,7 @@ import numpy as np
 
 from care_sim.base.checks import check_number, check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, IdentifiedDetections
 from care_sim.sources.nuscenes.cameras import RecordedCamera, projected

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Frame
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.types import CLASSES, Ego
 from care_sim.loops.film import Film, Shot

@@ -6,9 +6,10 @@ https://github.com/nutonomy/nuscenes-devkit/blob/master/python-sdk/nuscenes/eval
 
 import numpy as np
 
+from care_sim.core.arrays import Floats
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.forgetting import ForgettingRules
-from care_sim.core.frames import Floats, turned
+from care_sim.core.frames import turned
 from care_sim.core.types import CLASSES, Detections
 from care_sim.loops.film import Shot
 from care_sim.sources.nuscenes.table_files import JsonRow

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats, Frame, Integers, turned
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import AngularGrid
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.sources.nuscenes.table_files import DROPPED, JsonRow, indexed_rows, read_json
 from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats, Pose, turned
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Pose, turned
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ more.
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats, Mask
 from care_sim.world.bodies import CATALOGUE
 
 STEP_S = 0.1
@@ -26,7 +25,7 @@ Footprint = tuple[float, float]
 
 def footprints_meet(
     poses: Floats, size: Floats, others: Floats, other_sizes: Floats, gap: Floats
-) -> NDArray[np.bool_]:
+) -> Mask:
     """(n,) whether rectangles come closer than `gap` (n,) along every axis (separating axis
     theorem).
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
 from care_sim.scenarios.base import LANE_WIDTH_M, SPEED_LIMIT_MPS, Range, draw
 from care_sim.sources.streets.curve import Curve

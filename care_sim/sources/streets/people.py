@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.scenarios.base import Range, draw
 from care_sim.sources.streets.curve import Walked
 from care_sim.sources.streets.draft import TIMES, Draft

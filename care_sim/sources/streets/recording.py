@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from care_sim.base.random_streams import secret_entropy
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
 from care_sim.sources.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
 from care_sim.sources.streets.drivers import BEYOND_M, drive_joining, drive_main

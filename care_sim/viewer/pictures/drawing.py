@@ -7,8 +7,8 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from care_sim.core.arrays import Floats
 from care_sim.core.boxes import BOX_EDGES, box_corners
-from care_sim.core.frames import Floats
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import NEAR_M, PinholeCamera
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import box_corners
-from care_sim.core.frames import Floats
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.sensors.annotated import Cloud
@@ -43,9 +43,9 @@ def draw_plan(
     loop: OpenLoop,
     index: int,
     record: OpenLoopKeyframe | None,
-    found: NDArray[np.bool_],
-    scored: NDArray[np.bool_],
-    appearing: NDArray[np.bool_],
+    found: Mask,
+    scored: Mask,
+    appearing: Mask,
 ) -> NDArray[np.uint8]:
     """A picture (PICTURE_HEIGHT, PICTURE_WIDTH, 3) of keyframe `index` of a film from above, the
     car driving to the right.
@@ -70,7 +70,7 @@ def draw_plan(
 
 
 def _map(
-    boxes: Floats, colours: Sequence[drawing.Colour], appearing: NDArray[np.bool_], points: Floats
+    boxes: Floats, colours: Sequence[drawing.Colour], appearing: Mask, points: Floats
 ) -> Image.Image:
     """Range rings, points (P, 3), the car and boxes (n, 7) with their colours."""
     picture = Image.new("RGB", _MAP_SIZE, BACKGROUND)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.viewer.recording.entities import KEYFRAME, SECONDS
 
 THIN = -1.0

@@ -8,7 +8,7 @@ import rerun as rr
 from rerun.components import InterpolationMode
 
 from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import WatchedKeyframe

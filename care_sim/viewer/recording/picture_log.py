@@ -9,7 +9,7 @@ import rerun as rr
 from PIL import Image
 
 from care_sim.core.actions import SHARES
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig

@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 from rerun.components import FillMode
 
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES

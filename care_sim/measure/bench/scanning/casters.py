@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from care_sim.base.errors import MissingExtra
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.bench.scanning.embree import Embree
 from care_sim.measure.bench.scanning.mujoco import MuJoCo

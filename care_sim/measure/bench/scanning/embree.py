@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from care_sim.base.extras import import_open3d
-from care_sim.core.frames import Floats, Frame, Integers, turned
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame, turned
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.world.bodies import BodyKind, Part
 from care_sim.world.bullet import NO_BODY

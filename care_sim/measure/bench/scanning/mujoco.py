@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.base.extras import import_mujoco
-from care_sim.core.frames import Floats, Frame, Integers
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.world.bodies import BodyKind
 from care_sim.world.bullet import NO_BODY

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.core.allocation import budget_cells
-from care_sim.core.frames import Floats
+from care_sim.core.arrays import Floats
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.scanning.casters import Caster, casters
