@@ -229,8 +229,10 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             self._running = None
 
     def _pool(self, entropy: int) -> BoxPool:
-        """The boxes that false ones are drawn from, if there are any: those of another drive
-        through this scenario. Its stream is its own, so that nothing in it tells of this episode.
+        """The boxes that false ones are drawn from, if there are any.
+
+        They are those of another drive through this scenario. Its stream is its own, so that
+        nothing in it tells of this episode.
         """
         if not self.conditions.false_positive_rate:
             return EMPTY_POOL

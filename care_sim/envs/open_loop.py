@@ -129,8 +129,10 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         return SceneScore.of(self._sightings, self._masks)
 
     def _start(self, film: Film, seed: int) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode over a film. Camera faults, noise and floor have independent streams,
-        which the scene's name and the seed decide.
+        """Begin an episode over a film.
+
+        Camera faults, noise and floor have independent streams, which the scene's name and the seed
+        decide.
         """
         # By name: recorded scenes are all played with one seed, and should not share their faults.
         camera, lidar, floor, odometry = self._streams(seed, crc32(film.name.encode()), count=4)
@@ -165,8 +167,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         return self.observed(), reward, False, self._over, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture (H, W, 3) of the last keyframe from above: who was found, what returned, what
-        fired.
+        """A picture (H, W, 3) of the last keyframe from above.
+
+        It shows who was found, what returned and what fired.
         """
         if self.render_mode is None:
             return None
@@ -178,8 +181,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
 
 class FilmEnv(OpenLoopEnv):
-    """The open loop over a film that is there already. `care_sim.study` plays all policies of a
-    scene in it.
+    """The open loop over a film that is there already.
+
+    `care_sim.study` plays all policies of a scene in it.
     """
 
     def __init__(self, film: Film, **parameters: Any):

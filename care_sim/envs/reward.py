@@ -1,5 +1,6 @@
-"""The reward: named weights over metrics of a keyframe, each at most 0, so that 0 is the best
-return there is.
+"""The reward of the closed loop: named weights over metrics of a keyframe.
+
+Each is at most 0, so that 0 is the best return there is.
 """
 
 from collections.abc import Mapping
@@ -26,8 +27,9 @@ HEAVIEST = 1e6
 
 
 def weights(changes: Mapping[str, float] | None) -> dict[str, float]:
-    """The default weights with some changed. Raises InvalidInput for an unknown term or no finite
-    number.
+    """The default weights with some changed.
+
+    Raises InvalidInput for an unknown term or no finite number.
     """
     changes = {} if changes is None else changes
     if not isinstance(changes, Mapping):
@@ -67,8 +69,7 @@ def terms(record: Keyframe, in_view: bool, detected: bool, lost: float = 0.0) ->
 
 
 class Potential:
-    """The share of the full-scan bound that is lost so far, as a potential. One instance lives as
-    long as an episode.
+    """The share of the full-scan bound that is lost so far in an episode, as a potential.
 
     The bound is the distance at the first keyframe at which a scan of every cell would have
     detected the first-sighting actor. From then on, while it is undetected, 1 - distance / bound is

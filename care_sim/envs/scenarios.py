@@ -4,13 +4,12 @@ from care_sim.envs.closed_loop import ClosedLoopEnv
 
 
 class DartoutEnv(ClosedLoopEnv):
-    """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty 30 km/h
-    street.
+    """`CARE-Dartout-v0`: a person runs out from behind a parked trailer into an empty street.
 
-    The paper's first closed-loop scene. The seed draws the speeds, the place and the timing; see
-    `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources, all of which
-    can be passed as arguments. `occluder="truck", occluder_reported=True` parks a vehicle that
-    perception reports instead.
+    The paper's first closed-loop scene, at 30 km/h. The seed draws the speeds, the place and the
+    timing; see `care_sim.scenarios.crossing.CrossingScenario` for the physics and their sources,
+    all of which can be passed as arguments. `occluder="truck", occluder_reported=True` parks a
+    vehicle that perception reports instead.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
@@ -18,11 +17,10 @@ class DartoutEnv(ClosedLoopEnv):
 
 
 class DenseEnv(ClosedLoopEnv):
-    """`CARE-Dense-v0`: the dart-out in a street lined with `vehicles` (7) tracked ones, five in the
-    camera's view.
+    """`CARE-Dense-v0`: the dart-out in a street lined with tracked vehicles.
 
-    At 3% of the cells a reserve for every camera box starves the person; `care_sim.scenarios.dense`
-    reckons why, cell by cell.
+    There are `vehicles` (7) of them, five in the camera's view. At 3% of the cells a reserve for
+    every camera box starves the person; `care_sim.scenarios.dense` reckons why, cell by cell.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"

@@ -30,8 +30,9 @@ class StreetEnv(OpenLoopEnv):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
-        """Begin an episode in the street of a seed. `info` holds what repeats it; there are no
-        `options`.
+        """Begin an episode in the street of a seed.
+
+        `info` holds what repeats it; there are no `options`.
         """
         self._reseed(seed)
         entropy = self._draw_entropy(seed)
@@ -60,6 +61,7 @@ class ReplayEnv(FilmEnv):
         camera_detections: str | PathLike[str] | None = None,
         **parameters: Any,
     ):
+        # Before the scene is read, so that a wrong name is refused at once.
         check_film_arguments(type(self), parameters)
         if not isinstance(scene, str | None):
             raise InvalidInput(f"scene must be a name, got {shown(scene)}")

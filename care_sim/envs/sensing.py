@@ -1,5 +1,6 @@
-"""What the environments of both loops share: a rig, its spaces, and a budget that no action can
-overspend.
+"""What the environments of both loops share: a rig, its spaces, and its budget.
+
+No action can overspend that budget.
 """
 
 import inspect
@@ -108,8 +109,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return streams(entropy, count, self._secret)
 
     def _info_of(self, own: dict[str, Any], scoring: dict[str, Any]) -> dict[str, Any]:
-        """`info`: what the car itself knows and, unless `scoring_info` is off, what only the
-        scoring may know.
+        """`info`: what the car itself knows, and what only the scoring may know.
+
+        The latter is left out where `scoring_info` is off.
         """
         return own | scoring if self.scoring_info else own
 

@@ -15,8 +15,10 @@ from care_sim.core.rig import Rig
 
 
 def observation_space(rig: Rig) -> spaces.Space[Any]:
-    """The bounded observation space of a rig; keys and columns as in `care_sim.core.types`, bounds
-    of `care_sim.core.observation_limits`.
+    """The bounded observation space of a rig.
+
+    Keys and columns are as in `care_sim.core.types`, bounds as in
+    `care_sim.core.observation_limits`.
     """
     grid = rig.grid
     limits = Limits(rig)

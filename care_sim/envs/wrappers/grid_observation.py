@@ -17,8 +17,9 @@ GridArrays = dict[str, NDArray[np.float32]]
 
 
 class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], RecordConstructorArgs):
-    """Shows the belief as six channels over `columns` x `rows` blocks of the angular grid, and the
-    car's own motion.
+    """Shows the belief as coarse pictures of the angular grid, and the car's own motion.
+
+    The pictures are six channels over `columns` x `rows` blocks of the grid.
 
     ### Observation
     A `Dict` of float32 vectors. `grid` is flat, since Stable-Baselines3 takes anything of three
@@ -86,8 +87,9 @@ class GridObservation(gymnasium.ObservationWrapper[GridArrays, Any, Any], Record
 
     @property
     def belief(self) -> Belief:
-        """What the pictures were last drawn of, for wrappers outside. Raises
-        gymnasium.error.ResetNeeded before the first reset.
+        """What the pictures were last drawn of, for wrappers outside.
+
+        Raises gymnasium.error.ResetNeeded before the first reset.
         """
         if self._given is None:
             raise gymnasium.error.ResetNeeded("call reset() before stepping")

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 
 def _recording_class() -> "type[Recording]":
-    """The class, imported when somebody records. Its module imports Rerun, of the optional extra
-    'viewer', and this wrapper can be imported without it. Raises MissingExtra without Rerun.
+    """The class, imported when somebody records.
+
+    Its module imports Rerun, of the optional extra 'viewer', and this wrapper can be imported
+    without it. Raises MissingExtra without Rerun.
     """
     import_rerun()
     from care_sim.viewer.recording.recording import Recording
@@ -33,7 +35,8 @@ def _recording_class() -> "type[Recording]":
 
 def recording(path: Path, lanes: Sequence[str]) -> "Recording":
     """A file for several episodes, which `RecordRerun` takes in the place of a path; to be closed.
-    `lanes` are their names. Raises as `RecordRerun` does.
+
+    `lanes` are the names of the episodes. Raises as `RecordRerun` does.
     """
     return _recording_class()(path, lanes)
 

@@ -36,10 +36,10 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
 
 
 class SectorReserve(_Sectors):
-    """The action ranks sectors for the reserve; exploitation and floor stay those of the shared
-    allocator.
+    """The action ranks sectors for the reserve.
 
-    So a learner competes with the rules on the reserve alone.
+    Exploitation and floor stay those of the shared allocator, so a learner competes with the rules
+    on the reserve alone.
 
     ### Action
     `Box(-1, 1, (elevations, azimuths), float32)`, one score per sector; elevation 0 is the highest,
@@ -113,8 +113,7 @@ class SectorReserve(_Sectors):
 
 
 class SectorScores(_Sectors):
-    """The action scores everything: sector after sector is fired whole, best first, up to the
-    budget.
+    """The action scores everything: sectors are fired whole, best first, up to the budget.
 
     ### Action
     `Box(-1, 1, (elevations, azimuths), float32)`, one score per sector; elevation 0 is the highest,

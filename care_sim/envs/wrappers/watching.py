@@ -16,11 +16,11 @@ from care_sim.policies.base import Policy
 
 
 class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
-    """Records the keyframes of the closed loop under it. It may stand around or inside wrappers
-    that change the action.
+    """Records the keyframes of the closed loop under it.
 
-    With the `policy` that acts, the shares of exploitation and reserve are known. Of raw actions it
-    is only known what was chosen and what the floor filled up.
+    It may stand around or inside wrappers that change the action. With the `policy` that acts, the
+    shares of exploitation and reserve are known. Of raw actions it is only known what was chosen
+    and what the floor filled up.
 
     Raises InvalidInput for an environment that is no closed loop of CARE-Sim.
     """
@@ -54,8 +54,9 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
 
     @abstractmethod
     def end(self, outcome: Mapping[str, Any] | None) -> None:
-        """The episode is over; `outcome` has the fields of `care_sim.loops.records.Outcome`, None
-        for one that was left.
+        """The episode is over.
+
+        `outcome` has the fields of `care_sim.loops.records.Outcome`; None for one that was left.
         """
 
     def reset(
@@ -109,8 +110,9 @@ class Watching(gymnasium.Wrapper[Any, Action, Any, Action], ABC):
 
 
 def numbered(path: Path, episode: int) -> Path:
-    """Where an episode is kept: the first in `path` itself, later ones beside it, with their
-    number.
+    """Where an episode is kept.
+
+    The first is kept in `path` itself, later ones beside it, with their number.
     """
     if not episode:
         return path
