@@ -1,4 +1,7 @@
-"""Where tasks are played: in processes of this machine, or on the workers of a dask cluster."""
+"""Where tasks are played: in processes of this machine, or on the workers of a dask cluster.
+
+What becomes of the tasks of a worker that dies is decided in `care_sim.study.runner`.
+"""
 
 import asyncio
 import logging

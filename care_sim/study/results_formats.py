@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.loops.records import Outcome
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
@@ -16,6 +15,7 @@ from care_sim.study.rows.schema import (
     CONDITION_COLUMNS,
     COUNT,
     FLAG,
+    MEASURE,
     PARAMETERS,
     SEED,
     SHARE,
@@ -35,33 +35,49 @@ from care_sim.study.scene_play import SUMS, event_columns, play_scene, without_e
 class ResultsFormat:
     """How one kind of results is played and kept.
 
-    `unit` is what its tasks are called. `play_batch` plays a batch. `finish` makes rows side by
-    side into those that are kept. `file` holds them, in columns of the `schema`. `listed` gives
-    configurations as plain data. `aside` gives further files, as columns by file name, made of the
-    rows as they were played.
+    `file` holds the rows that are kept, in columns of the `schema`.
     """
 
     unit: str
+    """What its tasks are called."""
     play_batch: PlayBatch
-    finish: Callable[[Sequence[Row]], list[Row]]
+    """Plays a batch of tasks."""
+    kept_rows: Callable[[Sequence[Row]], list[Row]]
+    """The rows that are kept, made of all rows as they were played: some columns compare a row with
+    others.
+    """
     file: str
     schema: Schema
     listed: Callable[[Any], dict[str, Any]]
-    aside: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
+    """Configurations as plain data."""
+    further_files: Callable[[Sequence[Row]], dict[str, dict[str, Any]]] = lambda _rows: {}
+    """Columns by file name, made of the rows as they were played."""
 
 
-# Added when a study is written. Older files and those of others may lack them.
-_WRITER_COLUMNS = dict.fromkeys(("version", "digest", "episode_hash", "tags"), as_optional(TEXT))
+_BY_WRITER = {
+    "version": as_optional(TEXT),
+    "digest": as_optional(TEXT),
+    "episode_hash": as_optional(TEXT),
+    "tags": as_optional(TEXT),
+}
+"""Columns that every study writes. Older files and those of others may lack them."""
 _EPISODES = Schema(
     {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS}
-    | {"budget": SHARE, "seed": SEED, "braked": FLAG, "collision": FLAG, "rays_fired": COUNT}
+    # What a file must have as a column is optional in a row where it tells of what did not happen:
+    # a detection, a view of the actor, a collision.
     | {
-        name: as_optional(SUM)
-        # Every outcome that may be None: distances and speeds of what did not happen.
-        for name, kind in Outcome.__annotations__.items()
-        if kind == float | None
+        "budget": SHARE,
+        "seed": SEED,
+        "detection_distance_m": as_optional(SUM),
+        "undetected_to_m": as_optional(SUM),
+        "braked": FLAG,
+        "min_distance_m": as_optional(SUM),
+        "clearance_m": as_optional(MEASURE),
+        "collision": FLAG,
+        "impact_speed_mps": as_optional(SUM),
+        "rays_fired": COUNT,
     },
-    _WRITER_COLUMNS,
+    _BY_WRITER,
 )
 _PLAYS = Schema(
     {name: CONDITION_COLUMNS.get(name, TEXT) for name in (*PLAY_FIELDS, "film_hash")}
@@ -72,31 +88,39 @@ _PLAYS = Schema(
         "ttfds": Column("lists of whole numbers", least=0),
     }
     | dict.fromkeys(SUMS, TALLY)
-    | dict.fromkeys(("tracks", "explained"), SUM)
-    # Nothing for the reference, which differs from itself in nothing, and for the full scan.
-    | dict.fromkeys(("differing_keyframes", "differing_cells"), as_optional(COUNT)),
-    _WRITER_COLUMNS
-    | dict.fromkeys(("recording", "camera_detections", "presence"), as_optional(TEXT))
-    | {"emerging": as_optional(COUNT)},
+    | {
+        "tracks": SUM,
+        "explained": SUM,
+        # Nothing for the reference, which differs from itself in nothing, and for the full scan.
+        "differing_keyframes": as_optional(COUNT),
+        "differing_cells": as_optional(COUNT),
+    },
+    _BY_WRITER
+    | {
+        "recording": as_optional(TEXT),
+        "camera_detections": as_optional(TEXT),
+        "presence": as_optional(TEXT),
+        "emerging": as_optional(COUNT),
+    },
     SUMS,
 )
 EPISODES = ResultsFormat(
-    "episodes",
-    play_episodes,
-    with_added_columns,
-    "episodes.parquet",
-    _EPISODES,
-    listed_episodes,
+    unit="episodes",
+    play_batch=play_episodes,
+    kept_rows=with_added_columns,
+    file="episodes.parquet",
+    schema=_EPISODES,
+    listed=listed_episodes,
 )
 PLAYS = ResultsFormat(
-    "plays",
-    play_scene,
+    unit="plays",
+    play_batch=play_scene,
     # The events have a file of their own, one row per event and play.
-    lambda rows: [without_events(row) for row in with_tags(rows)],
-    "plays.parquet",
-    _PLAYS,
-    listed_plays,
-    lambda rows: {"events.parquet": event_columns(rows)},
+    kept_rows=lambda rows: [without_events(row) for row in with_tags(rows)],
+    file="plays.parquet",
+    schema=_PLAYS,
+    listed=listed_plays,
+    further_files=lambda rows: {"events.parquet": event_columns(rows)},
 )
 RESULTS_FORMATS = (EPISODES, PLAYS)
 _PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence"})

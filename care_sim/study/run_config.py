@@ -71,18 +71,19 @@ class RunConfig(ABC):
         """What it shares with tasks that take about as long, the closest first."""
 
     def make_policy(self, env: gymnasium.Env[Any, Any]) -> Policy:
-        """The policy for the environment. Its files are looked at before it plays, because making
-        it may load more of its code.
-        """
+        """The policy for the environment."""
         policy = make_policy(self.policy, env, **dict(self.policy_parameters))
+        # For what it remembers: files of code are hashed once per process, as they are when first
+        # asked for. Making the policy may have loaded more of them, and an edit while it plays must
+        # not change what `digest` says of them.
         self.installed()
         return policy
 
     def digest(self) -> str:
-        """Hash of the effective configuration, with the version and code of the package and what is
-        installed beside it.
+        """Hash of the configuration and of all code and files that decide the row.
 
-        It never repeats in another run when an installed policy has no source to read.
+        A row carries the digest that its worker worked out after playing it. Where code has no
+        source to read, the name of this run stands for it, so that no other run has the digest.
         """
         code = [
             code_digest(),
@@ -100,19 +101,22 @@ class RunConfig(ABC):
 
     @cached_property
     def key(self) -> str:
-        """The digest when this process first asked for it. A study files the row under it, whatever
-        changes while it runs. A worker works out its own.
+        """The digest when this process first asked for it.
+
+        The process that leads a study files the row under it, whatever changes while it runs, and
+        refuses a row with another digest.
         """
         return self.digest()
 
     def __getstate__(self) -> dict[str, Any]:
-        # The key is not sent to workers. Each computes its own, and a row whose digest differs from
-        # the key shows a worker with other code.
+        # Workers are sent no key, so that each works out its own and one with other code shows.
+        # They are sent `_session`, which has no meaning of its own there. It is set once the key
+        # was asked for, as the study does before it hands out tasks.
         return {name: value for name, value in vars(self).items() if name != "key"}
 
     @cached_property
     def _session(self) -> str:
-        """The run that first asked for the digest, which the workers keep."""
+        """The name of the run that leads the study; stands for code that cannot be read."""
         return SESSION
 
     def changed(self, **values: object) -> Self:

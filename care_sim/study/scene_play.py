@@ -193,17 +193,17 @@ def film_hash(film: Film) -> str:
     )
     # What a policy or the scoring can see of a shot, in a fixed order.
     for shot in film.shots:
-        seen = shot.annotations
-        identified = shot.seen
+        annotations = shot.annotations
+        seen = shot.seen
         cloud = shot.cloud
         content.update(portable_bytes(shot.time_s, shot.token, astuple(shot.ego)))
         content.update(
             portable_bytes(
+                annotations.objects,
+                annotations.classes,
+                annotations.boxes,
+                seen.detections.rows(),
                 seen.objects,
-                seen.classes,
-                seen.boxes,
-                identified.detections.rows(),
-                identified.objects,
             )
         )
         content.update(portable_bytes(cloud.cells, cloud.objects))

@@ -128,16 +128,13 @@ def _keyframe(
 
 
 def _first_camera(shot: Shot) -> Shot:
-    identified = shot.seen
-    seen = np.flatnonzero(identified.detections.cameras == 0)
+    seen = shot.seen
+    rows = np.flatnonzero(seen.detections.cameras == 0)
     columns = {
-        field.name: getattr(identified.detections, field.name)[seen]
-        for field in fields(identified.detections)
+        field.name: getattr(seen.detections, field.name)[rows] for field in fields(seen.detections)
     }
     front = replace(
-        identified,
-        detections=replace(identified.detections, **columns),
-        objects=identified.objects[seen],
+        seen, detections=replace(seen.detections, **columns), objects=seen.objects[rows]
     )
     return replace(shot, seen=front)
 

@@ -1,3 +1,6 @@
+from care_sim.loops.records import Outcome
+from care_sim.study.results_formats import EPISODES
+from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
 from tests.helpers.made_rows import rows
 
@@ -32,3 +35,18 @@ def test_what_was_there_stays_and_tags_are_text():
 def test_a_camera_fault_is_measured_against_the_full_scan_that_asks_no_camera():
     faulty = rows("care", [14.0], scenario="dartout", budget=0.1, false_negative_rates=(0.2,))
     assert columns([*faulty, *rows("full", [15.0], scenario="dartout")], "care") == [(1.0, False)]
+
+
+def test_a_collision_is_read_again_although_its_hulls_overlap(tmp_path):
+    touched = {"collision": True, "impact_speed_mps": 3.5, "clearance_m": -0.1}
+    study = with_added_columns(rows("history", [None], changes=touched))
+    file = tmp_path / EPISODES.file
+    write_rows(study, file, "sweep", [], EPISODES.schema)
+    (read,) = read_rows(file, EPISODES.schema)
+    assert {name: read[name] for name in touched} == touched
+
+
+def test_every_field_of_an_outcome_is_a_column_and_may_lack_what_it_may_lack():
+    columns = EPISODES.schema.needed
+    for name, kind in Outcome.__annotations__.items():
+        assert columns[name].optional == (kind == float | None)

@@ -144,11 +144,11 @@ def _write(
     """Write the results of a study: everything is made before the first file is replaced."""
     kind = study.results
     left_out = summary(failures, kind.unit)
-    finished = kind.finish(rows)
-    aside = kind.aside(rows)
-    report = StudyReport.of(finished, study, left_out)
+    kept = kind.kept_rows(rows)
+    further = kind.further_files(rows)
+    report = StudyReport.of(kept, study, left_out)
     write_text(folder / "config.json", _description(configs, study, failures))
-    for name, columns in aside.items():
+    for name, columns in further.items():
         write_columns(columns, folder / name)
-    write_rows(finished, folder / kind.file, study.name, left_out, study.schema)
+    write_rows(kept, folder / kind.file, study.name, left_out, study.schema)
     report.write(folder)

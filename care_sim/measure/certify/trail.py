@@ -175,14 +175,14 @@ def _moving(loop: ClosedLoop) -> tuple[Any, ...]:
 
 def _filmed(loop: Any) -> tuple[Any, ...]:
     shot = loop.shot
-    seen = shot.annotations
+    annotations = shot.annotations
     return (
         shot.time_s,
         astuple(shot.sensor),
         astuple(shot.ego),
-        seen.objects,
-        seen.classes,
-        seen.boxes,
+        annotations.objects,
+        annotations.classes,
+        annotations.boxes,
     )
 
 

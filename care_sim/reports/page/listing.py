@@ -66,13 +66,17 @@ def episode_groups(rows: Sequence[Row], episodes: Sequence[Episode]) -> list[Gro
 
 def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
     """What `play.js` plays: every replay, and the standing bodies that several share."""
-    shared: dict[str, int] = {}
+    standing: list[Any] = []
+    numbers: dict[str, int] = {}
     worlds: dict[Any, int] = {}
     played = []
     for episode in _watchable(episodes):
         assert episode.replay is not None
         # Policies meet the same world, whose standing bodies are then written once.
         bodies = episode.replay.bodies
+        number = numbers.setdefault(repr(bodies), len(numbers))
+        if number == len(standing):
+            standing.append(bodies)
         row = episode.row
         played.append(
             {
@@ -80,15 +84,12 @@ def replay_data(episodes: Sequence[Episode]) -> dict[str, Any]:
                 "setting": setting_of(row).label,
                 "seed": row["seed"],
                 "world": worlds.setdefault(_world(row), len(worlds)),
-                "bodies": shared.setdefault(repr(bodies), len(shared)),
-                "standing": bodies,
+                "bodies": number,
                 "differences": episode.differences,
                 "story": packed(episode.replay.story),
             }
         )
-    # Of several equal lists one is kept.
-    bodies_of = {one["bodies"]: one.pop("standing") for one in played}
-    return {"bodies": [bodies_of[number] for number in sorted(bodies_of)], "episodes": played}
+    return {"bodies": standing, "episodes": played}
 
 
 def _watchable(episodes: Sequence[Episode]) -> list[Episode]:

@@ -212,13 +212,13 @@ def _dense_less_sparse(
     interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
     if interval is None:
         return None
-    # The interval of the gap says nothing where one of the two ends has too few scenes for an
-    # interval of its own.
-    ends = [
+    # The two thirds are measured only to ask whether each has scenes enough for an interval of its
+    # own. Where one has not, that of the gap says nothing.
+    thirds = [
         _among(ratio, {name: ours[name] for name in groups[which]}, theirs)
         for which in ("dense", "sparse")
     ]
-    enough = all(end and end.interval for end in ends)
+    enough = all(third and third.interval for third in thirds)
     return MeasuredDifference(ratio, interval.mean, interval if enough else None)
 
 

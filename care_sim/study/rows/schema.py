@@ -91,14 +91,14 @@ class Column:
                 yield "must hold whole lists, got lists with gaps"
         if not _is_number(values.type) or self.kind == _ANY:
             return
+        # Without any number, in lists that are all empty, the ends are None, and so is `finite`.
         ends = pc.min_max(values).as_py()
-        # None where there are no values to look at.
-        finite = pc.all(pc.is_finite(values)).as_py() in (True, None)
-        if (
-            not finite
-            or not self.least <= (ends["min"] or 0)
-            or not (ends["max"] or self.least) <= self.most
-        ):
+        lowest = ends["min"]
+        highest = ends["max"]
+        finite = pc.all(pc.is_finite(values)).as_py()
+        if lowest is None:
+            return
+        if not (finite and self.least <= lowest and highest <= self.most):
             yield f"must hold {self.kind} from {self.least:g} to {self.most:g}"
         elif self.whole and pc.all(pc.equal(pc.round(values), values)).as_py() is False:
             yield "must hold whole numbers"
@@ -108,6 +108,8 @@ TEXT = Column("text")
 FLAG = Column("true or false")
 COUNT = Column("whole numbers", least=0)
 SEED = Column("whole numbers", least=0, most=math.inf)
+MEASURE = Column("numbers")
+"""What may be below 0, as the distance of hulls that overlap."""
 SUM = Column("numbers", least=0)
 TALLY = Column("numbers", least=0, whole=True)
 """Events and frames, and how many of them: numerators and denominators of the ratios in tables."""
