@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from traceback import extract_tb
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import gymnasium
 import numpy as np
@@ -16,6 +16,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput, one_line
 from care_sim.base.portable_hash import portable_bytes
 from care_sim.core.belief import Observation
+from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
@@ -77,17 +78,19 @@ def trace(
     # Made for the environment within the wrappers: the policy takes nothing from them.
     policy = config.make_policy(inner)
     with wrap(inner, policy) as env:
+        # The environment itself, which the wrappers that watch leave as it is.
+        played = cast(ClosedLoopEnv, env.unwrapped)
         observation, info = env.reset(seed=config.seed)
         policy.reset()
-        begin(env.unwrapped.loop)  # type: ignore[attr-defined]
+        begin(played.loop)
         ended = False
         while not ended:
             observation, _, terminated, truncated, info = env.step(policy(observation))
-            digest.add(info["fired"], observation, env.unwrapped.loop.world)  # type: ignore[attr-defined]
+            digest.add(info["fired"], observation, played.loop.world)
             for watch in watchers:
-                watch(env.unwrapped.loop, env.unwrapped.keyframes[-1])  # type: ignore[attr-defined]
+                watch(played.loop, played.keyframes[-1])
             ended = terminated or truncated
-        keyframes: list[Keyframe] = env.unwrapped.keyframes  # type: ignore[attr-defined]
+        keyframes = played.keyframes
     row = {
         **config.row(),
         "version": care_sim.__version__,

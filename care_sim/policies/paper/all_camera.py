@@ -7,8 +7,10 @@ from care_sim.policies.base import Policy
 
 
 class AllCamera(Policy):
-    """The all-camera control of the paper (Sec. 5.1): history plus one reserve layer with the
-    wedges of every camera detection. It lacks only the residual filter of CARE.
+    """The all-camera control of the paper (Sec. 5.1).
+
+    It is history plus one reserve layer with the wedges of every camera detection. It lacks only
+    the residual filter of CARE.
     """
 
     name = "all-camera"

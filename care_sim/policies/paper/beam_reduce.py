@@ -10,10 +10,11 @@ from care_sim.policies.base import Policy
 
 
 class BeamReduce(Policy):
-    """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), which drops scan lines from a
-    cloud. The paper (Sec. 5.1) adapts it into a causal scan policy, which fires whole rows, the
-    nearest to the horizon first. The last row is thinned evenly, so that exactly B cells are asked
-    for.
+    """Beam reduction of LiDAR Distillation (Wei et al., ECCV 2022), as a causal scan policy.
+
+    The original drops scan lines from a cloud. The paper (Sec. 5.1) adapts it: whole rows are
+    fired, the nearest to the horizon first. The last row is thinned evenly, so that exactly B cells
+    are asked for.
     """
 
     name = "beam-reduce"
@@ -29,8 +30,9 @@ class BeamReduce(Policy):
 
 
 def horizon_rows(grid: AngularGrid, count: int) -> list[Cells]:
-    """The cells of the rows nearest the horizon, nearest first, `count` in all; the last row evenly
-    thinned.
+    """The cells of the rows nearest the horizon, nearest first, `count` in all.
+
+    The last row is evenly thinned.
     """
     # The height of a row's unit rays orders rows as their elevation does. Rows as far above the
     # horizon as below keep the order of their index: the upper one first.

@@ -7,8 +7,10 @@ from care_sim.policies.base import Policy
 
 
 class Care(Policy):
-    """The camera-residual reserve of the paper (Sec. 4.2, Algorithm 2): history plus the layer U of
-    unexplained wedges. Without a camera detection it is the history policy, cell for cell.
+    """The camera-residual reserve of the paper (Sec. 4.2, Algorithm 2).
+
+    It is history plus the layer U of unexplained wedges. Without a camera detection it is the
+    history policy, cell for cell.
     """
 
     name = "care"

@@ -7,8 +7,10 @@ from care_sim.policies.base import Policy
 
 
 class CarePriority(Policy):
-    """The priority-ordering variant of the paper (Sec. 4.2): CARE with the layers (U, M). The
-    wedges of unexplained detections fill first, then those of explained ones. Nothing is forgotten.
+    """The priority-ordering variant of the paper (Sec. 4.2): CARE with the layers (U, M).
+
+    The wedges of unexplained detections fill first, then those of explained ones. Nothing is
+    forgotten.
     """
 
     name = "care-priority"

@@ -9,8 +9,10 @@ from care_sim.policies.base import Policy
 
 
 class CareSbf(Policy):
-    """CARE+SBF of the paper (Sec. 4.3, Algorithm 3): hulls of harmless tracks shrink and are served
-    after the full ones; the reserve layers are (U, M).
+    """CARE+SBF of the paper (Sec. 4.3, Algorithm 3).
+
+    Hulls of harmless tracks shrink and are served after the full ones; the reserve layers are
+    (U, M).
 
     Parameters are the fields of `ForgettingRules`, with their units and bounds, for example
     `k_safe=0` for unguarded forgetting. Raises InvalidInput for a value out of its bounds.

@@ -9,9 +9,10 @@ from care_sim.policies.paper.matched_fraction import MatchedFraction
 
 
 class FarthestPoints(MatchedFraction):
-    """The second reference of the paper (Sec. 5.1): a matched fraction of the full cloud by
-    farthest point sampling (PointNet++, Qi et al., NeurIPS 2017; Open3D), which begins with the
-    first point.
+    """The second reference of the paper (Sec. 5.1): a matched fraction by farthest point sampling.
+
+    The sampling (PointNet++, Qi et al., NeurIPS 2017; Open3D) begins with the first point of the
+    full cloud.
 
     Raises MissingExtra without Open3D.
     """

@@ -7,6 +7,7 @@ from care_sim.policies.base import Policy
 
 class History(Policy):
     """The base policy of the paper (Sec. 4.1), its re-implementation of history-driven scanning.
+
     The exploitation sets are the dilated hulls of the forecasts, nearest first. The reserve is
     empty, so the random floor takes what they leave.
     """

@@ -9,9 +9,10 @@ from care_sim.policies.base import PrivilegedPolicy
 
 
 class HistoryOracle(PrivilegedPolicy):
-    """The oracle of the paper (Sec. 5.2): history, with the forecast of every tracked object
-    replaced by its true next position. It bounds any learned predictor of regions from above. New
-    objects stay unknown to it.
+    """The oracle of the paper (Sec. 5.2): history with the true next positions of tracked objects.
+
+    They replace the forecasts. It bounds any learned predictor of regions from above. New objects
+    stay unknown to it.
     """
 
     name = "history-oracle"

@@ -13,8 +13,10 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 
 
 class HistoryUniform(Policy):
-    """The control history+uniform of the paper (Sec. 5.1): the whole reserve, rho B cells, goes to
-    one pattern that stays the same over the episode and looks nowhere in particular.
+    """The control history+uniform of the paper (Sec. 5.1).
+
+    The whole reserve, rho B cells, goes to one pattern that stays the same over the episode and
+    looks nowhere in particular.
     """
 
     name = "history-uniform"
@@ -32,8 +34,9 @@ class HistoryUniform(Policy):
 
 
 def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
-    """`count` different cells, ascending: as many in every row, evenly spaced, each row shifted
-    against the one above by the golden ratio of its spacing.
+    """`count` different cells, ascending: as many in every row, evenly spaced.
+
+    Each row is shifted against the one above by the golden ratio of its spacing.
     """
     # The numbers go to the rows as evenly as whole numbers can. Then each one's place in its row.
     numbers = np.arange(count)

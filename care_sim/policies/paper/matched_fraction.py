@@ -12,8 +12,10 @@ from care_sim.policies.base import PrivilegedPolicy
 
 
 class MatchedFraction(PrivilegedPolicy):
-    """A reference that is not causal (paper, Sec. 5.1). It sees the full cloud of P points before
-    it chooses, keeps round(beta P) of them, and so saves no sensing. The rest of the budget goes to
+    """A reference that is not causal (paper, Sec. 5.1).
+
+    It sees the full cloud of P points before it chooses, keeps round(beta P) of them, and so saves
+    no sensing. The rest of the budget goes to
     cells that return nothing, in ascending order, so that the shared floor adds no point.
     """
 

@@ -14,8 +14,7 @@ from care_sim.policies.paper.matched_fraction import MatchedFraction
 
 
 class RandomPoints(MatchedFraction):
-    """The first reference of the paper (Sec. 5.1): a matched fraction of the full cloud, drawn at
-    random.
+    """The first reference of the paper (Sec. 5.1): a matched fraction, drawn at random.
 
     `seed` and the cloud decide the draw, so that no two keyframes or episodes share one. The last
     bits of the cloud differ between processors and do not enter.

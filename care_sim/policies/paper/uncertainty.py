@@ -22,9 +22,10 @@ SHELL_M = 1.0
 
 
 class Uncertainty(Policy):
-    """The uncertainty reserve of the paper (Sec. 5.1), in the style of light curtains (Ancha et
-    al., ECCV 2020; safety envelopes, RSS 2021): cells that were occupied but undetected at the
-    previous scan are fired again, the closest obstacle first.
+    """The uncertainty reserve of the paper (Sec. 5.1), in the style of light curtains.
+
+    Cells that were occupied but undetected at the previous scan are fired again, the closest
+    obstacle first (Ancha et al., ECCV 2020; safety envelopes, RSS 2021).
     """
 
     name = "uncertainty"
