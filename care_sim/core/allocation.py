@@ -51,9 +51,10 @@ def allocate(
 
     Exploitation sets fill at most round((1 - rho) B) cells, round-robin. Then each reserve layer in
     order fills up to B, round-robin. Then `floor`, a permutation of all cells, fills up to B; None
-    leaves the rest unspent. Within a set, cells are taken in ascending order, and a cell that is
-    already taken costs the set no turn. rho = 0 keeps no reserve: layers then take only what
-    exploitation leaves. Raises InvalidInput for another form of demand or floor.
+    leaves the rest unspent. Within a set, cells are taken in its own order
+    (`care_sim.core.cell_order`), and a cell that is already taken costs the set no turn. rho = 0
+    keeps no reserve: layers then take only what exploitation leaves. Raises InvalidInput for
+    another form of demand or floor.
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     check_whole("budget", budget, 0, HIGHEST_CELL)
@@ -109,14 +110,13 @@ def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
     set_ends = np.array([*accumulate(map(len, sets))], np.int64)
     stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
-    lowest, highest, ascending = _survey(cells, set_ends)
 
     # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
+    lowest = min(0, cells.min(initial=0))
+    highest = cells.max(initial=0)
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
-    if not ascending:
-        cells = np.concatenate([np.sort(part) for part in np.split(cells, set_ends)])
     most = np.array(limits, np.int64)
     return _fill_stages(cells, set_ends, stage_ends, most, lowest, highest)
 
@@ -151,23 +151,6 @@ class _Selection(NamedTuple):
     chosen: Cells
     taken: Mask
     lowest: int
-
-
-@compiled()
-def _survey(cells: Cells, set_ends: Integers) -> tuple[int, int, bool]:
-    """Lowest (at most 0) and highest (at least 0) of the cells, and whether every set is ascending.
-
-    Sets lie one after the other in `cells`; set s ends at `set_ends[s]`.
-    """
-    # One pass over all cells. Policies hand in ascending sets; only others pay for a sort.
-    lowest = highest = start = 0
-    ascending = True
-    for end in set_ends:
-        for n in range(start, end):
-            lowest, highest = min(lowest, cells[n]), max(highest, cells[n])
-            ascending &= n == start or cells[n - 1] <= cells[n]
-        start = end
-    return lowest, highest, ascending
 
 
 @compiled()

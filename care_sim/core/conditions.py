@@ -15,6 +15,7 @@ from care_sim.base.checks import LARGEST_INTEGER, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.allocation import RESERVE_FRACTION
+from care_sim.core.cell_order import AS_DEMANDED
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
 
 MIN_RETURNS = 3
@@ -137,6 +138,11 @@ class Conditions(Sensing):
     """Columns by which hulls and wedges are dilated."""
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
     """Rows by which hulls and wedges are dilated."""
+    cell_order: str = AS_DEMANDED
+    """In which order the cells of a set are taken: `as-demanded`, which for the paper's policies is
+    row by row from the top, `rows-down`, `rows-up`, `columns`, `random`, `spread` or
+    `core-spread`.
+    """
 
 
 DEFAULTS = {field.name: field.default for field in fields(Conditions)}
@@ -149,6 +155,7 @@ UNUSED_BY_FULL_SCAN = (
     "floor_seed",
     "azimuth_margin",
     "elevation_margin",
+    "cell_order",
 )
 """Conditions that change nothing for a scan of every cell: it asks neither the camera nor the
 allocator."""

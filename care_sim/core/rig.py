@@ -1,13 +1,16 @@
 """What is fixed about the sensing task: grid, cameras, budget, margins."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from care_sim.base.bounds import bounded, check_fields
+from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.allocation import RESERVE_FRACTION, budget_cells
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief, Observation
+from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, SetMargins, reordered
 from care_sim.core.grid import (
     AZIMUTH_MARGIN,
     ELEVATION_MARGIN,
@@ -18,6 +21,7 @@ from care_sim.core.grid import (
 )
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
+from care_sim.core.types import Demand
 
 LIDAR_HEIGHT_M = 1.84
 """Of the LiDAR above the road: LIDAR_TOP of nuScenes."""
@@ -29,8 +33,9 @@ class Rig:
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` is the time
     between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
-    `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road. Raises InvalidInput
-    for a value out of its bounds.
+    `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road. The sets that a
+    policy demands are listed in a `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before
+    cells are chosen. Raises InvalidInput for a value out of its bounds.
     """
 
     grid: AngularGrid = field(default_factory=AngularGrid)
@@ -41,11 +46,13 @@ class Rig:
     azimuth_margin: int = bounded(AZIMUTH_MARGIN, 0, MOST_COLUMNS)
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
     sensor_height_m: float = bounded(LIDAR_HEIGHT_M, 0, 100)
+    cell_order: str = AS_DEMANDED
 
     def __post_init__(self) -> None:
         check_fields(self)
         if not isinstance(self.grid, AngularGrid):
             raise InvalidInput(f"grid must be an AngularGrid, got {shown(self.grid)}")
+        check_known("cell_order", self.cell_order, CELL_ORDERS)
         cameras = self.cameras
         if not (
             isinstance(cameras, tuple | list)
@@ -80,3 +87,21 @@ class Rig:
         """
         azimuth = self.azimuth_margin if azimuth_margins is None else azimuth_margins
         return self.grid.hulls(boxes, azimuth, self.elevation_margin)
+
+    def reordered(self, sets: Sequence[Cells], order: str) -> list[Cells]:
+        """Sets that were dilated by the rig's margins, the cells of each listed in an order of
+        `care_sim.core.cell_order.CELL_ORDERS`.
+        """
+        if order == AS_DEMANDED:
+            return list(sets)
+        margins = SetMargins(self.azimuth_margin, self.elevation_margin)
+        return reordered(sets, order, self.grid.spacing, margins)
+
+    def in_cell_order(self, demand: Demand) -> Demand:
+        """The demand with all its sets listed in the rig's `cell_order`."""
+        if self.cell_order == AS_DEMANDED:
+            return demand
+        exploitation, *layers = (
+            self.reordered(sets, self.cell_order) for sets in (demand.exploitation, *demand.layers)
+        )
+        return Demand(exploitation, layers)

@@ -214,7 +214,11 @@ def _table(*columns: NDArray[np.generic]) -> Floats:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a policy asks of the allocator (Algorithm 1)."""
+    """What a policy asks of the allocator (Algorithm 1).
+
+    A set is a list of cells, taken in its order. The paper takes them "in ascending index", and so
+    its policies list them (`care_sim.core.cell_order`).
+    """
 
     exploitation: Sequence[Cells] = ()
     """Sets of cells, that of the nearest object first."""

@@ -111,6 +111,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `floor` | allocator | whether the random floor spends what the policy leaves |
     | `floor_seed` | allocator | which of the random floors that the seed holds |
     | `azimuth_margin`, `elevation_margin` | allocator | cells by which hulls are dilated |
+    | `cell_order` | allocator | in which order the cells of a set are taken |
     | `engine` | sensors | what casts the rays, "fast" or "bullet" |
     | `min_returns` | LiDAR detector | fired rays that must hit an object |
     | `camera_confidence` | camera detector | least confidence of a detection |

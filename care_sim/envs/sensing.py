@@ -70,6 +70,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             azimuth_margin=conditions.azimuth_margin,
             elevation_margin=conditions.elevation_margin,
             sensor_height_m=sensor_height_m,
+            cell_order=conditions.cell_order,
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)

@@ -63,6 +63,7 @@ class Policy(ABC):
         demand = self.demand(belief)
         if not isinstance(demand, Demand):
             raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")
+        demand = self.rig.in_cell_order(demand)
         self.demanded = demand
         cells = allocate(demand, belief.budget, self.rig.reserve_fraction)
         if cells.min(initial=0) < 0 or cells.max(initial=0) >= self.rig.grid.size:

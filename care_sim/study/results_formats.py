@@ -59,10 +59,13 @@ _BY_WRITER = {
     "digest": as_optional(TEXT),
     "episode_hash": as_optional(TEXT),
     "tags": as_optional(TEXT),
+    "cell_order": CONDITION_COLUMNS["cell_order"],
 }
-"""Columns that every study writes. Older files and those of others may lack them."""
+"""Columns that every study writes. Older files and those of others may lack them: a condition that
+they do not know was at its default.
+"""
 _EPISODES = Schema(
-    {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS}
+    {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS if name not in _BY_WRITER}
     # What a file must have as a column is optional in a row where it tells of what did not happen:
     # a detection, a view of the actor, a collision.
     | {
@@ -80,7 +83,11 @@ _EPISODES = Schema(
     _BY_WRITER,
 )
 _PLAYS = Schema(
-    {name: CONDITION_COLUMNS.get(name, TEXT) for name in (*PLAY_FIELDS, "film_hash")}
+    {
+        name: CONDITION_COLUMNS.get(name, TEXT)
+        for name in (*PLAY_FIELDS, "film_hash")
+        if name not in _BY_WRITER
+    }
     | {
         "budget": SHARE,
         "keyframes": COUNT,

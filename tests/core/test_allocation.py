@@ -22,7 +22,7 @@ def in_turns(sets, limit, taken):
     while before < len(taken) < limit:
         before = len(taken)
         for one in sets:
-            left = [cell for cell in sorted(one) if cell not in taken]
+            left = [cell for cell in one if cell not in taken]
             taken.extend(left[: min(1, limit - len(taken))])
 
 
@@ -62,7 +62,7 @@ def test_worked_by_hand():
         exploitation=[[1, 2, 3], [2, 3, 4, 5], []],
         layers=[[[5, 6], [0, 6, 7]], [[9, 8, 30]]],
     )
-    assert allocate(demand, 10, 0.3).tolist() == [1, 2, 3, 4, 5, 6, 0, 7, 8, 9]
+    assert allocate(demand, 10, 0.3).tolist() == [1, 2, 3, 4, 5, 6, 0, 7, 9, 8]
 
 
 def test_a_taken_cell_costs_its_set_no_turn():
@@ -70,8 +70,8 @@ def test_a_taken_cell_costs_its_set_no_turn():
     assert allocate(demand, 7, 0.0).tolist() == [1, 20, 30, 10, 21, 31, 11]
 
 
-def test_within_a_set_cells_go_by_ascending_index_whatever_their_order():
-    assert allocate(Demand(exploitation=[[9, 3, 7, 3]]), 9, 0.0).tolist() == [3, 7, 9]
+def test_a_set_is_taken_in_its_order_and_a_cell_once():
+    assert allocate(Demand(exploitation=[[9, 3, 7, 3]]), 9, 0.0).tolist() == [9, 3, 7]
 
 
 def test_nearer_sets_come_first_in_every_round():
@@ -116,11 +116,11 @@ def test_a_burst_of_reserve_cells_never_displaces_exploitation():
 def test_sets_in_any_order_and_below_zero_are_taken_as_they_are():
     """The policies' door refuses what the grid does not have; the allocator knows no grid."""
     assert allocate(Demand([[7, -3, 7], [-3, 12]], [[[5, 4]]]), 5, 0.0).tolist() == [
+        7,
         -3,
         12,
-        7,
-        4,
         5,
+        4,
     ]
 
 

@@ -357,6 +357,7 @@ def test_step_before_reset_says_so():
         ({"lidar_dropout": 2.0}, "dropout must lie in"),
         ({"lidar_range_sigma": -1.0}, "range_sigma"),
         ({"engine": "magic"}, "unknown engine 'magic'; known: bullet"),
+        ({"cell_order": "magic"}, "unknown cell_order 'magic'; known: as-demanded, columns"),
         ({"keyframe_s": 0.12}, "multiple of the world step"),
         ({"render_mode": "ascii"}, "render_mode must be"),
         ({"occluder": "cloud"}, "unknown occluder"),

@@ -1,6 +1,7 @@
 """What every policy keeps to in every environment, until after the hidden actor appears."""
 
-from itertools import product
+from dataclasses import replace
+from itertools import chain, product
 
 import gymnasium
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import care_sim
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import MAX_DETECTIONS, Belief
+from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.policies import BUILT_IN
 
@@ -94,6 +96,35 @@ def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
         assert np.array_equal(other(observation), action)
         observation, *_ = env.step(action)
         read_only(observation)
+
+
+def test_a_policy_lists_its_sets_row_by_row_from_the_top(case):
+    """As the paper has it: in ascending index. So naming that order changes no action."""
+    env, name = case
+    policy, named = (care_sim.make_policy(name, env) for _ in range(2))
+    named.rig = replace(named.rig, cell_order="rows-down")
+    observation = driven_to_the_encounter(env)
+    for _ in range(KEYFRAMES // 2):
+        action = policy(observation)
+        assert np.array_equal(named(observation), action)
+        observation, *_ = env.step(action)
+        read_only(observation)
+
+
+@pytest.mark.parametrize("order", CELL_ORDERS[2:])
+def test_another_order_fires_other_cells_of_the_same_sets(order, encounter, environment):
+    policy, other = (care_sim.make_policy("care", environment) for _ in range(2))
+    other.rig = replace(other.rig, cell_order=order)
+    differing = 0
+    for observation in encounter:
+        differing += not np.array_equal(policy(observation) > 0, other(observation) > 0)
+        for ours, theirs in zip(
+            [*policy.demanded.exploitation, *chain(*policy.demanded.layers)],
+            [*other.demanded.exploitation, *chain(*other.demanded.layers)],
+            strict=True,
+        ):
+            assert np.array_equal(np.sort(theirs), ours)
+    assert differing
 
 
 @pytest.mark.parametrize("name", ["care", "care-priority", "all-camera"])

@@ -34,4 +34,4 @@ class MatchedFraction(PrivilegedPolicy):
         # beta is the budget over all cells: the belief tells the budget in cells.
         kept = self.kept(cells, points, round(belief.budget * len(cells) / self.rig.grid.size))
         silent = scan.cells[~returned][: belief.budget - len(kept)]
-        return Demand(layers=[[kept], [silent]])
+        return Demand(layers=[[np.sort(kept)], [silent]])

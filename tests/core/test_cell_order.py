@@ -1,0 +1,175 @@
+"""The order of the cells inside a set."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.allocation import allocate
+from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, SetMargins, reordered
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+
+GRID = AngularGrid()
+COLUMNS, ROWS = GRID.columns, GRID.rows
+MARGINS = SetMargins(2, 1)
+ORDERS = CELL_ORDERS[1:]
+
+
+def rectangle(first, width, upper, height):
+    """The ascending cells of `width` columns from `first` on, over the seam, and of some rows."""
+    columns = (first + np.arange(width)) % COLUMNS
+    rows = np.arange(upper, upper + height)
+    return np.sort((rows[:, None] * COLUMNS + columns).ravel())
+
+
+def listed(cells, order, margins=MARGINS):
+    (found,) = reordered([cells], order, GRID.spacing, margins)
+    return found
+
+
+def places(cells, first):
+    """Rows, and columns counted from `first`."""
+    return cells // COLUMNS, (cells % COLUMNS - first) % COLUMNS
+
+
+@st.composite
+def rectangles(draw):
+    width = draw(st.integers(1, COLUMNS))
+    height = draw(st.integers(1, ROWS))
+    return draw(st.integers(0, COLUMNS - 1)), width, draw(st.integers(0, ROWS - height)), height
+
+
+@given(st.lists(st.integers(0, GRID.size - 1), unique=True), st.sampled_from(ORDERS))
+def test_every_order_lists_the_cells_of_the_set(cells, order):
+    assert np.sort(listed(np.array(cells, np.int64), order)).tolist() == sorted(cells)
+
+
+@given(rectangles())
+def test_rows_and_columns(where):
+    first, width, _, _ = where
+    cells = rectangle(*where)
+    assert listed(cells[::-1], "rows-down").tolist() == cells.tolist()
+    rows, columns = places(listed(cells, "rows-up"), 0)
+    assert np.lexsort((columns, -rows)).tolist() == [*range(len(cells))]
+    start = first if width < COLUMNS else 0
+    rows, columns = places(listed(cells, "columns"), start)
+    assert np.lexsort((rows, columns)).tolist() == [*range(len(cells))]
+
+
+@given(rectangles(), st.integers(0, COLUMNS - 1), st.sampled_from(["columns", "spread"]))
+def test_the_seam_makes_no_difference(where, turned, order):
+    first, width, upper, height = where
+    if width == COLUMNS:
+        return
+    here = places(listed(rectangle(*where), order), first)
+    there = (first + turned) % COLUMNS
+    turned_cells = listed(rectangle(there, width, upper, height), order)
+    assert np.array_equal(here, places(turned_cells, there))
+
+
+@given(rectangles(), st.integers(0, 3), st.integers(0, 3))
+def test_the_core_is_the_rectangle_before_it_was_dilated(where, sides, ends):
+    first, width, upper, height = where
+    whole = rectangle(
+        first - sides,
+        min(width + 2 * sides, COLUMNS),
+        max(upper - ends, 0),
+        min(upper + height + ends, ROWS) - max(upper - ends, 0),
+    )
+    found = listed(whole, "core-spread", SetMargins(sides, ends))
+    core = rectangle(*where)
+    if width + 2 * sides >= COLUMNS or upper - ends <= 0 or upper + height + ends >= ROWS:
+        # All round, and where the grid cuts the margins, the rows or columns of the edge are core.
+        assert set(core) <= set(whole)
+        return
+    assert set(found[: len(core)]) == set(core)
+    # Core and rim are each in the order of the whole.
+    spread = listed(whole, "spread")
+    in_core = np.isin(spread, core)
+    assert np.array_equal(found, np.concatenate([spread[in_core], spread[~in_core]]))
+
+
+def test_a_set_that_is_all_margin_keeps_its_middle():
+    cells = rectangle(10, 3, 5, 2)
+    found = listed(cells, "core-spread", SetMargins(2, 1))
+    rows, columns = places(found, 10)
+    assert columns[:2].tolist() == [1, 1]
+    assert sorted(rows[:2]) == [5, 6]
+
+
+def test_rows_cut_by_the_grid_have_no_margin():
+    rows, _ = places(listed(rectangle(100, 5, 0, 4), "core-spread"), 100)
+    assert sorted(rows[:3]) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("order", ["spread", "core-spread"])
+@pytest.mark.parametrize(("width", "height"), [(12, 8), (20, 4), (40, 10), (7, 7)])
+def test_any_first_few_cells_lie_evenly(order, width, height):
+    """In every window the share of the cells taken departs from that of all by less than four
+    cells; eight random orders depart by more.
+    """
+    cells = rectangle(200, width, 10, height)
+
+    def unevenness(found):
+        rows, columns = places(found, 200)
+        worst = 0.0
+        for count in range(1, len(found)):
+            taken = np.zeros((height, width))
+            taken[rows[:count] - 10, columns[:count]] = 1
+            below = np.pad(taken.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+            area = np.outer(np.arange(height + 1), np.arange(width + 1)) * count / len(found)
+            worst = max(worst, np.abs(below - area).max())
+        return worst
+
+    margins = MARGINS if order == "spread" else SetMargins(0, 0)
+    ours = unevenness(listed(cells, order, margins))
+    others = [unevenness(np.random.default_rng(seed).permutation(cells)) for seed in range(8)]
+    assert ours < 4
+    assert ours < min(others)
+
+
+def test_random_is_one_permutation_of_the_grid():
+    everything = listed(np.arange(GRID.size), "random")
+    some = rectangle(500, 30, 3, 9)
+    assert listed(some, "random").tolist() == [c for c in everything.tolist() if c in set(some)]
+    assert not np.array_equal(everything, np.sort(everything))
+
+
+def test_sets_are_ordered_one_by_one():
+    sets = [rectangle(5, 9, 2, 4), np.empty(0, np.int64), rectangle(500, 30, 20, 12)]
+    for order in ORDERS:
+        together = reordered(sets, order, GRID.spacing, MARGINS)
+        assert [a.tolist() for a in together] == [
+            listed(cells, order).tolist() if len(cells) else [] for cells in sets
+        ]
+
+
+@pytest.mark.parametrize("cell", [-1, GRID.size])
+def test_a_cell_beyond_the_grid_is_refused(cell):
+    with pytest.raises(InvalidInput, match="cells must lie in"):
+        reordered([np.array([0, cell])], "spread", GRID.spacing, MARGINS)
+
+
+def test_the_rig_lists_all_sets_of_a_demand():
+    demand = Demand([rectangle(5, 9, 2, 4)], [[rectangle(30, 9, 2, 4)], [rectangle(60, 5, 2, 4)]])
+    assert Rig().in_cell_order(demand) is demand
+    spread = Rig(cell_order="spread").in_cell_order(demand)
+    for ours, theirs in zip(
+        [*spread.exploitation, *spread.layers[0], *spread.layers[1]],
+        [*demand.exploitation, *demand.layers[0], *demand.layers[1]],
+        strict=True,
+    ):
+        assert np.array_equal(ours, listed(theirs, "spread"))
+
+
+def test_the_allocator_takes_a_set_in_its_order():
+    assert allocate(Demand(layers=[[[7, 3, 5], [5, 1]]]), 4, 0.3).tolist() == [7, 5, 3, 1]
+
+
+def test_an_unknown_order_is_named():
+    with pytest.raises(InvalidInput, match="cell_order 'backwards'; known: as-demanded"):
+        Rig(cell_order="backwards")
+    assert Rig().cell_order == AS_DEMANDED
