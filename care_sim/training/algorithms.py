@@ -1,5 +1,6 @@
-"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration. Both libraries are
-imported when a learner is trained, since their extra 'rl' is optional.
+"""The learners of Stable-Baselines3 and sb3-contrib, made from a configuration.
+
+Both libraries are imported when a learner is trained, since their extra 'rl' is optional.
 """
 
 import math
@@ -14,8 +15,9 @@ if TYPE_CHECKING:
 
 
 def algorithm(name: str) -> Any:
-    """The class of a learner, a `BaseAlgorithm`. Raises MissingExtra for one that is not
-    installed.
+    """The class of a learner, a `BaseAlgorithm`.
+
+    Raises MissingExtra for one that is not installed.
     """
     try:
         if name == "recurrent-ppo":

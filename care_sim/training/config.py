@@ -110,8 +110,9 @@ class AgentConfig:
         }
 
     def check_same(self, before: Mapping[str, Any]) -> None:
-        """Raise InvalidInput, with the first difference, unless the run of that configuration can
-        be gone on with.
+        """Raise InvalidInput unless the run of that configuration can be gone on with.
+
+        The message names the first difference.
         """
         for name, value in self.recipe.items():
             if before.get(name) != value:

@@ -1,5 +1,6 @@
-"""Learning curves of training runs, read from their folders and grouped. Runs of a group differ by
-their seed alone.
+"""Learning curves of training runs, read from their folders and grouped.
+
+Runs of a group differ by their seed alone.
 """
 
 import json

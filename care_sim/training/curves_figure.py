@@ -13,8 +13,9 @@ from care_sim.training.curves import TrainingRun
 
 
 def curves_figure(groups: Sequence[Sequence[TrainingRun]]) -> Figure:
-    """A panel per recipe: a line per training seed, their mean where there are several, rules as
-    lines across.
+    """A panel per recipe.
+
+    It has a line per training seed, their mean where there are several, and rules as lines across.
     """
     figure = Figure(figsize=(1.2 + 4.6 * len(groups), 3.9), layout="constrained")
     panels = figure.subplots(1, len(groups), squeeze=False)[0]

@@ -23,10 +23,10 @@ ACTIONS = {wrapper.__name__: wrapper for wrapper in (SectorReserve, SectorScores
 
 
 def plain(config: AgentConfig, budget: float | None = None) -> gymnasium.Env[Any, Any]:
-    """The environment without wrappers, which the rules play, with `budget` or the first budget of
-    the configuration.
+    """The environment without wrappers, which the rules play.
 
-    Raises InvalidInput for an unknown environment or a wrong argument.
+    Its budget is `budget`, or the first of the configuration. Raises InvalidInput for an unknown
+    environment or a wrong argument.
     """
     known = care_sim.envs.IDS
     check_known("environment", config.env, known)

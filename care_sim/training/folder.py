@@ -46,8 +46,9 @@ loop).
 
 
 class Folder:
-    """The folder of a configuration. Raises InvalidInput when it holds another run, none to be
-    resumed, or a damaged file.
+    """The folder of a configuration.
+
+    Raises InvalidInput when it holds another run, none to be resumed, or a damaged file.
     """
 
     def __init__(self, config: AgentConfig):
@@ -64,8 +65,9 @@ class Folder:
         self._curve = read_curve(self.path / CURVE) if config.resume else []
 
     def begin(self, model: "BaseAlgorithm") -> None:
-        """Write the configuration down, and the learner as it is. From here on the run can be
-        resumed.
+        """Write the configuration down, and the learner as it is.
+
+        From here on the run can be resumed.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         # The checkpoint first: a folder with a configuration alone could not be resumed.
@@ -153,8 +155,9 @@ class Folder:
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """The configuration of a run. Raises InvalidInput for a damaged file, or one of something
-    else.
+    """The configuration of a run.
+
+    Raises InvalidInput for a damaged file, or one of something else.
     """
     config = _read_map(path)
     kinds: dict[str, Callable[[Any], bool]] = {

@@ -1,5 +1,6 @@
-"""The network of `care_sim.policies.learned.score_map` in PyTorch, as a policy of
-Stable-Baselines3.
+"""The score map in PyTorch, as a policy of Stable-Baselines3.
+
+`care_sim.policies.learned.score_map` computes the same network in NumPy.
 """
 
 from typing import Any
@@ -48,8 +49,9 @@ class Window(nn.Module):
 
 
 class Windows(nn.Module):
-    """One window for the actor, another for the critic, whose sectors are pooled into mean and
-    maximum.
+    """One window for the actor, another for the critic.
+
+    The critic's sectors are pooled into mean and maximum.
     """
 
     def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
@@ -106,8 +108,9 @@ class Joined(BaseFeaturesExtractor):
 
 
 class Sectored(BaseFeaturesExtractor):
-    """(n, 4 + 4 * sectors): four features per sector and the car's motion, for learners with layers
-    of their own.
+    """(n, 4 + 4 * sectors): four features per sector and the car's motion.
+
+    For learners with layers of their own.
     """
 
     def __init__(

@@ -107,8 +107,10 @@ def _descend(
 
 
 def _batches(rng: np.random.Generator, count: int, steps: int) -> Iterator[NDArray[np.int64]]:
-    """Rows (n,) of `steps` batches. Each pass over the examples is in random order; what does not
-    fill a batch at its end is left out.
+    """Rows (n,) of `steps` batches.
+
+    Each pass over the examples is in random order; what does not fill a batch at its end is left
+    out.
     """
     size = min(BATCH, count)
     order = np.empty(0, np.int64)

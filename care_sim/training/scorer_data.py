@@ -1,5 +1,6 @@
-"""What the learned scorer learns from: cells of the calibration's streets, with truth at training
-alone.
+"""What the learned scorer learns from: cells of the calibration's streets.
+
+Truth is used here, at training, and nowhere else.
 
 The paper says that 20 scenes apart from the evaluation's train it, and no more. The rest was
 decided before a result was seen:
@@ -44,13 +45,14 @@ OTHER_CELLS = 200
 
 @dataclass(frozen=True)
 class Examples:
-    """`inputs` (n, SCAN_INPUTS + len(RIG_INPUTS)) of cells, whether they are `positive` (n,), and
-    their `weights` (n,).
-    """
+    """Cells to learn from."""
 
     inputs: Float32s
+    """(n, SCAN_INPUTS + len(RIG_INPUTS))"""
     positive: Mask
+    """(n,) whether an untracked object returns from them."""
     weights: Float32s
+    """(n,)"""
 
     def __len__(self) -> int:
         return len(self.positive)
@@ -83,8 +85,10 @@ def front_alone(film: Film) -> Film:
 
 
 def untracked_cells(loop: OpenLoop) -> tuple[Cells, Float32s]:
-    """Cells (n,) of the coming keyframe's full scan with a return from an object in range that has
-    no track and can be detected, and what each weighs (n,). Truth.
+    """Cells (n,) of the coming keyframe that should fire, and what each weighs (n,). Truth.
+
+    In the full scan they have a return from an object in range that has no track and can be
+    detected.
     """
     cloud = loop.shot.cloud
     annotations = loop.shot.annotations

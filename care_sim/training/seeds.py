@@ -25,8 +25,9 @@ LAST = 2**31 - 1
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Every reset begins an episode of a training seed. The learner's seed and the one given to
-    `reset` decide the sequence of them.
+    """Every reset begins an episode of a training seed.
+
+    The learner's seed and the one given to `reset` decide the sequence of them.
 
     Stable-Baselines3 counts the seed of `reset` up from environment to environment. Without the
     learner's, learners of neighbouring seeds would share most of their episodes.

@@ -26,8 +26,10 @@ class Learner(Protocol):
 
 @dataclass(frozen=True)
 class ValidationScore:
-    """Means over episodes: the return, and the distance at which the first-sighting actor was
-    detected, metres (0 where it never was; None in the open loop).
+    """Means over episodes: the return, and the first-detection distance.
+
+    That is the distance at which the first-sighting actor was detected, metres; 0 where it never
+    was, None in the open loop.
     """
 
     episodes: int
