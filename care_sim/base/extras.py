@@ -3,6 +3,7 @@ extra where one is missing; and silence for those that print from C.
 """
 
 import ctypes
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -101,7 +102,9 @@ def silenced(descriptor: int) -> Iterator[None]:
     c_library.fflush(None)
     try:
         kept = os.dup(descriptor)
-    except OSError:
+    except OSError as error:
+        if error.errno != errno.EBADF:
+            raise
         # The process was started without this descriptor, so that nothing comes through anyway.
         yield
         return
