@@ -28,7 +28,6 @@ HTML = rb"<!DOCTYPE"
 JSON = rb"\s*[{[]"
 SVG = rb"<\?xml|<svg"
 ZIP = rb"PK"
-PARQUET = rb"PAR1"
 RERUN = rb"RRF"
 """What files of these kinds begin with, as patterns. Weights and checkpoints are ZIP."""
 

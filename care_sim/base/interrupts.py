@@ -100,9 +100,8 @@ def _end(*_: object) -> None:
 
 def _raise(number: int, frame: FrameType | None) -> None:
     # An import may catch what is raised within it and raise an error of its own. So an interrupt
-    # that falls into one is put off: an alarm calls this handler again, until the import has ended.
-    # While an alarm is set one interrupt is put off already, and a second one, typed meanwhile, is
-    # raised at once.
+    # that falls into an import is put off: an alarm calls this handler again, until the import has
+    # ended. If a second interrupt comes while the alarm is set, it is raised at once.
     is_alarm = number == signal.SIGALRM
     one_waits = signal.getitimer(signal.ITIMER_REAL)[0] > 0
     is_second = one_waits and not is_alarm

@@ -72,7 +72,7 @@ class AngularGrid:
 
     @cached_property
     def spacing(self) -> GridSpacing:
-        """What of the grid compiled code is told."""
+        """The spacing of the grid, in the form that compiled code takes."""
         top = float(self.top)
         height = float(self.row_height)
         return GridSpacing(self.columns, self.rows, self.column_width, top, height)

@@ -97,7 +97,7 @@ class Limits:
         return np.array([0, 0, *[0] * 4, 0, 0, -MAX_TURN]), most
 
     def _limited_detections(self, detections: ImageDetections) -> ImageDetections:
-        # Nearly always nothing lies beyond the limits: the detections are handed on as they are.
+        # Where nothing lies beyond the limits the detections are handed on as they are.
         rows = detections.rows()
         least, most = self._pictured
         most = most[detections.cameras]

@@ -121,7 +121,7 @@ class Tracks:
     """Tracked objects as columns of one table, the nearest first; `len()` is their number n."""
 
     ids: Integers
-    """(n,) 0 or more; no id ever means two objects of an episode."""
+    """(n,) 0 or more; within an episode an id is never given to a second object."""
     classes: Integers
     """(n,) places in `CLASSES`."""
     boxes: Floats
@@ -175,7 +175,7 @@ class Tracks:
 
     def take(self, rows: NDArray[np.int64] | Mask) -> "Tracks":
         """Some of the tracks, by index or mask."""
-        # Each column by its name: a loop over `fields` would take as long as the rest of it.
+        # Each column by its name: a loop over `fields` would take a third longer.
         return Tracks(
             self.ids[rows],
             self.classes[rows],

@@ -17,7 +17,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.random_streams import check_secret, streams
 from care_sim.core.actions import fired_cells
 from care_sim.core.allocation import RandomFloor, budget_cells
-from care_sim.core.belief import OBSERVED, Belief
+from care_sim.core.belief import OBSERVED
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
@@ -25,7 +25,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.loops.truth import EpisodeTruth, Loop, Truth
-from care_sim.sensors.lidar_faults import check_rows
+from care_sim.sensors.lidar_faults import check_dead_rows
 
 Observed = dict[str, NDArray[np.float32]]
 AnyLoop = TypeVar("AnyLoop", bound=Loop)
@@ -57,7 +57,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
                 "cameras must be at least one, got none: observations tell of each what it sees"
             )
         grid = AngularGrid()
-        check_rows(grid, conditions.lidar_dead_rows)
+        check_dead_rows(grid, conditions.lidar_dead_rows)
         self.conditions = conditions
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""
@@ -126,11 +126,6 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     def observed(self) -> Observed:
         """The observation of the coming keyframe; the arrays are the caller's own."""
         return self.loop.belief.to_observation()
-
-    @property
-    def belief(self) -> Belief:
-        """What the environment itself observes, without wrappers. Raises as `loop` does."""
-        return Belief.from_observation(self.observed())
 
     def _choose_cells(self, action: Action) -> Cells:
         """Take an action: the cells that it fires at the coming keyframe.

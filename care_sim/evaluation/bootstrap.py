@@ -1,7 +1,8 @@
 """Paired bootstrap: how sure a difference is between two policies that met the same episodes.
 
-Episodes differ far more among each other than two policies do in one of them. In the difference of
-a pair that drops out. So pairs are resampled, never each policy by itself.
+Episodes differ among each other, and that hides how two policies differ in one of them. What both
+share in an episode drops out of the difference of the pair. So pairs are resampled, never each
+policy by itself.
 
 `paired_difference` gives the intervals of the closed loop, over episodes, by way of
 `care_sim.evaluation.censoring`. `ratio_of_sums` gives the main intervals of the open-loop protocol,

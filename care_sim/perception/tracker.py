@@ -140,7 +140,7 @@ class TrackMemory:
 
     def _start(self, classes: Integers, boxes: Floats) -> Integers:
         """Begin a track with each of `classes` (n,) and `boxes` (n, 7); their ids (n,)."""
-        # New ids go up without end, so that no id ever means two objects.
+        # Ids count up and are never given again, so each means one object.
         count = len(classes)
         ids = np.arange(self._next_id, self._next_id + count)
         if not count:

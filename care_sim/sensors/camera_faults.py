@@ -126,7 +126,8 @@ class Delay:
 
 def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:
     """The camera as it really stands: turned and moved by errors that the rig does not know."""
-    # Drawn even where both spreads are 0: switched on, one leaves the draws of the other.
+    # Drawn even where both spreads are 0, so that to switch one error on does not change what is
+    # drawn for the other.
     yaw, pitch = np.deg2rad(faults.camera_rotation_sigma_deg) * rng.standard_normal(2)
     shift = faults.camera_position_sigma_m * rng.standard_normal(3)
     x, y, z = (float(value) for value in camera.position + shift)

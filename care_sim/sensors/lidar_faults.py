@@ -21,7 +21,7 @@ class CellFaults:
     """
 
     def __init__(self, grid: AngularGrid, faults: LidarFaults, seed: np.random.SeedSequence):
-        check_rows(grid, faults.lidar_dead_rows)
+        check_dead_rows(grid, faults.lidar_dead_rows)
         self.dead: Mask = np.isin(np.arange(grid.size) // grid.columns, faults.lidar_dead_rows)
         self.is_noisy = faults.lidar_range_sigma > 0
         self._grid = grid
@@ -63,7 +63,7 @@ def noisy(ranges: Floats, errors: Floats, reach: float) -> Floats:
     return np.where(np.abs(erring - reach / 2) <= span / 2, erring, folded)
 
 
-def check_rows(grid: AngularGrid, rows: Sequence[int]) -> None:
+def check_dead_rows(grid: AngularGrid, rows: Sequence[int]) -> None:
     """Raise InvalidInput for a row that the grid does not have."""
     for row in rows:
         if row >= grid.rows:

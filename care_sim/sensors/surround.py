@@ -75,8 +75,8 @@ def full_sweep(
     for hull in grid.hulls(boxes):
         covered[hull] = True
 
-    # Everywhere else the road, which a formula tells; where a ray was cast at a body and missed it,
-    # the road as well.
+    # Every other cell meets the road, at a distance that a formula gives. So does a ray that was
+    # cast at a body and missed it.
     ranges = road_ranges(grid, height_m)
     bodies = np.full(grid.size, NO_BODY)
     directions = sensor.vectors_to_world(grid.directions[covered])

@@ -93,7 +93,7 @@ class _Run:
         self._journal = journal
         self._workers = workers
         self._make_executor = make_executor
-        self._audience = listener
+        self._listener = listener
 
     def run_together(self, waiting: "deque[list[RunConfig]]") -> list[Batch]:
         """Run until nothing waits or a worker dies; returns the batches that a death cut off.
@@ -111,7 +111,7 @@ class _Run:
             except BrokenExecutor:
                 wait(in_flight)
             except KeyboardInterrupt:
-                self._audience.interrupted()
+                self._listener.interrupted()
                 wait(in_flight)
                 for future, batch in in_flight.items():
                     self._kept(batch, future)
@@ -152,7 +152,7 @@ class _Run:
         which waits for a worker.
         """
         workers = parallel_batches(executor, self._workers)
-        self._audience.playing(workers)
+        self._listener.playing(workers)
         while waiting and len(in_flight) < max(workers, 1):
             waiting[0] = self._without_deadly(waiting[0])
             if waiting[0]:
@@ -189,12 +189,12 @@ class _Run:
             self._fail([config], _OTHER_CODE)
         else:
             self._journal.append(ending)
-            self._audience.finished(config, ending)
+            self._listener.finished(config, ending)
 
     def _fail(self, batch: Batch, reason: str) -> None:
         for config in batch:
             self.failures.append(Failure(config, reason))
-            self._audience.finished(config, None)
+            self._listener.finished(config, None)
 
     def _submit(self, executor: Executor, batch: Batch) -> Future[list[Row | str]]:
         """Hand a batch over.

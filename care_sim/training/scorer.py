@@ -153,7 +153,7 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
         scenario="CARE-Street-v0",
         data=f"{len(learned)} cells, {positive} of them positive, of generated streets "
         f"under history at {budgets} of "
-        f"the cells, with six cameras and with the front one; {OTHER_CELLS} others a keyframe",
+        f"the cells, with six cameras and with the front one; {OTHER_CELLS} others per keyframe",
         seeds={name: list(seeds) for name, seeds in _STREETS.items()} | {"training": made.seed},
         steps=made.steps,
         machine=machine_line(),

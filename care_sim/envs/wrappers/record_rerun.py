@@ -1,4 +1,4 @@
-"""The wrapper that records: any agent, any learner, any policy."""
+"""The wrapper that records episodes for the Rerun viewer, whoever acts in them."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext

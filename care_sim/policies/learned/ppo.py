@@ -19,8 +19,8 @@ from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 
 class PpoPolicy(Policy):
-    """Does what the learner would do behind its wrappers, without exploration: the same scores, the
-    same allocator.
+    """Acts as the learner does behind its wrappers, without exploration. Scores and allocator are
+    the same.
 
     `path` is a file of weights that `care-sim train ppo` wrote. Without it those act that come with
     the package, learned on the dense street at all budgets of its tables. Raises InvalidInput for

@@ -11,6 +11,7 @@ from care_sim.base.checks import check_known, check_whole
 from care_sim.base.errors import InvalidInput
 
 ACTION_WRAPPERS = ("SectorReserve", "SectorScores")
+_LINE = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,8 @@ class Wrapping:
 
 
 def wrapping_of_line(line: str) -> Wrapping:
-    """Read the form of cards up to 0.2.0, the shipped ones among them: one line of text such as
-    "SectorReserve 32 x 4, GridObservation 64 x 8". Raises InvalidInput for another.
+    """Read the form of cards from before 0.2.0, the shipped ones among them: one line of text such
+    as "SectorReserve 32 x 4, GridObservation 64 x 8". Raises InvalidInput for another.
     """
     found = _LINE.fullmatch(line)
     if not found:
@@ -65,6 +66,3 @@ def wrapping_of_line(line: str) -> Wrapping:
         )
     action, *sizes = found.groups()
     return Wrapping(action, *map(int, sizes))
-
-
-_LINE = re.compile(r"(\w+) (\d{1,4}) x (\d{1,4}), GridObservation (\d{1,4}) x (\d{1,4})")

@@ -64,8 +64,8 @@ def nuscenes_film(
     cars = [
         _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
     ]
+    # Timestamps are microseconds. The motion is that of the poses at which the sweeps were taken.
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
-    # Times are microseconds; the motion is that of the poses at which the sweeps were taken.
     egos = motions(times, cars)
     shots = tuple(
         setup.shot(*moment)

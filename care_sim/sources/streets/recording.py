@@ -40,7 +40,7 @@ def record(
     `street.poses`.
 
     An object is annotated at a keyframe if a return of the full sweep lies on it or a camera shows
-    it. So does nuScenes, which scores what has at least one LiDAR or radar point; nobody could have
+    it. nuScenes is alike: it scores what has at least one LiDAR or radar point. Nobody could have
     seen what is wholly hidden. The street knows those too: who is wholly hidden at its first
     keyframe is in `Film.hidden`.
     """
