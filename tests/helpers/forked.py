@@ -51,7 +51,7 @@ __code__ = compile(asked["code"], "<string>", "exec")
 for name in [name for name in globals() if not name.startswith("__")]:
     del globals()[name]
 exec(__code__)
-# To take the libraries down one by one would take a second.
+# To take the libraries down one by one takes time that nobody needs.
 import atexit, os, sys
 atexit._run_exitfuncs()
 sys.stdout.flush()
@@ -89,9 +89,12 @@ class Forked:
 
     def run(self, code, folder):
         """What came of the code as the main program, `folder` being its working folder."""
-        told = {name: str(folder / f".{name}") for name in ("out", "err")}
-        asked = json.dumps({"code": code, "folder": str(folder)} | told)
+        printed = {name: folder / f".{name}" for name in ("out", "err")}
+        asked = json.dumps(
+            {"code": code, "folder": str(folder)}
+            | {name: str(path) for name, path in printed.items()}
+        )
         self._server.stdin.write(f"{asked}\n")
         self._server.stdin.flush()
-        code = int(self._server.stdout.readline())
-        return Ended(code, *(open(told[name]).read() for name in ("out", "err")))
+        status = int(self._server.stdout.readline())
+        return Ended(status, *(path.read_text() for path in printed.values()))

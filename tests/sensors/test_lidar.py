@@ -9,7 +9,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.types import Scan
 from care_sim.sensors.engines import ENGINES, check_engine
 from care_sim.sensors.lidar import Lidar
-from care_sim.sensors.lidar_faults import check_rows, noisy
+from care_sim.sensors.lidar_faults import check_dead_rows, noisy
 from care_sim.world.bodies import CATALOGUE
 
 SENSOR = Frame(0.0, 0.0, 1.84, 0.0)
@@ -193,7 +193,7 @@ def test_a_dead_row_fires_and_returns_nothing(grid, street, lidar):
 
 def test_a_row_that_the_grid_lacks_cannot_be_dead(grid):
     with pytest.raises(InvalidInput, match=r"lidar_dead_rows must lie in 0\.\.31, got 32"):
-        check_rows(grid, (32,))
+        check_dead_rows(grid, (32,))
 
 
 def test_firing_nothing_returns_nothing(grid, street, lidar):

@@ -27,12 +27,12 @@ def seconds(config, random):
     return base * random.uniform(0.8, 1.2)
 
 
-def play(configs, workers, forecast=None):
+def play(configs, workers, remaining=None):
     """Play on a synthetic clock; the truth and, at every landing, when it was and what was
     predicted then.
     """
     random = np.random.default_rng(0)
-    remaining = forecast or RemainingTime(configs)
+    remaining = remaining or RemainingTime(configs)
     flying, predictions, waiting, now = [], [], list(reversed(configs)), 0.0
     while waiting or flying:
         while waiting and len(flying) < workers:
@@ -57,8 +57,8 @@ def test_soon_the_whole_is_known_to_a_tenth(workers, share):
 
 
 def test_the_mean_of_all_would_be_far_off():
-    """The same run when the slow policy comes last and key is not looked at: why the forecast
-    looks.
+    """The same run with the slow policy last, predicted from the mean of all that have landed. That
+    is why the prediction looks at the settings of an episode.
     """
     configs = sorted(sweep(), key=lambda config: config.policy == "full")
     truth, predictions = play(configs, 1)

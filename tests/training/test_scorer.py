@@ -14,7 +14,7 @@ INPUTS = SCAN_INPUTS + len(RIG_INPUTS)
 
 
 def drawn(seed, count=3000):
-    """Examples that are positive, mostly, where the first cue is."""
+    """Examples that are positive, mostly, where the first input is 1."""
     rng = np.random.default_rng(seed)
     inputs = rng.random((count, INPUTS)).astype(np.float32).round()
     positive = (inputs[:, 0] > 0) != (rng.random(count) < 0.1)
@@ -30,9 +30,9 @@ def test_it_learns_what_there_is_to_learn():
         "out": (scorer.HIDDEN_UNITS,),
     }
     assert losses["held out"] == pytest.approx(0.325, abs=0.06)
-    cues = np.zeros((2, INPUTS), np.float32)
-    cues[1, 0] = 1
-    less, more = np.maximum(cues @ arrays["layer"] + arrays["bias"], 0) @ arrays["out"]
+    inputs = np.zeros((2, INPUTS), np.float32)
+    inputs[1, 0] = 1
+    less, more = np.maximum(inputs @ arrays["layer"] + arrays["bias"], 0) @ arrays["out"]
     assert more > less + 1
 
 

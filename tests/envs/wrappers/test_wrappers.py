@@ -85,7 +85,7 @@ def test_the_reserve_goes_to_the_best_sector_and_exploitation_stays():
     wrapped.reset(seed=0)
     for _ in range(10):
         rig = env.unwrapped.rig
-        belief = env.unwrapped.belief
+        belief = Belief.from_observation(env.unwrapped.observed())
         hulls = care_sim.Demand(rig.hulls(belief.tracks.boxes))
         exploited = care_sim.allocate(hulls, rig.budget, rig.reserve_fraction)[
             : round(0.7 * rig.budget)

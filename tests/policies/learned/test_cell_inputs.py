@@ -24,7 +24,7 @@ DOWN = 20 * GRID.columns + 256
 
 @pytest.fixture
 def seen_of(belief_of):
-    """Makes the cues (N, `SCAN_INPUTS`) of a belief from camera detections, tracks and ranges by
+    """Makes the inputs (N, `SCAN_INPUTS`) of a belief from camera detections, tracks and ranges by
     cell.
     """
 
@@ -40,8 +40,8 @@ def seen_of(belief_of):
     return make
 
 
-def cells_with(seen, cue):
-    return np.flatnonzero(seen[:, cue]).tolist()
+def cells_with(seen, column):
+    return np.flatnonzero(seen[:, column]).tolist()
 
 
 def test_of_an_empty_belief_nothing_is_seen(seen_of):
@@ -96,7 +96,7 @@ def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
     assert not seen[:, [STANDING, NEAR]].any()
 
 
-def test_outlooks_are_those_of_the_ray():
+def test_the_inputs_of_the_rig_are_those_of_the_ray():
     elevation, ground, cosine, sine, covered = CellInputs(RIG).rig_inputs.T.reshape(
         len(RIG_INPUTS), *GRID.shape
     )

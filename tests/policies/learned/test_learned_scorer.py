@@ -44,13 +44,15 @@ def test_the_highest_are_those_of_a_stable_sort(scores, data):
 
 def test_every_cell_is_scored_as_a_plain_network_does(drawn, encounter, environment):
     weights = load_weights(drawn)
-    cues = CellInputs(environment.unwrapped.rig)
-    network = CellNetwork(weights, cues.rig_inputs)
+    cell_inputs = CellInputs(environment.unwrapped.rig)
+    network = CellNetwork(weights, cell_inputs.rig_inputs)
     layer, bias, out = (weights.arrays[name].astype(float) for name in ("layer", "bias", "out"))
     for observation in encounter[::8]:
         belief = Belief.from_observation(observation)
-        seen = cues.of(belief, cues.rig.hulls(belief.tracks.boxes))
-        inputs = np.hstack([seen.rows(np.arange(cues.rig.grid.size)), cues.rig_inputs])
+        seen = cell_inputs.of(belief, cell_inputs.rig.hulls(belief.tracks.boxes))
+        inputs = np.hstack(
+            [seen.rows(np.arange(cell_inputs.rig.grid.size)), cell_inputs.rig_inputs]
+        )
         expected = np.maximum(inputs @ layer + bias, 0) @ out
         np.testing.assert_allclose(network.scores(seen), expected, rtol=1e-4, atol=1e-4)
 

@@ -53,7 +53,7 @@ def test_what_is_written_is_read_back_bit_for_bit(saved):
 
 
 def in_the_first_form(path: Path, arrays, card, line: str) -> None:
-    """Write weights as up to 0.2.0, when a card named the wrappers in one line of text."""
+    """Write weights as before 0.2.0, when a card named the wrappers in one line of text."""
     save_weights(path, arrays, replace(card, wrapper=None))
     with np.load(path) as file:
         entries = dict(file)
