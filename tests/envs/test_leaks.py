@@ -20,6 +20,9 @@ CYCLES = int(os.environ.get("CARE_SIM_CYCLES", "150"))
 MOST_CLIENTS = 1024
 GROWTH_MB = 20.0
 """A client holds 28 MB; the rest is the allocator's own unrest."""
+MIXED_GROWTH_MB = 10.0
+"""Half of that where two ways share the cycles: so it shows a leak of one of them as small, 20 kB
+per cycle. A thousand cycles without a leak grew by 0.4 MB at most."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ def clients():
 WAYS = [closed, dropped, reset_twice, failed, vector_dropped]
 
 
-def is_flat(way, cycles):
+def is_flat(way, cycles, growth_mb=GROWTH_MB):
     for seed in range(MOST_FREE):
         way(seed)
     memory, *before = held()
@@ -89,7 +92,7 @@ def is_flat(way, cycles):
         way(seed)
     later, *after = held()
     assert after == before
-    assert later - memory < GROWTH_MB
+    assert later - memory < growth_mb
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -103,7 +106,7 @@ def closed_or_dropped(seed):
 
 @pytest.mark.slow
 def test_they_stay_flat_over_a_thousand():
-    is_flat(closed_or_dropped, max(CYCLES, 1000))
+    is_flat(closed_or_dropped, max(CYCLES, 1000), MIXED_GROWTH_MB)
 
 
 def test_a_dropped_environment_leaves_its_client_at_once_without_the_garbage_collector():

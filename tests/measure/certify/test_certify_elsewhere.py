@@ -31,7 +31,9 @@ def played(folder):
 
 @pytest.mark.slow
 def test_a_processor_of_fewer_features_plays_most_episodes_as_published(tmp_path, pytestconfig):
-    """That this processor plays all of them as published is tested in `test_certify.py`."""
+    """That this processor plays them as published is tested for 28 of them in `test_certify.py`;
+    `care-sim certify` plays every episode of the list.
+    """
     line = (
         "import json; from tests.measure.certify import test_certify_elsewhere as t; "
         f"trails = t.played({str(tmp_path / 'there')!r}); "
