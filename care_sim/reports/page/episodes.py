@@ -88,7 +88,8 @@ def config_of(row: Row) -> EpisodeConfig:
     """The configuration that a row was played with. Raises InvalidInput for one that this version
     does not accept.
     """
-    plain = {name: row[name] for name in PLAIN_FIELDS}
+    # A condition that the file's version did not know, or the row does not tell, is the default.
+    plain = {name: row[name] for name in PLAIN_FIELDS if row.get(name) is not None}
     scenario, policy = (_parameters(row, kind) for kind in ("scenario", "policy"))
     return EpisodeConfig(**plain, scenario_parameters=scenario, policy_parameters=policy)
 

@@ -345,7 +345,7 @@ class OneSeed(ThreadPoolExecutor):
         self.first = {}
 
     def submit(self, call, play, row):
-        cell = tuple(row[name] for name in PLAIN_FIELDS if name != "seed")
+        cell = tuple(row.get(name) for name in PLAIN_FIELDS if name != "seed")
         if cell not in self.first:
             self.first[cell] = super().submit(call, play, row)
         return self.first[cell]

@@ -151,6 +151,12 @@ def test_a_row_gives_its_configuration_back(config):
     )
 
 
+def test_a_condition_that_the_row_does_not_tell_is_the_default():
+    row = CONFIG.row()
+    del row["cell_order"]
+    assert config_of(row) == config_of(row | {"cell_order": None}) == CONFIG
+
+
 def test_seeds_are_watched_one_after_the_other():
     rows = [{"policy": policy, "seed": seed} for policy in ("history", "care") for seed in (0, 1)]
     assert [(row["policy"], row["seed"]) for row in episodes_to_watch(rows, 3)] == [
