@@ -1,9 +1,11 @@
+import errno
+import os
 import sys
 
 import pytest
 
 from care_sim.base.errors import MissingExtra
-from care_sim.base.extras import import_open3d
+from care_sim.base.extras import STANDARD_ERROR, import_open3d, silenced
 
 
 def test_a_missing_system_library_names_the_debian_packages(tmp_path, monkeypatch):
@@ -33,3 +35,19 @@ def test_open3d_where_it_is_installed():
     except MissingExtra as error:
         pytest.skip(str(error))
     assert len(open3d.geometry.PointCloud().points) == 0
+
+
+def refused(number):
+    def dup(_descriptor):
+        raise OSError(number, os.strerror(number))
+
+    return dup
+
+
+def test_a_closed_descriptor_needs_no_silence_and_a_shortage_of_them_is_told(monkeypatch):
+    monkeypatch.setattr(os, "dup", refused(errno.EBADF))
+    with silenced(STANDARD_ERROR):
+        pass
+    monkeypatch.setattr(os, "dup", refused(errno.EMFILE))
+    with pytest.raises(OSError, match="Too many open files"), silenced(STANDARD_ERROR):
+        pass
