@@ -28,7 +28,7 @@ def read_results(folder: Path) -> tuple[list[Row], Study, list[str]]:
     # Rows are written when a study ends. A journal without them is of a study that was stopped.
     if (folder / JOURNAL).is_file() and not (folder / kind.file).is_file():
         raise InvalidInput(
-            f"{folder} holds an unfinished study; run the command that began it again"
+            f"{folder} holds an unfinished study; run again the command that began it"
         )
     path = folder / kind.file
     study = study_of(path)

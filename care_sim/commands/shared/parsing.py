@@ -14,12 +14,13 @@ from care_sim.base.errors import InvalidInput, shown, unknown
 
 class _Reading(NamedTuple):
     """How the words after an option become a value: the words as help shows them, how many there
-    are, and what makes the value of them.
+    are, what makes the value of them, and what tells such a value from others.
     """
 
     metavar: str
     nargs: int | Literal["*"]
     value_of: Callable[[list[str]], Any]
+    is_value: Callable[[Any], bool]
 
 
 def _whole(text: str) -> int:
@@ -40,12 +41,35 @@ def _whole_or_none(text: str) -> int | None:
     return None if text == "None" else _whole(text)
 
 
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int)
+
+
+def _is_real(value: Any) -> bool:
+    return isinstance(value, int | float)
+
+
 _READINGS: dict[Any, _Reading] = {
-    int: _Reading("INT", 1, lambda words: _whole(words[0])),
-    float: _Reading("FLOAT", 1, lambda words: _real(words[0])),
-    int | None: _Reading("{None}|INT", 1, lambda words: _whole_or_none(words[0])),
-    tuple[int, ...]: _Reading("[INT [INT ...]]", "*", lambda words: tuple(map(_whole, words))),
-    tuple[float, ...]: _Reading("[FLOAT [FLOAT ...]]", "*", lambda words: tuple(map(_real, words))),
+    int: _Reading("INT", 1, lambda words: _whole(words[0]), _is_whole),
+    float: _Reading("FLOAT", 1, lambda words: _real(words[0]), _is_real),
+    int | None: _Reading(
+        "{None}|INT",
+        1,
+        lambda words: _whole_or_none(words[0]),
+        lambda value: value is None or _is_whole(value),
+    ),
+    tuple[int, ...]: _Reading(
+        "[INT [INT ...]]",
+        "*",
+        lambda words: tuple(map(_whole, words)),
+        lambda value: isinstance(value, tuple) and all(map(_is_whole, value)),
+    ),
+    tuple[float, ...]: _Reading(
+        "[FLOAT [FLOAT ...]]",
+        "*",
+        lambda words: tuple(map(_real, words)),
+        lambda value: isinstance(value, tuple) and all(map(_is_real, value)),
+    ),
 }
 """Types of options that hold numbers: tyro reads them the same, but complains in its own words."""
 
@@ -61,7 +85,7 @@ def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
         nargs=reading.nargs,
         metavar=reading.metavar,
         instance_from_str=reading.value_of,
-        is_instance=lambda value: value is None or isinstance(value, int | float | tuple),
+        is_instance=reading.is_value,
         str_from_instance=lambda value: list(
             map(str, value if isinstance(value, tuple) else [value])
         ),
@@ -104,7 +128,8 @@ def _refusal(end: BaseException | None) -> InvalidInput | None:
 
 
 def _one_line(box: str) -> str:
-    """The message that tyro draws as a box: its sections, without title, frame and hint at help.
+    """The message that tyro draws as a box: its sections, without title and frame, and without the
+    help that it adds.
 
     An option that is missing, unknown or without its value has no public event in tyro. The events
     of `tyro._errors` are private and may change in any release, as its first lines say. What cannot
@@ -116,5 +141,7 @@ def _one_line(box: str) -> str:
     # An unknown option may be known to another command, which "in care-sim NAME" would tell.
     texts = [" ".join(section.split()).partition(" in care-sim ")[0] for section in sections]
     return "; ".join(
-        text.rstrip(".") for text in texts if text and not text.startswith("For full helptext")
+        text.removeprefix("Error parsing ").rstrip(".")
+        for text in texts
+        if text and not text.startswith(("For full helptext", "Argument helptext:"))
     )
