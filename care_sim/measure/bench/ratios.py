@@ -1,6 +1,6 @@
 """Speed without a clock: ratios of medians within one run, larger being better.
 
-A ratio says the same on a slow and on a fast machine. Its name is a key of `results/bench.json`.
+A ratio varies less between machines than the times. Its name is a key of `results/bench.json`.
 """
 
 from collections.abc import Sequence

@@ -60,8 +60,8 @@ def _speed(report: BenchReport) -> Table:
 
 def _stages(stages: Mapping[str, Sequence[float]]) -> Table:
     note = (
-        f"{REST}: what lies between these stages: drawing the floor, the cells of an action, "
-        "frames, records, info"
+        f"{REST}, an estimate: what lies between these stages: drawing the floor, "
+        "the cells of an action, frames, records, info"
     )
     return replace(_spreads("Where a keyframe's time goes, ms", "stage", stages), notes=(note,))
 

@@ -36,7 +36,8 @@ _RATIO_BOUNDS = {
     OVER_REACHING: 1.5,
 }
 _TWO_PROCESSES = 1.8
-"""Of two: what they lose to each other, to the pipes and to the process that steps them."""
+"""Twice the speed of one process, less what two lose to each other, to the pipes and to the process
+that steps them."""
 _SAME_RAYS = 0.8
 """Sixteen times the cells may cost a fixed number of rays a quarter more."""
 

@@ -45,7 +45,8 @@ def test_the_stages_add_up_to_the_keyframe():
     whole = parts.pop(WHOLE)
     assert set(parts) == {POLICY, *KEYFRAME_STAGES, REST}
     assert sum(parts.values()) == pytest.approx(whole)
-    assert min(parts.values()) > 0
+    # The rest is a difference of two times, which a pause between them can turn below 0.
+    assert min(parts[stage] for stage in (POLICY, *KEYFRAME_STAGES)) > 0
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -90,7 +91,7 @@ def test_everything_is_measured_in_every_round(measured):
     for figures in (
         *measured["speed"].values(),
         measured["vectorised"],
-        measured["stages"],
+        {name: values for name, values in measured["stages"].items() if name != REST},
         measured["choices"],
     ):
         assert all(len(values) == 2 and min(values) > 0 for values in figures.values())
