@@ -10,8 +10,8 @@ from care_sim.measure.bench.run import run_bench
 class Bench(BenchConfig):
     """Measure speed: keyframe, scans, steps and memory, beside other engines and environments.
 
-    Known engines and environments are measured in the same run. All but what takes several
-    processes runs on one core.
+    The ray casters Embree and MuJoCo and the environments highway-env and panda-gym are measured in
+    the same run. All but what takes several processes runs on one core.
     """
 
     def __call__(self) -> int:

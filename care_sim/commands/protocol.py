@@ -32,8 +32,8 @@ class Protocol(StudyCommand, PlayOptions):
     """
 
     scenes: tuple[str, ...] = ()
-    """One number: that many scenes, from the first. Otherwise names of scenes. Without it, all
-    scenes."""
+    """One number: that many scenes, from the first. Otherwise names of scenes. Without this
+    option, all scenes."""
     policies: tuple[str, ...] = (*_PAPER_POLICIES, "full")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
     budget 1.0. Allocations are compared with those of `care`, which is played for that in any case.
@@ -47,7 +47,7 @@ class Protocol(StudyCommand, PlayOptions):
     presence: str = "annotated"
     """Objects that are present at scene start are never first sightings. `annotated`: all that are
     annotated there are present (the paper's rule). `visible`: only those that are visible there
-    are, so that one that stands hidden then counts when it comes into view."""
+    are: an object hidden at the start counts when it first shows."""
     out: Path = Path("runs/protocol")
     """Folder of the results; an interrupted run goes on there."""
 
@@ -70,4 +70,4 @@ class Protocol(StudyCommand, PlayOptions):
             raise InvalidInput("none of the policies can be played")
         floors = range(first, first + self.floor_seeds)
         configs = play_grid(source, scenes, policies, self.budgets, floors, latencies, **common)
-        return self.run_study("protocol", configs, self.out, left_out)
+        return self.play_study("protocol", configs, self.out, left_out)

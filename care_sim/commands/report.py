@@ -28,8 +28,7 @@ class PrintReport:
     'page').
     """
     episodes: int = bounded(400, 0, LARGEST_INTEGER)
-    """Number of episodes that are played again, to be watched in the page, at the most; seed by
-    seed, 0 for none."""
+    """At most this many episodes are played again for the page, seed by seed; 0 for none."""
     workers: int = bounded(CORES, 1, MOST_WORKERS)
     """Processes that play them."""
 

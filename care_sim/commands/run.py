@@ -46,7 +46,7 @@ class Run:
 
     def __call__(self) -> int:
         """Run it."""
-        # The grid of one is a study's way to a configuration: it knows what `full` needs.
+        # Made as a grid of one, the configuration gets what `full` needs, as in a study.
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
         (config,) = grid(*axes, **self.conditions.arguments())
         if config.budget != self.budget:

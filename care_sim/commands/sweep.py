@@ -52,4 +52,4 @@ class Sweep(EpisodeStudy):
         configs = grid(
             scenarios, policies, self.budgets, seeds_of(self.seeds), rates, latencies, **common
         )
-        return self.run_study("sweep", configs, self.out, left_out)
+        return self.play_study("sweep", configs, self.out, left_out)

@@ -35,4 +35,4 @@ class FixedStudy(EpisodeStudy):
         seeds = seeds_of(self.seeds)
         also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
         configs = of_seeds(configurations(seeds[:1], also), seeds)
-        return self.run_study(study, configs, out, left_out)
+        return self.play_study(study, configs, out, left_out)

@@ -44,6 +44,7 @@ def run_study(
     if not configs:
         raise InvalidInput("a study needs at least one value on every axis")
     check_whole("workers", workers, 1)
+    # A copy has no key yet: its digest is of the code as it is when this run asks for it.
     configs = [config.changed() for config in configs]
     kind = study.results
     check_columns(config.row() for config in configs)

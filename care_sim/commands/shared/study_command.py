@@ -42,7 +42,7 @@ class StudyCommand:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def run_study(
+    def play_study(
         self, study: str, configs: Sequence[RunConfig], out: Path, left_out: Sequence[str] = ()
     ) -> int:
         """Play the tasks and print their tables, the tasks that failed and the policies that were

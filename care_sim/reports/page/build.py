@@ -88,7 +88,7 @@ class Page:
                 tables=[(table, blocks(table)) for table in self.findings.tables],
                 closing=self.findings.closing,
                 groups=self.groups(),
-                reel=_embedded(replay_data(self.episodes)),
+                replays=_embedded(replay_data(self.episodes)),
                 asset=_asset,
                 counted=counted,
             )

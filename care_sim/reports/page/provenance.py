@@ -112,9 +112,8 @@ def _unplayed(
             len(each.get("seeds", each.get("floor_seeds")))
             for each in description.get("configurations", ())
         )
-        # Every configuration of the open loop is played in all scenes. "1" has one character, for
-        # the closed loop, which names none.
-        asked *= len(description.get("scenes", "1"))
+        # Every configuration of the open loop is played in all scenes; the closed loop names none.
+        asked *= len(description.get("scenes", [None]))
         failed = len(description.get("failed", ()))
     except (AttributeError, TypeError):
         return [f"The configurations in {CONFIG} cannot be read."]

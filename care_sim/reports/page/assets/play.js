@@ -3,8 +3,8 @@
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
 class Player {
-  constructor(root, reel) {
-    this.reel = reel;
+  constructor(root, replays) {
+    this.replays = replays;
     this.part = (id) => root.querySelector(`#${id}`);
     this.views = [];
     this.position = 0;
@@ -18,8 +18,8 @@ class Player {
 
   async open(number, compare = false) {
     // With `compare` the reference, where it has played in the same world, at best at the same budget.
-    const own = this.reel.episodes[number];
-    const others = this.reel.episodes.map((other, n) => [n, other]).filter(([n, other]) => n !== number && other.world === own.world);
+    const own = this.replays.episodes[number];
+    const others = this.replays.episodes.map((other, n) => [n, other]).filter(([n, other]) => n !== number && other.world === own.world);
     const name = (other) => (other.setting === own.setting ? other.policy : `${other.policy}, ${other.setting}`);
     this.part("beside").replaceChildren(new Option("nothing", ""), ...others.map(([n, other]) => new Option(name(other), n)));
     const rival = others.find(([, other]) => other.setting === own.setting && other.policy === own.policy.replace(/\S+/, "care"));
@@ -31,11 +31,11 @@ class Player {
     this.stop();
     this.number = number;
     const wish = (this.wish = Symbol());
-    const chosen = [number, ...(beside === "" ? [] : [Number(beside)])].map((n) => this.reel.episodes[n]);
+    const chosen = [number, ...(beside === "" ? [] : [Number(beside)])].map((n) => this.replays.episodes[n]);
     const stories = await Promise.all(chosen.map((episode) => unpack(episode.story)));
     if (wish !== this.wish) return; // another was chosen meanwhile
     this.part("views").replaceChildren();
-    this.views = chosen.map((episode, n) => new View(this.part("views"), episode, this.reel.bodies[episode.bodies], stories[n]));
+    this.views = chosen.map((episode, n) => new View(this.part("views"), episode, this.replays.bodies[episode.bodies], stories[n]));
     this.last = Math.max(...this.views.map((view) => view.last));
     this.part("moment").max = this.last;
     const first = (flags) => (flags.includes("1") ? flags.indexOf("1") : 0);
@@ -88,7 +88,7 @@ class Player {
 }
 
 const stage = document.getElementById("player");
-const player = new Player(stage, read("reel"));
+const player = new Player(stage, read("replays"));
 const mark = (button) => {
   document.querySelectorAll(".episodes [aria-pressed]").forEach((other) => other.removeAttribute("aria-pressed"));
   button.setAttribute("aria-pressed", "true");
