@@ -23,7 +23,7 @@ from care_sim.study.run_config import (
     check_size,
     collected,
     departures,
-    felt_by,
+    effective_conditions,
     flat,
 )
 
@@ -110,7 +110,6 @@ class EpisodeConfig(Conditions, RunConfig):
     @property
     def similarity_keys(self) -> tuple[SimilarityKey, ...]:
         """Everything but the seed; scenario, policy and budget; the policy; nothing."""
-        # Episodes of one configuration differ least in how long they take.
         all_but_seed = tuple(item for item in self.row().items() if item[0] != "seed")
         return all_but_seed, (self.scenario, self.policy, self.budget), (self.policy,), ()
 
@@ -163,7 +162,7 @@ def of_seeds(configs: Sequence[EpisodeConfig], seeds: Sequence[int]) -> list[Epi
 
 
 def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) -> EpisodeConfig:
-    return EpisodeConfig(scenario, policy, **felt_by(policy, budget, given))
+    return EpisodeConfig(scenario, policy, **effective_conditions(policy, budget, given))
 
 
 def listed_episodes(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:

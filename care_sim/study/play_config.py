@@ -26,7 +26,7 @@ from care_sim.study.run_config import (
     check_size,
     collected,
     departures,
-    felt_by,
+    effective_conditions,
     files_in,
     flat,
 )
@@ -175,7 +175,7 @@ def play_grid(
 def _config(
     source: Source, scene: Scene, policy: str, budget: float, given: dict[str, Any]
 ) -> PlayConfig:
-    return PlayConfig(source, scene, policy, **felt_by(policy, budget, given))
+    return PlayConfig(source, scene, policy, **effective_conditions(policy, budget, given))
 
 
 def listed_plays(configs: Sequence[PlayConfig]) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def departures(task: RunConfig, without: Sequence[str]) -> list[str]:
     return [f"{n}={v}" for n, v in task.row().items() if n not in without and v != DEFAULTS.get(n)]
 
 
-def felt_by(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
+def effective_conditions(policy: str, budget: float, conditions: dict[str, Any]) -> dict[str, Any]:
     """Budget and conditions as a policy feels them. The full scan has one budget, and asks neither
     camera nor allocator.
     """

@@ -71,7 +71,7 @@ def same(one: Answers, other: Answers) -> Mask:
     return alike
 
 
-def aside(engine: RayEngine, sensor: Frame, cell: int, answer: Answers) -> bool:
+def decided_by_a_micrometre(engine: RayEngine, sensor: Frame, cell: int, answer: Answers) -> bool:
     """Whether `engine` gives `answer`, of one ray, to any of 26 rays beside that of `cell`, which
     start a micrometre from it.
     """

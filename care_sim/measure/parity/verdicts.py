@@ -7,7 +7,7 @@ import numpy as np
 from care_sim.core.arrays import Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
-from care_sim.measure.parity.answers import Answers, aside, same
+from care_sim.measure.parity.answers import Answers, decided_by_a_micrometre, same
 from care_sim.sensors.engines import RayEngine
 
 VERDICTS = ("same", "grazing", "lost", "tolerance", "unexplained")
@@ -75,9 +75,11 @@ def _judge(
     answer: Answers,
     expected: Answers,
 ) -> int:
-    if aside(fast, sensor, cell, expected) and aside(fast, sensor, cell, answer):
+    if decided_by_a_micrometre(fast, sensor, cell, expected) and decided_by_a_micrometre(
+        fast, sensor, cell, answer
+    ):
         return GRAZING
-    return LOST if aside(reference, sensor, cell, answer) else UNEXPLAINED
+    return LOST if decided_by_a_micrometre(reference, sensor, cell, answer) else UNEXPLAINED
 
 
 def _only(answers: Answers, number: int) -> Answers:

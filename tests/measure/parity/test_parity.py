@@ -9,7 +9,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.measure.parity import outcomes as parity_outcomes
-from care_sim.measure.parity.answers import Millimetres, aside
+from care_sim.measure.parity.answers import Millimetres, decided_by_a_micrometre
 from care_sim.measure.parity.keyframes import KeyframeAgreement, PictureAgreement, compare_episode
 from care_sim.measure.parity.outcomes import Outcomes
 from care_sim.measure.parity.run import agree, unexplained
@@ -75,7 +75,10 @@ def test_a_ray_grazes_within_a_micrometre_of_an_edge(bullet, above, grazes):
     bus = bullet.add(CATALOGUE["bus"], (20.0, 0.0, 0.0))
     engine, sensor = ENGINES["fast"](bullet, LEVEL), Frame(0.0, 0.0, 3.47 + above, AHEAD)
     assert engine.cast(sensor, np.array([6]))[1].item() != bus
-    assert aside(engine, sensor, 6, (np.array([20 - 11.19 / 2]), np.array([bus]))) == grazes
+    assert (
+        decided_by_a_micrometre(engine, sensor, 6, (np.array([20 - 11.19 / 2]), np.array([bus])))
+        == grazes
+    )
 
 
 def test_rays_count_where_they_end(street):
