@@ -51,8 +51,8 @@ $(VENV)/.developing: $(VENV)/.installed
 reproduce: setup
 	$(BIN)/care-sim reproduce
 
-# worksteal: each process begins with half of the rooms, in order. So what a file of tests has made is made once, code is
-# compiled once (the first rooms need none), and who is done first takes over from the end of the other's list.
+# worksteal: each process begins with half of the tests, in order; who is done first takes over from the end of the
+# other's list.
 test: $(VENV)/.developing
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
 

@@ -247,7 +247,7 @@ def _leave_output() -> None:
 
 
 def _finished(arguments: list[str]) -> int:
-    """The exit code of the command, which is run; all that it printed is written."""
+    """Run the command and write out all that it printed; returns its exit code."""
     _check_texts(arguments)
     try:
         return int(parsed_command(arguments)())

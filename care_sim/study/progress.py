@@ -83,9 +83,9 @@ class ProgressReporter(RunListener):
         """Learn how long a task took."""
         self._remaining.finished(config, row["wall_s"] if row else 0.0)
         self._predict()
+        # One prediction is noted early and kept, so that the summary can say how good it was.
         if (
             math.isnan(self._predicted_s)
-            # One prediction is noted early and kept, so that the summary can say how good it was.
             and self._new - self._remaining.waiting >= _EARLY * self._new
         ):
             self._predicted_s = self._end - self._started

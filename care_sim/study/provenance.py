@@ -120,7 +120,7 @@ def machine() -> dict[str, str | int]:
 
 
 def machine_line() -> str:
-    """The same in a few words, for the cards of weights."""
+    """The machine in a few words, for the cards of weights."""
     here = machine()
     return f"{here['processor']}, {here['cores']} cores, {here['system']}"
 

@@ -47,7 +47,7 @@ class RemainingTime:
         return max(total / max(workers, 1), max(expected.values()))
 
     def _expected_s(self, kind: tuple[SimilarityKey, ...]) -> float:
-        # The closest likeness first, and for each what this run has measured before what an earlier
+        # The closest key first, and for each what this run has measured before what an earlier
         # one did.
         candidates = (means.get(key) for key in kind for means in (self._now, self._earlier))
         return next((seconds for seconds in candidates if seconds is not None), math.nan)

@@ -64,10 +64,10 @@ _BY_WRITER = {
 """Columns that every study writes. Older files and those of others may lack them: a condition that
 they do not know was at its default.
 """
+# What a file must have as a column is optional in a row where it tells of what did not happen: a
+# detection, a view of the actor, a collision.
 _EPISODES = Schema(
     {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS if name not in _BY_WRITER}
-    # What a file must have as a column is optional in a row where it tells of what did not happen:
-    # a detection, a view of the actor, a collision.
     | {
         "budget": SHARE,
         "seed": SEED,

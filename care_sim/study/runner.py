@@ -202,11 +202,11 @@ class _Run:
         A fork server may not answer at once on a busy machine, or be killed while it starts a
         worker. It is asked again: another one takes its place.
         """
-        for patience_s in (0.5, 2.0):
+        for wait_s in (0.5, 2.0):
             try:
                 return executor.submit(self._play_batch, batch)
             except (ConnectionError, EOFError):
-                time.sleep(patience_s)
+                time.sleep(wait_s)
         return executor.submit(self._play_batch, batch)
 
 

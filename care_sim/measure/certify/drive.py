@@ -14,7 +14,7 @@ _SWEEP_S = 0.1
 _START_NS = 315_000_000_000_000_000
 _AHEAD = {"qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
 _ACROSS = {"qw": 0.8, "qx": 0.0, "qy": 0.0, "qz": -0.6}
-"""A turn to the right by 74 degrees: cos and sin of half of it are exact to one digit."""
+"""A turn to the right by 74 degrees: cos and sin of half of it are 0.8 and 0.6 exactly."""
 
 
 def write_drive(folder: Path) -> str:

@@ -180,8 +180,8 @@ def _stepped(
     episodes: Sequence[Drawn], envs: Sequence[Any], vector: Any, observations: Any
 ) -> list[Played]:
     """Play a vector until the longest episode is over; the policies choose in this process."""
-    # An episode that is over takes its last action again, and leaves it without effect: a
-    # privileged policy has nothing to ask then.
+    # An episode that is over is given its last action again, which has no effect. Its policy is not
+    # asked, since a privileged one needs an episode that goes on.
     policies = [_begun(episode, env) for episode, env in zip(episodes, envs, strict=True)]
     actions: list[Any] = [None] * len(episodes)
     for _ in range(max(episode.keyframes for episode in episodes)):

@@ -29,11 +29,9 @@ NO_INTERVAL = (
 def played(plays: SettingPlays) -> str:
     """Scenes, events, object frames and floor seeds."""
     total = counts(plays.scenes.values())
+    # The most that any policy has at a budget: some may have been played with fewer.
     seeds = {
-        # The most that any policy has at a budget: some may have been played with fewer.
-        len(plays.seeds(policy, budget))
-        for policy in plays.policies
-        for budget in plays.budgets
+        len(plays.seeds(policy, budget)) for policy in plays.policies for budget in plays.budgets
     }
     return (
         f"{_several(len(plays.scenes), 'scene')}, {total.events:,.0f} events, {total.frames:,.0f} "

@@ -49,10 +49,10 @@ def write_columns(
 ) -> None:
     """Write columns to a Parquet file, whole or not at all."""
     arrays = {name: pa.array(column) for name, column in columns.items()}
+    # A column without a value has no type of its own, and readers of another file would not agree
+    # on one.
     typed = {
         name: column.cast(schema.column(name).type) if column.type == pa.null() else column
-        # A column without a value has no type of its own, and readers of another file would not
-        # agree on one.
         for name, column in arrays.items()
     }
     with replacing(path) as unfinished:

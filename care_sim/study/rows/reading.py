@@ -39,11 +39,11 @@ def setting_of(row: Row) -> Setting:
 
 def _setting_of_episode(row: Row) -> Setting:
     names = [name for name in row if name in PLAIN_FIELDS or name.startswith("scenario.")]
+    # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names another
+    # setting, whatever its value.
     changed = [
         (n, row[n])
         for n in names
-        # Parameters of a scenario have no default in _USUAL_EPISODE: one that was given names
-        # another setting, whatever its value.
         if n not in _AXES and row[n] is not None and row[n] != _USUAL_EPISODE.get(n)
     ]
     # Sorted, so that the order of columns in a file does not make another setting.
@@ -53,10 +53,10 @@ def _setting_of_episode(row: Row) -> Setting:
 
 def _setting_of_play(row: Row) -> Setting:
     """A condition for which the row has no column is the default."""
+    # Files of older versions have no columns for the conditions that were added since.
     changed = tuple(
         (name, row[name])
         for name, usual in _USUAL_PLAY.items()
-        # Files of older versions have no columns for the conditions that were added since.
         if row.get(name) not in (usual, None)
     )
     return Setting(row["source"], changed, with_parameters(row, "detector"))
