@@ -429,3 +429,13 @@ def test_output_that_goes_nowhere_ends_quietly(shell, code, complaint):
         ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
     )
     assert (ended.returncode, ended.stderr) == (code, complaint)
+
+
+def test_help_of_an_option_breaks_only_where_the_terminal_does(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "1000")
+    with pytest.raises(SystemExit):
+        main(["protocol", "--help"])
+    helped = capsys.readouterr().out
+    (presence,) = (line for line in helped.splitlines() if "--presence" in line)
+    assert "Objects that are present" in presence
+    assert "when it first shows. (default: annotated)" in presence

@@ -4,10 +4,21 @@ import contextlib
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import partial
+from typing import Any, Literal, NamedTuple, get_type_hints
 
+import docstring_parser
 import tyro
-from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
+from tyro.constructors import (
+    MISSING_NONPROP,
+    ConstructorRegistry,
+    PrimitiveConstructorSpec,
+    PrimitiveTypeInfo,
+    StructConstructorSpec,
+    StructFieldSpec,
+    StructTypeInfo,
+)
 
 from care_sim.base.errors import InvalidInput, shown, unknown
 
@@ -73,10 +84,10 @@ _READINGS: dict[Any, _Reading] = {
 }
 """Types of options that hold numbers: tyro reads them the same, but complains in its own words."""
 
-_NUMBERS = ConstructorRegistry()
+_RULES = ConstructorRegistry()
 
 
-@_NUMBERS.primitive_rule
+@_RULES.primitive_rule
 def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     reading = _READINGS.get(asked.type)
     if reading is None:
@@ -90,6 +101,45 @@ def _number(asked: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
             map(str, value if isinstance(value, tuple) else [value])
         ),
     )
+
+
+@_RULES.struct_rule
+def _options(asked: StructTypeInfo) -> StructConstructorSpec | None:
+    """Fields of a command as tyro takes them, but the lines of their docstrings joined."""
+    if not (is_dataclass(asked.type) and asked.type.__module__.startswith("care_sim.")):
+        return None
+    types = get_type_hints(asked.type, include_extras=True)
+    return StructConstructorSpec(
+        asked.type,
+        tuple(
+            StructFieldSpec(
+                field.name,
+                types[field.name],
+                _default_of(field, asked.default),
+                partial(_help_of, asked.type, field.name),
+            )
+            for field in fields(asked.type)
+            if field.init
+        ),
+    )
+
+
+def _default_of(field: Field[Any], options: Any) -> Any:
+    """The value in `options`, where they are given, or else the field's default."""
+    if options is not MISSING_NONPROP and options is not tyro.MISSING:
+        return getattr(options, field.name)
+    if field.default_factory is not MISSING:
+        return field.default_factory()
+    return MISSING_NONPROP if field.default is MISSING else field.default
+
+
+def _help_of(options: type, name: str) -> str:
+    """The docstring of a field, in one line: tyro would keep the breaks of the source."""
+    for one in options.__mro__[:-1]:
+        for described in docstring_parser.parse_from_object(one).params:
+            if described.arg_name == name:
+                return " ".join((described.description or "").split())
+    return ""
 
 
 def chosen_command(
@@ -108,7 +158,7 @@ def chosen_command(
     try:
         with contextlib.redirect_stderr(complaint):
             command: Callable[[], int] = tyro.extras.subcommand_cli_from_dict(
-                dict(commands), prog=prog, description=about, args=arguments, registry=_NUMBERS
+                dict(commands), prog=prog, description=about, args=arguments, registry=_RULES
             )
             return command
     except SystemExit as end:
