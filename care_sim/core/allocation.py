@@ -58,19 +58,26 @@ def allocate(
     """
     check_number("reserve_fraction", reserve_fraction, 0, 1)
     check_whole("budget", budget, 0, HIGHEST_CELL)
-    if not isinstance(demand, Demand):
-        raise InvalidInput(f"demand must be a Demand, got {shown(demand)}")
-    layers = _sequence("layers", "a list of layers", demand.layers)
-    stages = [
-        _sequence("exploitation", _SETS, demand.exploitation),
-        *(_sequence("a layer", _SETS, layer) for layer in layers),
-    ]
+    stages = stages_of(demand)
     # A layer may use all that is left of B, so that it inherits what exploitation did not need.
-    limits = [round((1 - reserve_fraction) * budget)] + [budget] * len(layers)
+    limits = [round((1 - reserve_fraction) * budget)] + [budget] * (len(stages) - 1)
     chosen = _filled(stages, limits)
     if floor is None:
         return chosen
     return np.concatenate([chosen, _free(floor, chosen, budget - len(chosen))])
+
+
+def stages_of(demand: Demand) -> list[Sequence[Cells]]:
+    """The sets of exploitation, then those of each reserve layer in order. Raises InvalidInput for
+    another form of demand.
+    """
+    if not isinstance(demand, Demand):
+        raise InvalidInput(f"demand must be a Demand, got {shown(demand)}")
+    layers = _sequence("layers", "a list of layers", demand.layers)
+    return [
+        _sequence("exploitation", _SETS, demand.exploitation),
+        *(_sequence("a layer", _SETS, layer) for layer in layers),
+    ]
 
 
 class RandomFloor:
@@ -164,9 +171,9 @@ def _fill_stages(
 ) -> Cells:
     """The cells taken, in order of selection.
 
-    Sets lie as in `_survey`, each ascending. Stages of sets follow each other likewise: stage k
-    ends at set `stage_ends[k]` and fills up to `limits[k]` cells in all. No cell is lower than
-    `lowest` (at most 0) or higher than `highest`.
+    Sets lie one after the other in `cells`; set s ends at `set_ends[s]`. Stages of sets follow each
+    other likewise: stage k ends at set `stage_ends[k]` and fills up to `limits[k]` cells in all. No
+    cell is lower than `lowest` (at most 0) or higher than `highest`.
     """
     # A set offers its cells from its own start, which is where the set before it ends.
     next_places = np.empty(len(set_ends), np.int64)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_sim.base.checks import check_known
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
@@ -34,22 +35,24 @@ CELL_ORDERS = (
 """How the cells of a set can be listed:
 
 - `as-demanded`, as the policy lists them;
-- `rows-down`, row by row from the top, `rows-up`, from the bottom, both from right to left;
+- `rows-down`, row by row from the top, `rows-up`, from the bottom, both by ascending column;
 - `columns`, column by column from right to left, each from the top;
 - `random`, by one permutation of the grid, the same at every keyframe and for every policy;
 - `spread`, by a low-discrepancy sequence: any first few cells lie evenly over the set;
-- `core-spread`, first the set without its margins, then the margins, both spread. The margins of a
-  set narrower than them leave its middle; on the first and last row of the grid there is none.
+- `core-spread`, first the set without the margins by which sets are dilated, then these margins,
+  both spread. A set narrower than the margins keeps its middle; on the first and last row of the
+  grid there is none. A set that was dilated by less loses as much all the same.
 """
 
 _TURN = 2**32
-_COLUMN_STEP = round(math.sqrt(2) * _TURN) % _TURN
-_ROW_STEP = round(math.sqrt(3) * _TURN) % _TURN
+_COLUMN_STEP = round(math.sqrt(2) * _TURN) % _TURN | 1
+_ROW_STEP = round(math.sqrt(3) * _TURN) % _TURN | 1
 """Steps of the sequence per column and per row, in parts of `_TURN`: the square roots of the first
-primes, modulo 1 (Richtmyer, 1951). Whole numbers give every machine the same order. In rectangles
-of the size of hulls their windows are a third less uneven than those of the plastic number's
-powers, the other usual choice, and no pair of 1,500 random steps was better
-(`tests/core/test_cell_order.py` holds the unevenness).
+primes, modulo 1 (Richtmyer, 1951). Whole numbers give every machine the same order, and odd ones
+give different cells of a grid different numbers. Over eight rectangles of 4 x 6 to 10 x 40 cells
+the most uneven of all windows, at any number of cells taken, is off by 2.0 cells on average; 2.5
+with the inverse powers of the plastic number, 2.6 to 3.3 with multiples of the golden ratio, 5.5 at
+random.
 """
 
 
@@ -68,8 +71,9 @@ def reordered(
     A set lies on an arc of columns: from its first to its last, or, if it has cells on both sides
     of the seam at azimuth -pi, from the end of its widest gap. `columns` and the spread orders
     count from the right end of the arc, so that the seam makes no difference. Raises InvalidInput
-    for a cell that the grid does not have.
+    for another order, and for a cell that the grid does not have.
     """
+    check_known("order", order, CELL_ORDERS[1:])
     arrays = [cell_indices(cells) for cells in sets]
     size = spacing.columns * spacing.rows
     cells = np.concatenate([np.empty(0, np.int64), *arrays], dtype=np.int64, casting="unsafe")
@@ -77,7 +81,7 @@ def reordered(
         raise InvalidInput(f"cells must lie in 0..{size - 1}")
     ends = np.array([*accumulate(map(len, arrays))], np.int64)
     number = CELL_ORDERS.index(order) - 1
-    _sort_sets(cells, ends, number, spacing, margins, _ranks(size))
+    _sort_sets(cells, ends, number, spacing, margins, _ranks(size if number == RANDOM else 0))
     return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
 
 
@@ -157,9 +161,8 @@ def _write_keys(
         elif order == COLUMNS:
             keys[n] = column * grid.rows + row
         else:
-            # Where the sequence stands after so many steps, modulo a whole turn: cells whose number
-            # is below t make an even lattice of the share t of the plane. So do those of any
-            # rectangle, since the sequence does not know its borders.
+            # Where the sequence stands after so many steps, modulo a whole turn. The cells whose
+            # number is below t lie evenly, as the share t of the plane, in any rectangle.
             keys[n] = (column * _COLUMN_STEP + (row - arc.upper) * _ROW_STEP) & (_TURN - 1)
             if order == CORE_SPREAD:
                 in_core = right <= column < left and upper <= row < lower
@@ -168,8 +171,8 @@ def _write_keys(
 
 @compiled(inline="always")
 def _row_and_column(cell: int, columns: int) -> tuple[int, int]:
-    """Of a cell. A multiplication takes a tenth of the time of a division of whole numbers; half a
-    cell more keeps its last bit from mattering.
+    """Of a cell. A multiplication is faster than a division of whole numbers; half a cell more
+    keeps its last bit from mattering.
     """
     row = int((cell + 0.5) * (1.0 / columns))
     return row, cell - row * columns

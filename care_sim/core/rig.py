@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain, islice
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.core.allocation import RESERVE_FRACTION, budget_cells
+from care_sim.core.allocation import RESERVE_FRACTION, budget_cells, stages_of
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, SetMargins, reordered
@@ -89,8 +90,10 @@ class Rig:
         return self.grid.hulls(boxes, azimuth, self.elevation_margin)
 
     def reordered(self, sets: Sequence[Cells], order: str) -> list[Cells]:
-        """Sets that were dilated by the rig's margins, the cells of each listed in an order of
-        `care_sim.core.cell_order.CELL_ORDERS`.
+        """The cells of each set listed in an order of `care_sim.core.cell_order.CELL_ORDERS`.
+
+        `core-spread` takes every set for one that was dilated by the rig's margins. Raises
+        InvalidInput for another order, and for a cell that the grid does not have.
         """
         if order == AS_DEMANDED:
             return list(sets)
@@ -98,10 +101,12 @@ class Rig:
         return reordered(sets, order, self.grid.spacing, margins)
 
     def in_cell_order(self, demand: Demand) -> Demand:
-        """The demand with all its sets listed in the rig's `cell_order`."""
+        """The demand with all its sets listed in the rig's `cell_order`. Raises InvalidInput for
+        another form of demand, and for a cell that the grid does not have.
+        """
         if self.cell_order == AS_DEMANDED:
             return demand
-        exploitation, *layers = (
-            self.reordered(sets, self.cell_order) for sets in (demand.exploitation, *demand.layers)
-        )
+        stages = stages_of(demand)
+        listed = iter(self.reordered([*chain(*stages)], self.cell_order))
+        exploitation, *layers = ([*islice(listed, len(stage))] for stage in stages)
         return Demand(exploitation, layers)

@@ -1,5 +1,7 @@
 """The order of the cells inside a set."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,14 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
-from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, SetMargins, reordered
+from care_sim.core.cell_order import (
+    _COLUMN_STEP,
+    _ROW_STEP,
+    AS_DEMANDED,
+    CELL_ORDERS,
+    SetMargins,
+    reordered,
+)
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -167,6 +176,91 @@ def test_the_rig_lists_all_sets_of_a_demand():
 
 def test_the_allocator_takes_a_set_in_its_order():
     assert allocate(Demand(layers=[[[7, 3, 5], [5, 1]]]), 4, 0.3).tolist() == [7, 5, 3, 1]
+
+
+@st.composite
+def grids_and_sets(draw):
+    """Small, wide and high grids; sets of any form, at the seam, empty, rectangular."""
+    grid = AngularGrid(*draw(st.sampled_from([(1, 2), (8, 4), (31, 3), (512, 32), (1024, 64)])))
+    random = draw(st.randoms(use_true_random=False))
+    sets = []
+    for form in draw(st.lists(st.sampled_from(["any", "seam", "rectangle"]), max_size=4)):
+        size = random.randrange(min(grid.size, 60))
+        cells = random.sample(range(grid.size), size)
+        if form == "seam":
+            cells = [0, grid.columns - 1, grid.size - 1][: 1 + size % 3]
+        elif form == "rectangle":
+            width = random.randrange(1, min(grid.columns, 40) + 1)
+            height = random.randrange(1, min(grid.rows, 12) + 1)
+            first, upper = random.randrange(grid.columns), random.randrange(grid.rows - height + 1)
+            cells = [
+                row * grid.columns + (first + n) % grid.columns
+                for row in range(upper, upper + height)
+                for n in range(width)
+            ]
+        sets.append(np.array(sorted({*cells}), np.int64))
+    return grid, sets, SetMargins(draw(st.integers(0, 4)), draw(st.integers(0, 3)))
+
+
+def by_the_letter(cells, order, grid, margins):
+    """The documented order once more, cell by cell, with sorted tuples."""
+    columns = {c % grid.columns for c in cells}
+    first = min(columns)
+    if {0, grid.columns - 1} <= columns:
+        runs = "".join("x" if n in columns else "." for n in range(grid.columns))
+        gaps = [(len(gap), -start) for gap, start in free_runs(runs)]
+        first = -max(gaps)[1] + max(gaps)[0] if gaps else 0
+    width = max((c % grid.columns - first) % grid.columns for c in cells) + 1
+    rows = [c // grid.columns for c in cells]
+    side = 0 if width == grid.columns else min(margins.columns, (width - 1) // 2)
+    ends = min(margins.rows, (max(rows) - min(rows)) // 2)
+
+    def key(cell):
+        row, column = divmod(cell, grid.columns)
+        place = (column - first) % grid.columns
+        number = (place * _COLUMN_STEP + (row - min(rows)) * _ROW_STEP) % 2**32
+        in_core = (
+            side <= place < width - side
+            and (min(rows) == 0 or row >= min(rows) + ends)
+            and (max(rows) == grid.rows - 1 or row <= max(rows) - ends)
+        )
+        return {
+            "rows-down": (cell,),
+            "rows-up": (-row, column),
+            "columns": (place, row),
+            "spread": (number,),
+            "core-spread": (not in_core, number),
+        }[order]
+
+    return sorted(cells, key=key)
+
+
+def free_runs(runs):
+    """The stretches of dots, each with its start."""
+    return [(found.group(), found.start()) for found in re.finditer(r"\.+", runs)]
+
+
+@given(grids_and_sets(), st.sampled_from([name for name in ORDERS if name != "random"]))
+def test_agrees_with_the_orders_by_the_letter(made, order):
+    grid, sets, margins = made
+    for ours, cells in zip(reordered(sets, order, grid.spacing, margins), sets, strict=True):
+        expected = by_the_letter(cells.tolist(), order, grid, margins) if len(cells) else []
+        assert ours.tolist() == expected
+
+
+@pytest.mark.parametrize("order", [AS_DEMANDED, "backwards", None])
+def test_only_an_order_can_be_asked_for(order):
+    with pytest.raises(InvalidInput, match=r"unknown order .*; known: columns, core-spread"):
+        reordered([np.arange(9)], order, GRID.spacing, MARGINS)
+
+
+@pytest.mark.parametrize("demand", [None, Demand(None), Demand((), None), Demand((), [None])])
+def test_a_demand_of_another_form_is_refused_as_the_allocator_does(demand):
+    with pytest.raises(InvalidInput) as ours:
+        Rig(cell_order="spread").in_cell_order(demand)
+    with pytest.raises(InvalidInput) as theirs:
+        allocate(demand, 5, 0.3)
+    assert str(ours.value) == str(theirs.value)
 
 
 def test_an_unknown_order_is_named():

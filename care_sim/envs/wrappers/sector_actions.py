@@ -32,7 +32,8 @@ class _Sectors(gymnasium.ActionWrapper[Any, NDArray[np.float32], Action], Record
     def _cells(self, demand: Demand) -> Action:
         """Scores (E, A) of the cells that the shared allocator takes."""
         rig = self._rig
-        return scores_of(allocate(demand, rig.budget, rig.reserve_fraction), rig.grid.shape)
+        cells = allocate(rig.in_cell_order(demand), rig.budget, rig.reserve_fraction)
+        return scores_of(cells, rig.grid.shape)
 
 
 class SectorReserve(_Sectors):
