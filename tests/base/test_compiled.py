@@ -27,8 +27,11 @@ def test_without_a_folder_for_the_code_it_is_compiled_anew():
     assert done.stdout.strip() == "(1, 2, 6, 7)"
 
 
+# Python tells its bytecode by the second and the size of the source. These tests write a file twice
+# within a second, so nothing is kept of it.
 KEPT_HERE = """
 import numba, os, sys
+sys.dont_write_bytecode = True
 numba.config.CACHE_DIR = os.path.join(os.getcwd(), "kept")
 sys.path.insert(0, os.getcwd())
 """
