@@ -119,7 +119,7 @@ def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
 
     # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
-    lowest = min(0, cells.min(initial=0))
+    lowest = cells.min(initial=0)
     highest = cells.max(initial=0)
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest

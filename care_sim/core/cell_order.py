@@ -50,9 +50,9 @@ _ROW_STEP = round(math.sqrt(3) * _TURN) % _TURN | 1
 """Steps of the sequence per column and per row, in parts of `_TURN`: the square roots of the first
 primes, modulo 1 (Richtmyer, 1951). Whole numbers give every machine the same order, and odd ones
 give different cells of a grid different numbers. Over eight rectangles of 4 x 6 to 10 x 40 cells
-the most uneven of all windows, at any number of cells taken, is off by 2.0 cells on average; 2.5
-with the inverse powers of the plastic number, 2.6 to 3.3 with multiples of the golden ratio, 5.5 at
-random.
+the most uneven of all windows at a corner, at any number of cells taken, is off by 2.0 cells on
+average; 2.5 to 3.0 with the inverse powers of the plastic number, 2.6 to 3.3 with the golden ratio
+and another number, 5.5 at random.
 """
 
 

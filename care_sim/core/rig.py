@@ -1,6 +1,5 @@
 """What is fixed about the sensing task: grid, cameras, budget, margins."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, islice
@@ -89,24 +88,17 @@ class Rig:
         azimuth = self.azimuth_margin if azimuth_margins is None else azimuth_margins
         return self.grid.hulls(boxes, azimuth, self.elevation_margin)
 
-    def reordered(self, sets: Sequence[Cells], order: str) -> list[Cells]:
-        """The cells of each set listed in an order of `care_sim.core.cell_order.CELL_ORDERS`.
+    def in_cell_order(self, demand: Demand) -> Demand:
+        """The demand with all its sets listed in the rig's `cell_order`.
 
         `core-spread` takes every set for one that was dilated by the rig's margins. Raises
-        InvalidInput for another order, and for a cell that the grid does not have.
-        """
-        if order == AS_DEMANDED:
-            return list(sets)
-        margins = SetMargins(self.azimuth_margin, self.elevation_margin)
-        return reordered(sets, order, self.grid.spacing, margins)
-
-    def in_cell_order(self, demand: Demand) -> Demand:
-        """The demand with all its sets listed in the rig's `cell_order`. Raises InvalidInput for
-        another form of demand, and for a cell that the grid does not have.
+        InvalidInput for another form of demand, and for a cell that the grid does not have.
         """
         if self.cell_order == AS_DEMANDED:
             return demand
         stages = stages_of(demand)
-        listed = iter(self.reordered([*chain(*stages)], self.cell_order))
+        margins = SetMargins(self.azimuth_margin, self.elevation_margin)
+        sets = [*chain(*stages)]
+        listed = iter(reordered(sets, self.cell_order, self.grid.spacing, margins))
         exploitation, *layers = ([*islice(listed, len(stage))] for stage in stages)
         return Demand(exploitation, layers)

@@ -28,7 +28,8 @@ class Policy(ABC):
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
     parameters to the attributes of the environment that `make_policy` fills them from, unless they
-    are given. `demanded` is what `demand` last answered a call with, for those who watch.
+    are given. `demanded` is what `demand` last answered a call with, in the rig's order of cells,
+    for those who watch.
     """
 
     name: ClassVar[str] = ""

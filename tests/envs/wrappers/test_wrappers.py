@@ -233,3 +233,20 @@ def test_their_examples_run(name, tmp_path, monkeypatch):
     except MissingExtra as error:
         pytest.skip(str(error))
     given["env"].close()
+
+
+def test_sectors_take_hulls_in_the_order_of_the_environment():
+    """Without a score they are the history policy cell for cell, under any order of cells."""
+    with SectorReserve(
+        gymnasium.make("CARE-Dense-v0", budget=0.03, cell_order="core-spread")
+    ) as env:
+        history = care_sim.make_policy("history", env.unwrapped)
+        observation, _ = env.reset(seed=0)
+        nothing = np.zeros(env.action_space.shape)
+        held = 0
+        for _ in range(12):
+            expected = history(observation)
+            held += len(history.demanded.exploitation)
+            assert np.array_equal(env.action(nothing), expected)
+            observation, *_ = env.step(nothing)
+    assert held
