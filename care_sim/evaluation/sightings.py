@@ -73,16 +73,20 @@ class Sightings:
     """What there is to find in a scene, the same for every policy.
 
     `keyframes` are the annotations it was made from and `in_range` (n,) marks which of their
-    objects, one keyframe after the other, are scored: these are the rows of `frames`. `events` (e,)
-    are the rows of `frames` that are first sightings, ascending. `emerging` (m,) are the rows at
-    which an object that was hidden within range at the first keyframe first shows itself,
-    ascending: events by the presence "visible", none by "annotated".
+    objects, one keyframe after the other, are scored, those within `range_m` metres: these are the
+    rows of `frames`. `first_ranges` (r,) are the planar metres at which the annotations first show
+    the object of each row, within range or beyond. `events` (e,) are the rows of `frames` that are
+    first sightings, ascending. `emerging` (m,) are the rows at which an object that was hidden
+    within range at the first keyframe first shows itself, ascending: events by the presence
+    "visible", none by "annotated".
     """
 
     scene: str
     keyframes: tuple[Annotations, ...]
+    range_m: float
     in_range: Mask
     frames: ObjectFrames
+    first_ranges: Floats
     events: Integers
     emerging: Integers
 
@@ -118,7 +122,17 @@ class Sightings:
         appearing = _newcomer_rows(frames)
         present = np.isin(frames.objects[appearing], start.objects[start.ranges <= range_m])
         events = appearing[~present] if presence == ANNOTATED else appearing
-        return cls(scene, tuple(keyframes), in_range, frames, events, appearing[present])
+        first_ranges = _first_ranges(rows)[in_range]
+        return cls(
+            scene,
+            tuple(keyframes),
+            range_m,
+            in_range,
+            frames,
+            first_ranges,
+            events,
+            appearing[present],
+        )
 
     def scored(self, keyframe: int) -> Mask:
         """(n,) which annotations of a keyframe are in range."""
@@ -147,6 +161,13 @@ def _newcomer_rows(frames: ObjectFrames) -> Integers:
     # Rows are in order of keyframe, so the first row of an object is its first keyframe.
     _, first = np.unique(frames.objects, return_index=True)
     return np.sort(first[frames.keyframes[first] > 0]).astype(np.int64)
+
+
+def _first_ranges(rows: ObjectFrames) -> Floats:
+    """(r,) the range of the first row of every row's object."""
+    # Rows are in order of keyframe, and `unique` gives the first of equal ones.
+    _, first, which = np.unique(rows.objects, return_index=True, return_inverse=True)
+    return rows.ranges[first[which]]
 
 
 def _together(seen: Annotations, hidden: Annotations) -> Annotations:

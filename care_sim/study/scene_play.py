@@ -220,7 +220,7 @@ def _reference(config: PlayConfig) -> PlayConfig:
 def _strata(score: SceneScore) -> Row:
     return {
         f"{kind}/{label}/{name}": value
-        for kind, masks in strata(score.sightings.frames).items()
+        for kind, masks in strata(score.sightings).items()
         for label, mask in masks.items()
         for name, value in asdict(score.tally(mask)).items()
     }

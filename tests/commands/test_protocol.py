@@ -69,7 +69,7 @@ def test_a_play_is_one_row_with_the_sums_of_the_scene_and_of_its_strata(source):
     assert set(PLAY_FIELDS) | set(plays.SUMS) < set(row)
     assert (row["source"], row["scene"], row["digest"]) == ("argoverse2", "a", config.digest())
     assert (row["keyframes"], row["events"], row["sighted"], row["ttfds"]) == (10, 1.0, 1.0, (0,))
-    for kind, labels in {"range": 3, "azimuth": 3, "class": 5}.items():
+    for kind, labels in {"range": 3, "azimuth": 3, "class": 5, "entry": 4}.items():
         parts = [name for name in row if name.startswith(f"{kind}/") and name.endswith("/frames")]
         assert len(parts) == labels
         assert sum(row[name] for name in parts) == row["frames"]

@@ -12,8 +12,8 @@ from care_sim.evaluation.strata import strata, thirds
 
 def labels(shown, kind, name, x, y):
     """The strata in which an object at (x, y) lies."""
-    frames = Sightings.of("one", [shown((1, name, x, y))]).frames
-    return [label for label, rows in strata(frames)[kind].items() if rows[0]]
+    scene = Sightings.of("one", [shown((1, name, x, y))])
+    return [label for label, rows in strata(scene)[kind].items() if rows[0]]
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_by_class(shown, name):
 def test_the_strata_of_a_kind_add_up_to_the_scene(street, detector, seed):
     keyframes = street(seed)
     result = score_scene(Sightings.of("any", keyframes), detector(keyframes, seed))
-    for parts in strata(result.sightings.frames).values():
+    for parts in strata(result.sightings).values():
         assert np.all(np.sum(list(parts.values()), axis=0) == 1)
         assert sum((result.tally(rows) for rows in parts.values()), Tally()) == result.tally()
 
