@@ -1,5 +1,5 @@
-"""Two policies on the same scenes: how much more one found, and how sure that is (paper, Sec. 3 and
-Table 1).
+"""Two policies on the same scenes: how much more one found, or which share of what the other did,
+and how sure that is (paper, Sec. 3, Sec. 5.2 and Table 1).
 
 Policies are paired by scene and whole scenes are resampled, for the events of a scene are not
 independent. Scenes without an event, or without an object frame, hold nothing of the measure and
@@ -77,6 +77,16 @@ class SceneContrast:
         return self.scenes >= FEWEST_PAIRS and (self.by_event.low > 0 or self.by_event.high < 0)
 
 
+@dataclass(frozen=True)
+class SceneShare:
+    """What one policy found in % of what another found, over `scenes` in which the other found
+    anything.
+    """
+
+    interval: Interval
+    scenes: int
+
+
 def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
     """The mean tally of every scene over floor seeds, of the scenes that all seeds have.
 
@@ -112,6 +122,21 @@ def scene_contrast(
     by_event = ratio_of_sums((a - b, weights), seed=seed)
     by_scene = paired_difference(a / weights, b / weights, seed=seed)
     return SceneContrast(ratio, by_event, by_scene, len(pairs), float(weights.sum()))
+
+
+def scene_share(ratio: Ratio, ours: Tallies, whole: Tallies, *, seed: int = 0) -> SceneShare | None:
+    """`ours` in % of the `whole` on the scenes that both have; None where the whole found nothing.
+
+    It is a quotient of two recalls of the same objects. What ours found need not be among what the
+    whole did, so that it can exceed 100. Raises InvalidInput as `scene_contrast` does.
+    """
+    # A scene in which the whole found nothing has no share, as one without an event has no recall.
+    pairs = [pair for pair in _pairs(ratio, ours, whole) if ratio.numerator(pair[1])]
+    if not pairs:
+        return None
+    # A scene is drawn with what both found in it: the two are paired within the resamples too.
+    a, b, _ = _columns(ratio, pairs)
+    return SceneShare(ratio_of_sums((100 * a, b), seed=seed), len(pairs))
 
 
 def contrast_gap(

@@ -4,6 +4,8 @@ be compared.
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
@@ -15,6 +17,7 @@ from care_sim.evaluation.scene_contrasts import (
     contrast_gap,
     ratio_level,
     scene_contrast,
+    scene_share,
 )
 
 
@@ -163,3 +166,45 @@ def test_the_gap_between_thirds_is_the_difference_of_their_contrasts():
     assert contrast_gap(FIRST_SIGHTING, ours, theirs, dense, ["scene 3"]) is None
     with pytest.raises(InvalidInput, match="must share none, got scene 2 in both"):
         contrast_gap(FIRST_SIGHTING, ours, theirs, dense, ["scene 2", "scene 3"])
+
+
+def test_a_share_is_of_all_that_the_whole_found_and_scenes_without_any_of_it_are_left_out():
+    """3 of 5 and 1 of 1; in the third scene the whole found nothing, the last has no event."""
+    ours = tallies((10, 3), (2, 1), (8, 2), (0, 0))
+    whole = tallies((10, 5), (2, 1), (8, 0), (0, 0))
+    found = scene_share(FIRST_SIGHTING, ours, whole)
+    assert found.scenes == 2
+    assert found.interval.mean == pytest.approx(100 * 4 / 6)
+    assert (found.interval.low, found.interval.high) == pytest.approx((60.0, 100.0))
+    assert scene_share(OVERALL, ours, whole).interval == pytest.approx(found.interval)
+
+
+def test_a_share_of_nothing_is_none():
+    nothing = tallies((10, 0), (0, 0))
+    assert scene_share(FIRST_SIGHTING, tallies((10, 3), (0, 0)), nothing) is None
+    assert scene_share(FIRST_SIGHTING, nothing, {}) is None
+    assert scene_share(FIRST_SIGHTING, {}, nothing) is None
+
+
+def test_a_share_is_paired_and_does_not_know_how_much_a_scene_holds():
+    """Half of the whole in every scene, rich or poor: there is nothing to be unsure of."""
+    whole = tallies(*[(4 * n, 2 * n) for n in range(1, 9)])
+    half = tallies(*[(4 * n, n) for n in range(1, 9)])
+    assert scene_share(FIRST_SIGHTING, half, whole).interval == pytest.approx((50.0, 50.0, 50.0))
+    assert scene_share(FIRST_SIGHTING, whole, half).interval == pytest.approx((200.0,) * 3)
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=12))
+def test_a_share_is_the_quotient_of_the_levels_where_the_whole_found_something(found):
+    ours, whole = (tallies(*[(9, pair[n]) for pair in found]) for n in (0, 1))
+    rich = [scene for scene, tally in whole.items() if tally.sighted]
+    share = scene_share(FIRST_SIGHTING, ours, whole)
+    assert (share is None) == (not rich)
+    if share:
+        a, b = (
+            ratio_level(FIRST_SIGHTING, {scene: each[scene] for scene in rich}).by_event
+            for each in (ours, whole)
+        )
+        assert share.interval.mean == pytest.approx(100 * a / b)
+        assert share.interval.low <= share.interval.mean + 1e-9
+        assert share.interval.mean <= share.interval.high + 1e-9

@@ -25,7 +25,7 @@ from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.study.run_config import REFERENCE
 
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
-_HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
+HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
 RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
 """What the columns count by which scenes are ranked, per keyframe."""
 FEWEST_SCENES = 9
@@ -129,7 +129,7 @@ class PolicyPair:
         """The measure, the stratum, the weights."""
         within = [self.within.partition("/")[2]] if self.within else []
         return ", ".join(
-            [_HEADINGS[self.ratio], *within, *(["equal scenes"] if self.equal_scenes else [])]
+            [HEADINGS[self.ratio], *within, *(["equal scenes"] if self.equal_scenes else [])]
         )
 
     @property
@@ -177,7 +177,7 @@ class SceneThird:
     @property
     def heading(self) -> str:
         """The measure, and what scenes are ranked by."""
-        return f"{_HEADINGS[self.ratio]}, by {self.ranked_by}"
+        return f"{HEADINGS[self.ratio]}, by {self.ranked_by}"
 
     @property
     def label(self) -> str:

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio
-from care_sim.reports.formatting import emphasised, mean, signed
+from care_sim.evaluation.censoring import FEWEST_PAIRS
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD, Ratio, SceneShare
+from care_sim.reports.formatting import bounds, emphasised, mean, signed
 from care_sim.reports.protocol.differences import MeasuredDifference, decimals_of
 from care_sim.reports.protocol.paper import Claim, Claims, PublishedLevel
 
@@ -22,13 +23,15 @@ def written(ratio: Ratio, value: float | None) -> str:
 
 def level_of_paper(said: PublishedLevel) -> tuple[str, ...]:
     """The paper's levels of a policy, in the order of the columns: recall and share of the full
-    scan's, of first sightings and of all; TTFD.
+    scan's, which it gives without an interval, of first sightings and of all; TTFD.
     """
     return (
         written(FIRST_SIGHTING, said.first),
         rounded(said.first_of_full),
+        "",
         written(OVERALL, said.overall),
         rounded(said.overall_of_full),
+        "",
         written(TTFD, said.ttfd),
     )
 
@@ -36,6 +39,18 @@ def level_of_paper(said: PublishedLevel) -> tuple[str, ...]:
 def rounded(share: float | None, unit: str = "") -> str:
     """A share in whole %."""
     return "" if share is None else f"{share:.0f}{unit}"
+
+
+def share(found: SceneShare | None) -> str:
+    """A share of the full scan's recall in whole %."""
+    return rounded(found.interval.mean) if found else ""
+
+
+def share_ends(found: SceneShare | None) -> str:
+    """The interval of a share in whole %; empty of fewer scenes than carry one."""
+    if found is None or found.scenes < FEWEST_PAIRS:
+        return ""
+    return bounds(found.interval, 0)
 
 
 def claims_of_paper(claims: Claims | None, budgets: Sequence[float]) -> tuple[str, ...]:

@@ -25,6 +25,12 @@ NO_INTERVAL = (
     f"{FEWEST_PAIRS} events."
 )
 
+_OF_FULL = (
+    "Of full: recall in % of the full scan's, with its interval, of the scenes in which the full "
+    "scan finds anything and both were played. Scenes are resampled with what both found in them; "
+    f"no interval of fewer than {FEWEST_PAIRS}."
+)
+
 
 def played(plays: SettingPlays) -> str:
     """Scenes, events, object frames and floor seeds."""
@@ -77,6 +83,11 @@ def on_intervals(differences: Iterable[MeasuredDifference | None]) -> tuple[str,
         if any(difference.interval is None for difference in shown)
         else by_events
     )
+
+
+def of_full(plays: SettingPlays) -> str:
+    """What the share of the full scan's recall is, or that there is none."""
+    return _OF_FULL if plays.full else "Of full: the full scan was not played."
 
 
 def left_out(plays: SettingPlays) -> tuple[str, ...]:

@@ -11,7 +11,15 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import Ratio, RatioLevel, Tallies, averaged, ratio_level
+from care_sim.evaluation.scene_contrasts import (
+    Ratio,
+    RatioLevel,
+    SceneShare,
+    Tallies,
+    averaged,
+    ratio_level,
+    scene_share,
+)
 from care_sim.evaluation.strata import thirds
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
@@ -82,6 +90,16 @@ class SettingPlays:
     def level(self, ratio: Ratio, policy: str, budget: float, within: str = "") -> RatioLevel:
         """A measure over all scenes of the policy."""
         return ratio_level(ratio, self.tallies(policy, budget, within))
+
+    def share_of_full(
+        self, ratio: Ratio, policy: str, budget: float, within: str = ""
+    ) -> SceneShare | None:
+        """A recall in % of the full scan's, of the scenes that both have; None where the full scan
+        was not played or found nothing.
+        """
+        return scene_share(
+            ratio, self.tallies(policy, budget, within), self.tallies(FULL, 1.0, within)
+        )
 
     def delays(self, policy: str, budget: float, scene: str) -> Floats:
         """(floor seeds, events) censored TTFD in keyframes of a scene's events."""

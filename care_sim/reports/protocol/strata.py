@@ -16,6 +16,7 @@ from care_sim.reports.protocol.differences import (
     PolicyPair,
     SceneThird,
 )
+from care_sim.reports.protocol.entries import ENTRY, ENTRY_NOTE
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded, written
 from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, papers
 from care_sim.reports.protocol.paper import (
@@ -25,7 +26,7 @@ from care_sim.reports.protocol.paper import (
 )
 from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.reports.table import Table
-from care_sim.study.run_config import REFERENCE
+from care_sim.study.run_config import FULL, REFERENCE
 
 _BASES = (HISTORY, "all-camera")
 """The policies with which strata compare CARE."""
@@ -44,13 +45,14 @@ _DIFFERING = (
 
 
 def strata_tables(plays: SettingPlays) -> list[Table]:
-    """Recall by range, azimuth and class: the level of every policy, and CARE less the others in
-    `_BASES`.
+    """Recall by range, azimuth, class and entry: the level of every policy and of the full scan,
+    and CARE less the others in `_BASES`.
     """
     if not plays.policies:
         return []
     columns = (
         *(marked(policy, tags) for policy, tags in plays.tags.items()),
+        *((FULL,) if plays.full else ()),
         *(pair.label for pair in _pairs(plays)),
     )
     notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
@@ -83,25 +85,41 @@ def _on_strata(plays: SettingPlays) -> tuple[str, ...]:
         "Intervals over scenes that have anything in the stratum, none of fewer than "
         f"{FEWEST_PAIRS}."
     )
-    return ("Levels in %.", *((intervals,) if _pairs(plays) else ()))
+    entries = (ENTRY_NOTE,) if ENTRY in plays.strata() else ()
+    return (
+        "Levels in %. A stratum with nothing to find has no line.",
+        *((intervals,) if _pairs(plays) else ()),
+        *entries,
+    )
 
 
 def _strata_lines(plays: SettingPlays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
     for kind, labels in plays.strata().items():
         yield (kind,)
-        for label in labels:
-            for budget in plays.budgets:
-                yield _stratum_line(plays, ratio, f"{kind}/{label}", budget)
+        for within in (f"{kind}/{label}" for label in labels):
+            if count := _counted(plays, ratio, within):
+                for budget in plays.budgets:
+                    yield _stratum_line(plays, ratio, within, budget, count)
 
 
-def _stratum_line(plays: SettingPlays, ratio: Ratio, within: str, budget: float) -> tuple[str, ...]:
+def _counted(plays: SettingPlays, ratio: Ratio, within: str) -> float:
     # First sightings are counted in events, overall recall in object frames.
     column = "events" if ratio is FIRST_SIGHTING else "frames"
-    levels = (plays.level(ratio, policy, budget, within).by_event for policy in plays.policies)
+    return float(sum(row[f"{within}/{column}"] for row in plays.scenes.values()))
+
+
+def _stratum_line(
+    plays: SettingPlays, ratio: Ratio, within: str, budget: float, count: float
+) -> tuple[str, ...]:
+    ceiling = ((FULL, 1.0),) if plays.full else ()
+    levels = (
+        plays.level(ratio, policy, of, within).by_event
+        for policy, of in (*((policy, budget) for policy in plays.policies), *ceiling)
+    )
     return (
         within.partition("/")[2],
         percent(budget),
-        f"{sum(row[f'{within}/{column}'] for row in plays.scenes.values()):,.0f}",
+        f"{count:,.0f}",
         *(written(ratio, value) for value in levels),
         *(interval(pair.measured(plays, budget)) for pair in _pairs(plays, ratio, within)),
     )

@@ -13,9 +13,17 @@ from care_sim.evaluation.scene_contrasts import (
 )
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.contrasts import protocol_contrast_tables
+from care_sim.reports.protocol.controls import control_tables
 from care_sim.reports.protocol.differences import RATIOS
-from care_sim.reports.protocol.formatting import PAPER, level_of_paper, rounded, written
-from care_sim.reports.protocol.notes import left_out, papers
+from care_sim.reports.protocol.entries import entry_tables
+from care_sim.reports.protocol.formatting import (
+    PAPER,
+    level_of_paper,
+    share,
+    share_ends,
+    written,
+)
+from care_sim.reports.protocol.notes import left_out, of_full, papers
 from care_sim.reports.protocol.paper import LEVEL_SOURCES, PUBLISHED_LEVELS
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.protocol.statements import statements_tables
@@ -28,8 +36,10 @@ _LEVEL_COLUMNS = (
     "policy",
     "first sightings %",
     "of full %",
+    "interval",
     "overall %",
     "of full %",
+    "interval",
     "TTFD",
     "equal scenes: first sightings %",
     "equal scenes: overall %",
@@ -38,7 +48,11 @@ _LEVEL_COLUMNS = (
     "seeds: overall ±",
     "scenes",
 )
-_LEVEL_FILES_ONLY = tuple(name for name in _LEVEL_COLUMNS if ": " in name or name == "scenes")
+_OF_FULL = ("of full %", "interval")
+"""Columns of a setting in which the full scan was played."""
+_DETAILS = tuple(name for name in _LEVEL_COLUMNS if ": " in name or name == "scenes")
+"""Columns of which the paper says nothing."""
+_LEVEL_FILES_ONLY = ("interval", *_DETAILS)
 _LEVEL_WHOLE = tuple(name for name in _LEVEL_COLUMNS if name != "policy")
 
 
@@ -47,7 +61,9 @@ def protocol_tables(rows: Sequence[Row]) -> list[Table]:
     # What answers the main question comes first: differences, then levels, then details.
     made: list[Callable[[SettingPlays], list[Table]]] = [
         protocol_contrast_tables,
+        control_tables,
         levels_tables,
+        entry_tables,
         statements_tables,
         strata_tables,
         thirds_tables,
@@ -63,13 +79,13 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
     budgeted = ((policy, budget) for budget in plays.budgets for policy in plays.policies)
     keys = [key for key in (*budgeted, *ceiling) if plays.rows(*key)]
     lines = [line for key in keys for line in _level_lines(plays, *key)]
-    missing = () if plays.full else ("Of full: the full scan was not played.",)
+    kept = [n for n, name in enumerate(_LEVEL_COLUMNS) if plays.full or name not in _OF_FULL]
     return [
         Table(
             f"{plays.setting.label}: levels",
-            _LEVEL_COLUMNS,
-            tuple(lines),
-            (*missing, *left_out(plays), *tag_notes(plays.tags.values())),
+            tuple(_LEVEL_COLUMNS[n] for n in kept),
+            tuple(tuple(line[n] for n in kept) for line in lines),
+            (of_full(plays), *left_out(plays), *tag_notes(plays.tags.values())),
             papers(LEVEL_SOURCES) if any(line[1] == PAPER for line in lines) else (),
             _LEVEL_FILES_ONLY,
             _LEVEL_WHOLE,
@@ -79,13 +95,18 @@ def levels_tables(plays: SettingPlays) -> list[Table]:
 
 def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[str, ...]]:
     first, overall, ttfd = (plays.level(ratio, policy, budget) for ratio in RATIOS)
+    first_share, overall_share = (
+        plays.share_of_full(ratio, policy, budget) for ratio in (FIRST_SIGHTING, OVERALL)
+    )
     line = (
         percent(budget),
         marked(policy, plays.tags.get(policy, ())),
         written(FIRST_SIGHTING, first.by_event),
-        _of_full(plays, FIRST_SIGHTING, policy, budget),
+        share(first_share),
+        share_ends(first_share),
         written(OVERALL, overall.by_event),
-        _of_full(plays, OVERALL, policy, budget),
+        share(overall_share),
+        share_ends(overall_share),
         written(TTFD, ttfd.by_event),
         written(FIRST_SIGHTING, first.by_scene),
         written(OVERALL, overall.by_scene),
@@ -97,16 +118,7 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
     said = None if plays.setting.conditions else PUBLISHED_LEVELS.get((policy, budget))
     if said is None:
         return [line]
-    return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _LEVEL_FILES_ONLY))]
-
-
-def _of_full(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
-    """Share of the ceiling in %, of the scenes that the policy and the full scan have."""
-    # A ratio of two recalls is one of the same objects only where both have played the same scenes.
-    ours = plays.tallies(policy, budget)
-    full = plays.tallies(FULL, 1.0)
-    value, ceiling = (_over(ratio, tallies, set(ours) & set(full)) for tallies in (ours, full))
-    return rounded(100 * value / ceiling) if value is not None and ceiling else ""
+    return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _DETAILS))]
 
 
 def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | None:

@@ -1,0 +1,24 @@
+"""Which policies are the controls that a contender has to beat, and which of them is the best."""
+
+from collections.abc import Mapping
+
+from care_sim.reports.formatting import MARKS
+
+BEST_CONTROL = "best control"
+"""What the line begins with that names it at every budget."""
+IN_HINDSIGHT = (
+    "It is chosen anew at each budget, by the very results that are compared. Such a choice in "
+    "hindsight favours the control, which is the strict reading."
+)
+
+
+def is_control(tags: tuple[str, ...]) -> bool:
+    """Whether a policy with these tags is a control that a car can have."""
+    # What looks the episode up, or knows the truth, is a warning or a bound, and nothing to beat.
+    return "control" in tags and not {*tags} & {*MARKS}
+
+
+def best_control(levels: Mapping[str, float | None]) -> str | None:
+    """The control of the highest level, of equal ones the first; None where no level is known."""
+    known = {policy: level for policy, level in levels.items() if level is not None}
+    return max(known, key=lambda policy: known[policy], default=None)
