@@ -176,6 +176,20 @@ def test_of_the_forecasts_that_explain_nothing_the_furthest_are_left_out():
     assert told([*aside, last]).tracks.ids.tolist() == list(range(MAX_TRACKS))
 
 
+@pytest.mark.parametrize("others", [99, MAX_TRACKS - 1, 400])
+def test_the_farthest_of_many_tracks_still_explains_its_box_for_who_reads_the_observation(others):
+    """The others are of its class, nearer, and behind the camera."""
+    aside = [track(id=n, x=-10.0, y=n / 20, **{"class": PEDESTRIAN}) for n in range(others)]
+    (u, v), _ = SURROUND_CAMERAS[0].project(np.array([48.0, 0.0, 0.0]))
+    last = track(id=999, x=48.0, **{"class": PEDESTRIAN})
+    box = detection(left=u - 1, right=u + 1, top=v - 1, bottom=v + 1, **{"class": PEDESTRIAN})
+
+    def unexplained(*tracks):
+        return len(camera_layers(read(told(tracks, [box])), RIG)[0])
+
+    assert (unexplained(*aside, last), unexplained(*aside)) == (0, 1)
+
+
 LARGE = st.floats(-1e12, 1e12)
 """Numbers as they come."""
 POSITIVE = st.floats(0, 1e12)

@@ -11,8 +11,16 @@ STRATA = {
     "range": ("below 20 m", "20 to 35 m", "from 35 m"),
     "azimuth": ("front", "side", "rear"),
     "class": ("car", "truck", "bus", "bicycle", "pedestrian"),
+    "entry": ("emergence", "ring", "beyond"),
 }
-TAGS = {"history-oracle": "privileged", "random-points": "non-causal"}
+"""Of entries only those that events have; every object frame is of an event here."""
+TAGS = {
+    "history-oracle": "privileged",
+    "random-points": "non-causal",
+    "rows": "causal+control",
+    "place": "causal+control",
+    "seed-finder": "generator+control",
+}
 
 
 def play(

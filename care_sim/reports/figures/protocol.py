@@ -1,5 +1,5 @@
 """Figures of the first-sighting protocol: the paper's Figures 2 and 3 for every setting that has
-them.
+them, and the policies over the best control.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,14 +9,16 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
+from care_sim.reports.figures.controls import control_figure
 from care_sim.reports.figures.styles import FULL_STYLE, OPEN_LOOP_DODGE, Style, bare_axes, styles
 from care_sim.reports.formatting import MARKS, marked, tag_notes
+from care_sim.reports.protocol.controls import contenders
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.rows.settings import SOURCES
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
-_KINDS = ("pareto", "levels")
+_KINDS = ("pareto", "levels", "controls")
 PROTOCOL_FIGURES = tuple(
     f"{kind}-{source}{rest}" for kind in _KINDS for source in SOURCES for rest in ("", "-*")
 )
@@ -26,7 +28,9 @@ and conditions.
 
 
 def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """Figures 2 and 3 of the paper for each setting, by name; Figure 3 needs two budgets."""
+    """Figures 2 and 3 of the paper for each setting, by name, and what policies have over controls
+    where any was played; Figure 3 needs two budgets.
+    """
     figures = {}
     for plays in plays_by_setting(rows):
         if plays.policies:
@@ -34,6 +38,8 @@ def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         # A single budget makes no curve.
         if len(plays.budgets) > 1:
             figures[f"levels-{plays.setting.slug}"] = levels_figure(plays)
+        if contenders(plays):
+            figures[f"controls-{plays.setting.slug}"] = control_figure(plays)
     return figures
 
 

@@ -94,6 +94,13 @@ class Encoding:
         )
 
 
+def faceted(panels: Any, values: Sequence[Mapping[str, Any]], order: Sequence[str]) -> Any:
+    """Panels side by side in this order, one for each text in `panel` of the values."""
+    header = alt.Header(title=None, labelAnchor="start", labelFontSize=12)
+    facet = alt.Facet("panel:N", sort=list(order), header=header)
+    return panels.facet(facet=facet, columns=len(order), data=inline(values))
+
+
 def budget_axis(budgets: Sequence[float], column: str = "place") -> alt.X:
     """A logarithmic axis of budgets with a mark at each."""
     return alt.X(

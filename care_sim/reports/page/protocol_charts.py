@@ -1,4 +1,6 @@
-"""The charts of the first-sighting protocol: the paper's Figures 2 and 3."""
+"""The charts of the first-sighting protocol: the paper's Figures 2 and 3, and the policies over the
+best control.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,9 +18,11 @@ from care_sim.reports.page.chart import (
     Chart,
     Encoding,
     budget_axis,
-    inline,
+    faceted,
     specification,
 )
+from care_sim.reports.page.control_charts import control_chart
+from care_sim.reports.protocol.controls import contenders
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.run_config import FULL, Row
@@ -28,13 +32,17 @@ _Values = list[dict[str, Any]]
 
 
 def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
-    """Figures 2 and 3 of the paper for each setting; Figure 3 needs two budgets."""
+    """Figures 2 and 3 of the paper for each setting, and what policies have over controls where any
+    was played; Figure 3 needs two budgets.
+    """
     charts = []
     for plays in plays_by_setting(rows):
         if plays.policies:
             charts.append(_pareto(plays))
         if len(plays.budgets) > 1:
             charts.append(_levels(plays))
+        if contenders(plays):
+            charts.append(control_chart(plays))
     return charts
 
 
@@ -45,7 +53,7 @@ def _pareto(plays: SettingPlays) -> Chart:
     encoding = Encoding.of(plays.tags.items(), full=False)
     values = [value for budget in plays.budgets for value in _points(plays, budget)]
     chart = (
-        _faceted(_pareto_panel(encoding), values, [*map(_panel, plays.budgets)])
+        faceted(_pareto_panel(encoding), values, [*map(_panel, plays.budgets)])
         .resolve_scale(x="independent", y="independent")
         .add_params(encoding.chosen)
     )
@@ -142,7 +150,7 @@ def _levels(plays: SettingPlays) -> Chart:
     """Both recalls against the budget; hollow: what the paper gives."""
     encoding = Encoding.of(plays.tags.items(), full=bool(plays.full))
     values = [value for ratio in _RECALLS for value in _curves(plays, ratio)]
-    chart = _faceted(
+    chart = faceted(
         _levels_panel(encoding, plays.budgets), values, [ratio.name for ratio in _RECALLS]
     ).resolve_scale(y="independent")
     said = (
@@ -209,12 +217,6 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
         "by": "here",
     }
     return [*values, *([full] if ceiling is not None else [])]
-
-
-def _faceted(panels: Any, values: _Values, order: Sequence[str]) -> Any:
-    header = alt.Header(title=None, labelAnchor="start", labelFontSize=12)
-    facet = alt.Facet("panel:N", sort=list(order), header=header)
-    return panels.facet(facet=facet, columns=len(order), data=inline(values))
 
 
 def _panel(budget: float) -> str:

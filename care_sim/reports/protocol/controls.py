@@ -40,6 +40,13 @@ def control_at(plays: SettingPlays, budget: float) -> str | None:
     )
 
 
+def named_controls(plays: SettingPlays) -> str:
+    """The best control at every budget, in a sentence."""
+    known = ((budget, control_at(plays, budget)) for budget in plays.budgets)
+    named = (f"{control} at {percent(budget)}" for budget, control in known if control)
+    return f"{BEST_CONTROL.capitalize()}: {', '.join(named)}."
+
+
 def over_control(
     plays: SettingPlays, ratio: Ratio, policy: str, budget: float
 ) -> MeasuredDifference | None:

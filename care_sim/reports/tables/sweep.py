@@ -1,5 +1,5 @@
-"""Tables of a sweep: in every setting the levels of all policies, then what CARE and the learned
-policies have over each.
+"""Tables of a sweep: in every setting the levels of all policies, what CARE and the learned
+policies have over each, and what each has over the best control.
 """
 
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from care_sim.reports.cells import Cell, summarise
 from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, Contrast, Measure, contrast
 from care_sim.reports.formatting import ends, interval, marked, spread, tag_notes, unsigned
 from care_sim.reports.table import Table
+from care_sim.reports.tables.controls import control_tables
 from care_sim.study.designs.paper import (
     PAPER_EPISODES,
     PublishedResult,
@@ -46,7 +47,11 @@ def sweep_tables(rows: Sequence[Row]) -> list[Table]:
     tables = []
     for setting in dict.fromkeys(cell.setting for cell in cells):
         own = [cell for cell in cells if cell.setting == setting]
-        tables += [levels_table(setting.label, own), *sweep_contrast_tables(setting, own, groups)]
+        tables += [
+            levels_table(setting.label, own),
+            *sweep_contrast_tables(setting, own, groups),
+            *control_tables(setting, own, groups),
+        ]
     return tables
 
 

@@ -98,7 +98,7 @@ def test_a_scene_that_one_seed_lacks_is_left_out():
 
 def test_a_stratum_is_read_by_its_name():
     (plays,) = plays_by_setting([play("a", "care", [0, 6, 6, 0], [5, 0, 0, 5])])
-    assert list(plays.strata()) == ["range", "azimuth", "class"]
+    assert list(plays.strata()) == ["range", "azimuth", "class", "entry"]
     assert plays.strata()["range"] == ["below 20 m", "20 to 35 m", "from 35 m"]
     assert plays.tallies("care", 0.1, "range/below 20 m")["a"] == Tally(2, 2, 0, 2 * FRAMES, 10)
     assert plays.level(FIRST_SIGHTING, "care", 0.1, "range/20 to 35 m").by_event == 0.0
@@ -139,3 +139,13 @@ def test_plays_of_two_films_of_a_scene_are_refused_and_two_camera_detectors_are_
     plain, detected = plays_by_setting([*rows, *seen])
     assert detected.setting.label == "generated streets, detector returns, camera detections 1f"
     assert len(plain.scenes) == len(detected.scenes) == 2
+
+
+def test_a_share_needs_a_full_scan_that_finds_something():
+    (plays,) = plays_by_setting(study({"care": (6, 5), "full": (8, 8)}))
+    share = plays.share_of_full(FIRST_SIGHTING, "care", 0.1)
+    assert (share.interval, share.scenes) == (pytest.approx((75.0, 75.0, 75.0)), 6)
+    (alone,) = plays_by_setting(study({"care": (6, 5)}))
+    assert alone.share_of_full(FIRST_SIGHTING, "care", 0.1) is None
+    (blind,) = plays_by_setting(study({"care": (6, 5), "full": (0, 0)}))
+    assert blind.share_of_full(FIRST_SIGHTING, "care", 0.1) is None

@@ -116,13 +116,51 @@ def test_equal_scene_weights_have_a_table_in_the_files():
 def test_levels_are_shares_of_what_the_full_scan_finds():
     table = tables()["levels"]
     lines = {(line[0], line[1]): line for line in table.rows}
-    assert lines["20%", "care"][2:7] == ("30.0", "75", "50.0", "62", "4.20")
-    assert lines["100%", "full"][2:7] == ("40.0", "100", "80.0", "100", "3.60")
-    assert lines["20%", "care"][7:] == ("30.0", "50.0", "4.20", "0.0", "0.0", "6")
+    assert lines["20%", "care"][2:9] == ("30.0", "75", "[75,75]", "50.0", "62", "[62,62]", "4.20")
+    assert lines["100%", "full"][2:9] == (
+        "40.0", "100", "[100,100]", "80.0", "100", "[100,100]", "3.60"
+    )  # fmt: skip
+    assert lines["20%", "care"][9:] == ("30.0", "50.0", "4.20", "0.0", "0.0", "6")
     said = [line for line in table.rows if line[1] == "(paper)"]
-    assert said[-1][2:7] == ("24.5", "100", "49.4", "100", "")
-    assert ("", "(paper)", "", "88", "", "94", "3.33") in {line[:7] for line in said}
-    assert "Of full" in tables(study({"care": (6, 5)}))["levels"].notes[0]
+    assert said[-1][2:9] == ("24.5", "100", "", "49.4", "100", "", "")
+    assert ("", "(paper)", "", "88", "", "", "94", "", "3.33") in {line[:9] for line in said}
+    assert {len(line) for line in table.rows} == {len(table.columns)}
+
+
+def test_without_a_full_scan_there_is_no_column_of_shares_and_a_note_says_why():
+    levels = tables(study({"care": (6, 5)}))["levels"]
+    assert levels.columns[:5] == ("budget", "policy", "first sightings %", "overall %", "TTFD")
+    assert levels.rows[0][:5] == ("10%", "care", "30.0", "50.0", "4.20")
+    assert levels.notes[0] == "Of full: the full scan was not played."
+    (care, *_) = block(
+        tables(study({"care": (6, 5)}))["first-sighting recall by entry"], "emergence, 42 events"
+    )
+    assert care == ("care", *["28.6"] * 3)
+
+
+def test_a_full_scan_that_finds_nothing_has_no_share():
+    levels = tables(study({"care": (6, 5), "full": (0, 5)}))["levels"]
+    care = dict(zip(levels.columns[2:5], levels.rows[0][2:5], strict=True))
+    assert care == {"first sightings %": "30.0", "of full %": "", "interval": ""}
+    assert levels.rows[0][5:8] == ("50.0", "100", "[100,100]")
+
+
+def unequal(policy, sighted, scenes):
+    return [
+        play(f"{n}", policy, found(10, count), [count] * 10)
+        for n, count in enumerate((sighted * scenes)[:scenes])
+    ]
+
+
+def test_the_interval_of_a_share_rests_on_scenes_and_on_no_fewer_than_five():
+    """In turns one and three of the four that the full scan finds."""
+    for scenes, ends in ((4, False), (5, True)):
+        rows = [*unequal("care", [1, 3], scenes), *unequal("full", [4], scenes)]
+        levels = tables(rows)["levels"]
+        line = levels.rows[0][3:5]
+        assert line[0] == ("50" if scenes == 4 else "45")
+        assert bool(line[1]) == ends
+        assert line[1] in ("", "[25,65]")
 
 
 def test_the_floor_seed_farthest_from_the_mean_is_named():
@@ -263,7 +301,12 @@ def test_the_strict_causal_variant_has_the_papers_own_numbers():
 
 def test_strata_have_the_level_of_every_policy_and_contrasts():
     table = tables()["first-sighting recall by stratum"]
-    assert [line[0] for line in table.rows if len(line) == 1] == ["range", "azimuth", "class"]
+    assert [line[0] for line in table.rows if len(line) == 1] == [
+        "range",
+        "azimuth",
+        "class",
+        "entry",
+    ]
     side = next(line for line in table.rows if line[:2] == ("side", "10%"))
     assert dict(zip(table.columns, side, strict=True)) == {
         "stratum": "side",
@@ -274,6 +317,7 @@ def test_strata_have_the_level_of_every_policy_and_contrasts():
         "care": "28.6",
         "mine": "28.6",
         "history-oracle †": "14.3",
+        "full": "42.9",
         "care minus history": "+14.3 [14.3,14.3]",
         "care minus all-camera": "+0.0 [0.0,0.0]",
     }
@@ -350,6 +394,7 @@ def test_one_policy_without_care_has_levels_and_strata():
     shown = tables(study({"history": (4, 6), "full": (8, 8)}))
     assert list(shown) == [
         "levels",
+        "first-sighting recall by entry",
         "first-sighting recall by stratum",
         "overall recall by stratum",
     ]
@@ -358,6 +403,7 @@ def test_one_policy_without_care_has_levels_and_strata():
         "budget",
         "object frames",
         "history",
+        "full",
     )
     assert list(tables(study({"full": (8, 8)}))) == ["levels"]
 

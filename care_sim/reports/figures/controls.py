@@ -1,0 +1,73 @@
+"""The figure of what every policy has over the best control, in points of recall by budget."""
+
+from textwrap import wrap
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from care_sim.base.errors import percent
+from care_sim.evaluation.scene_contrasts import Ratio
+from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, bare_axes, styles
+from care_sim.reports.formatting import marked, tag_notes
+from care_sim.reports.protocol.controls import (
+    CONTROL_RATIOS,
+    RULE,
+    contenders,
+    named_controls,
+    over_control,
+)
+from care_sim.reports.protocol.rows import SettingPlays
+
+_NOTE_WIDTH = 110
+"""Letters of a note in one line below the panels."""
+
+
+def control_figure(plays: SettingPlays) -> Figure:
+    """First-sighting and overall recall of every contender less the best control's, with bars over
+    the intervals.
+    """
+    figure = Figure(figsize=(8.4, 4.0), layout="constrained")
+    panels = figure.subplots(1, len(CONTROL_RATIOS))
+    for axes, ratio in zip(panels, CONTROL_RATIOS, strict=True):
+        axes.axhline(0.0, color="0.35", linewidth=1.2, linestyle="--", label=BEST_CONTROL)
+        _draw_differences(axes, plays, ratio)
+        axes.set_xscale("log")
+        axes.set_xticks(plays.budgets, [percent(budget) for budget in plays.budgets])
+        axes.minorticks_off()
+        axes.set_title(ratio.name, loc="left", fontsize=10)
+        bare_axes(axes, "0.93")
+    panels[0].set_ylabel(f"points over the {BEST_CONTROL}")
+    figure.suptitle(
+        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
+    )
+    notes = [
+        "budget (share of cells fired); bars: 95% intervals",
+        *wrap(f"{named_controls(plays)} {RULE}", _NOTE_WIDTH),
+        *tag_notes(plays.tags[policy] for policy in contenders(plays)),
+    ]
+    figure.supxlabel("\n".join(notes), fontsize=9)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
+    )
+    return figure
+
+
+def _draw_differences(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
+    drawn = styles((policy, plays.tags[policy]) for policy in plays.policies)
+    for number, policy in enumerate(contenders(plays)):
+        look = drawn[policy]
+        shift = OPEN_LOOP_DODGE.factor(number, len(contenders(plays)))
+        known = {
+            budget * shift: difference
+            for budget in plays.budgets
+            if (difference := over_control(plays, ratio, policy, budget))
+        }
+        means = [difference.mean for difference in known.values()]
+        axes.plot(
+            list(known), means, look.line, marker=look.marker, color=look.colour, linewidth=1.4,
+            markersize=6, label=marked(policy, plays.tags[policy]),
+        )  # fmt: skip
+        for place, difference in known.items():
+            if difference.interval:
+                axes.plot([place] * 2, difference.interval[1:], color=look.colour, linewidth=1.2)

@@ -1,0 +1,87 @@
+"""The chart of what every policy has over the best control, in points of recall by budget."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import altair as alt
+
+from care_sim.base.errors import counted, percent
+from care_sim.evaluation.scene_contrasts import Ratio
+from care_sim.reports.controls import BEST_CONTROL
+from care_sim.reports.figures.styles import OPEN_LOOP_DODGE
+from care_sim.reports.formatting import interval, marked, tag_notes
+from care_sim.reports.page.chart import (
+    PANEL_WIDTH,
+    Chart,
+    Encoding,
+    budget_axis,
+    faceted,
+    specification,
+)
+from care_sim.reports.protocol.controls import (
+    CONTROL_RATIOS,
+    RULE,
+    contenders,
+    control_at,
+    named_controls,
+    over_control,
+)
+from care_sim.reports.protocol.rows import SettingPlays
+
+
+def control_chart(plays: SettingPlays) -> Chart:
+    """First-sighting and overall recall of every contender less the best control's."""
+    tags = {policy: plays.tags[policy] for policy in contenders(plays)}
+    encoding = Encoding.of(tags.items(), full=False)
+    values = [value for ratio in CONTROL_RATIOS for value in _points(plays, ratio)]
+    chart = faceted(
+        _panel(encoding, plays.budgets), values, [ratio.name for ratio in CONTROL_RATIOS]
+    ).resolve_scale(y="independent")
+    return Chart(
+        f"{plays.setting.label}: {counted(len(plays.scenes), 'scene')}: "
+        f"each policy over the {BEST_CONTROL}",
+        f"Points of recall over the {BEST_CONTROL} by budget, a curve a policy.",
+        (f"{named_controls(plays)} {RULE} Bars: 95% intervals.", *tag_notes(tags.values())),
+        specification(chart.add_params(encoding.chosen)),
+    )
+
+
+def _panel(encoding: Encoding, budgets: Sequence[float]) -> Any:
+    """One panel: the control as a rule at zero, the policies as curves with their intervals."""
+    height = alt.Y("value:Q", title=f"points over the {BEST_CONTROL}")
+    base = alt.Chart().encode(
+        x=budget_axis(budgets), color=encoding.colour, opacity=encoding.opacity
+    )
+    about = ["policy:N", "budget:N", "control:N", alt.Tooltip("text:N", title="points")]
+    return alt.layer(
+        alt.Chart().mark_rule(color="#555555", strokeDash=[5, 3]).encode(y=alt.datum(0)),
+        base.mark_rule(strokeWidth=1.5).encode(y="low:Q", y2="high:Q"),
+        base.mark_line(strokeWidth=1.8).encode(y=height, strokeDash=encoding.dash),
+        base.mark_point(filled=True, size=50).encode(y=height, shape=encoding.shape, tooltip=about),
+    ).properties(width=PANEL_WIDTH + 140, height=260)
+
+
+def _points(plays: SettingPlays, ratio: Ratio) -> list[dict[str, Any]]:
+    """What every contender has over the control at every budget, moved apart."""
+    rivals = contenders(plays)
+    values = []
+    for number, policy in enumerate(rivals):
+        for budget in plays.budgets:
+            difference = over_control(plays, ratio, policy, budget)
+            if difference is None:
+                continue
+            ends = difference.interval
+            values.append(
+                {
+                    "panel": ratio.name,
+                    "policy": marked(policy, plays.tags[policy]),
+                    "budget": percent(budget),
+                    "control": control_at(plays, budget),
+                    "place": budget * OPEN_LOOP_DODGE.factor(number, len(rivals)),
+                    "value": difference.mean,
+                    "low": ends.low if ends else None,
+                    "high": ends.high if ends else None,
+                    "text": interval(difference),
+                }
+            )
+    return values
