@@ -32,8 +32,9 @@ RING_M = 45.0
 0.5 s, and on 12 generated streets 90% of those that come over the ring close no faster. Most that
 are first shown nearer than this were within R at the keyframe before, too, and hidden.
 """
+ENTRY = "entry"
 ENTRIES = EMERGENCE, RING, BEYOND, AT_START = ("emergence", "ring", "beyond", "at start")
-"""How an object came within range; see above."""
+"""The kind of strata by how an object came within range, and its strata; see above."""
 SCENE_THIRDS = ("sparse", "middle", "dense")
 
 
@@ -58,7 +59,7 @@ def strata(sightings: Sightings) -> dict[str, dict[str, Mask]]:
         },
         "azimuth": {"front": front, "side": ~front & ~rear, "rear": rear},
         "class": {name: frames.classes == index for index, name in enumerate(CLASSES)},
-        "entry": _entries(sightings),
+        ENTRY: _entries(sightings),
     }
 
 

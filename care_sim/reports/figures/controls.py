@@ -13,9 +13,9 @@ from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.controls import (
     CONTROL_RATIOS,
     RULE,
-    contenders,
     named_controls,
     over_control,
+    rivals,
 )
 from care_sim.reports.protocol.rows import SettingPlays
 
@@ -24,8 +24,8 @@ _NOTE_WIDTH = 110
 
 
 def control_figure(plays: SettingPlays) -> Figure:
-    """First-sighting and overall recall of every contender less the best control's, with bars over
-    the intervals.
+    """First-sighting and overall recall of every other policy less the best control's, in points,
+    with bars over the intervals.
     """
     figure = Figure(figsize=(8.4, 4.0), layout="constrained")
     panels = figure.subplots(1, len(CONTROL_RATIOS))
@@ -44,7 +44,7 @@ def control_figure(plays: SettingPlays) -> Figure:
     notes = [
         "budget (share of cells fired); bars: 95% intervals",
         *wrap(f"{named_controls(plays)} {RULE}", _NOTE_WIDTH),
-        *tag_notes(plays.tags[policy] for policy in contenders(plays)),
+        *tag_notes(plays.tags[policy] for policy in rivals(plays)),
     ]
     figure.supxlabel("\n".join(notes), fontsize=9)
     figure.legend(
@@ -54,20 +54,19 @@ def control_figure(plays: SettingPlays) -> Figure:
 
 
 def _draw_differences(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
-    drawn = styles((policy, plays.tags[policy]) for policy in plays.policies)
-    for number, policy in enumerate(contenders(plays)):
+    # The styles of all policies, so that each looks as it does in the other figures.
+    drawn = styles(plays.tags.items())
+    for number, policy in enumerate(rivals(plays)):
         look = drawn[policy]
-        shift = OPEN_LOOP_DODGE.factor(number, len(contenders(plays)))
+        shift = OPEN_LOOP_DODGE.factor(number, len(rivals(plays)))
         known = {
             budget * shift: difference
             for budget in plays.budgets
             if (difference := over_control(plays, ratio, policy, budget))
         }
         means = [difference.mean for difference in known.values()]
-        axes.plot(
-            list(known), means, look.line, marker=look.marker, color=look.colour, linewidth=1.4,
-            markersize=6, label=marked(policy, plays.tags[policy]),
-        )  # fmt: skip
+        (line,) = axes.plot(list(known), means, look.line, color=look.colour, linewidth=1.4)
+        line.set(marker=look.marker, markersize=6, label=marked(policy, plays.tags[policy]))
         for place, difference in known.items():
             if difference.interval:
                 axes.plot([place] * 2, difference.interval[1:], color=look.colour, linewidth=1.2)

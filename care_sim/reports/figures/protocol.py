@@ -12,7 +12,7 @@ from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.controls import control_figure
 from care_sim.reports.figures.styles import FULL_STYLE, OPEN_LOOP_DODGE, Style, bare_axes, styles
 from care_sim.reports.formatting import MARKS, marked, tag_notes
-from care_sim.reports.protocol.controls import contenders
+from care_sim.reports.protocol.controls import rivals
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.rows.settings import SOURCES
@@ -38,7 +38,7 @@ def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         # A single budget makes no curve.
         if len(plays.budgets) > 1:
             figures[f"levels-{plays.setting.slug}"] = levels_figure(plays)
-        if contenders(plays):
+        if rivals(plays):
             figures[f"controls-{plays.setting.slug}"] = control_figure(plays)
     return figures
 

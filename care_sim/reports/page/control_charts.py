@@ -8,7 +8,7 @@ import altair as alt
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import Ratio
 from care_sim.reports.controls import BEST_CONTROL
-from care_sim.reports.figures.styles import OPEN_LOOP_DODGE
+from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, styles
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.page.chart import (
     PANEL_WIDTH,
@@ -21,18 +21,20 @@ from care_sim.reports.page.chart import (
 from care_sim.reports.protocol.controls import (
     CONTROL_RATIOS,
     RULE,
-    contenders,
     control_at,
     named_controls,
     over_control,
+    rivals,
 )
 from care_sim.reports.protocol.rows import SettingPlays
 
 
 def control_chart(plays: SettingPlays) -> Chart:
-    """First-sighting and overall recall of every contender less the best control's."""
-    tags = {policy: plays.tags[policy] for policy in contenders(plays)}
-    encoding = Encoding.of(tags.items(), full=False)
+    """First-sighting and overall recall of every other policy less the best control's."""
+    tags = {policy: plays.tags[policy] for policy in rivals(plays)}
+    # The styles of all policies, so that each looks as it does in the other charts.
+    drawn = styles(plays.tags.items())
+    encoding = Encoding.of_styles({marked(policy, tags[policy]): drawn[policy] for policy in tags})
     values = [value for ratio in CONTROL_RATIOS for value in _points(plays, ratio)]
     chart = faceted(
         _panel(encoding, plays.budgets), values, [ratio.name for ratio in CONTROL_RATIOS]
@@ -62,10 +64,9 @@ def _panel(encoding: Encoding, budgets: Sequence[float]) -> Any:
 
 
 def _points(plays: SettingPlays, ratio: Ratio) -> list[dict[str, Any]]:
-    """What every contender has over the control at every budget, moved apart."""
-    rivals = contenders(plays)
+    """What every other policy has over the control at every budget, moved apart."""
     values = []
-    for number, policy in enumerate(rivals):
+    for number, policy in enumerate(rivals(plays)):
         for budget in plays.budgets:
             difference = over_control(plays, ratio, policy, budget)
             if difference is None:
@@ -77,7 +78,7 @@ def _points(plays: SettingPlays, ratio: Ratio) -> list[dict[str, Any]]:
                     "policy": marked(policy, plays.tags[policy]),
                     "budget": percent(budget),
                     "control": control_at(plays, budget),
-                    "place": budget * OPEN_LOOP_DODGE.factor(number, len(rivals)),
+                    "place": budget * OPEN_LOOP_DODGE.factor(number, len(rivals(plays))),
                     "value": difference.mean,
                     "low": ends.low if ends else None,
                     "high": ends.high if ends else None,

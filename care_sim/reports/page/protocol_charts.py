@@ -22,7 +22,8 @@ from care_sim.reports.page.chart import (
     specification,
 )
 from care_sim.reports.page.control_charts import control_chart
-from care_sim.reports.protocol.controls import contenders
+from care_sim.reports.protocol.controls import rivals
+from care_sim.reports.protocol.formatting import share_with_ends
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.run_config import FULL, Row
@@ -41,7 +42,7 @@ def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
             charts.append(_pareto(plays))
         if len(plays.budgets) > 1:
             charts.append(_levels(plays))
-        if contenders(plays):
+        if rivals(plays):
             charts.append(control_chart(plays))
     return charts
 
@@ -177,6 +178,7 @@ def _levels_panel(encoding: Encoding, budgets: Sequence[float]) -> Any:
         "policy:N",
         "budget:N",
         alt.Tooltip("value:Q", format=".1f", title="recall (%)"),
+        alt.Tooltip("of_full:N", title="in % of the full scan's"),
         "by:N",
     ]
     # The full scan has no place on the axis of budgets and is drawn as a rule across it.
@@ -199,10 +201,19 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
     for number, (policy, tags) in enumerate(plays.tags.items()):
         shift = OPEN_LOOP_DODGE.factor(number, len(plays.tags))
         for budget in plays.budgets:
-            about = {"policy": marked(policy, tags), "budget": percent(budget), "panel": ratio.name}
+            about = {
+                "policy": marked(policy, tags),
+                "budget": percent(budget),
+                "panel": ratio.name,
+                "of_full": "",
+            }
             here = plays.level(ratio, policy, budget).by_event
             if here is not None:
-                values.append(about | {"place": budget * shift, "value": here, "by": "here"})
+                of_full = share_with_ends(plays.share_of_full(ratio, policy, budget))
+                values.append(
+                    about
+                    | {"place": budget * shift, "value": here, "by": "here", "of_full": of_full}
+                )
             # The paper's stand at their own budgets, and belong to its plain setting alone.
             said = None if plays.setting.conditions else published_level(ratio, policy, budget)
             if said is not None:
@@ -215,6 +226,7 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
         "place": None,
         "value": ceiling,
         "by": "here",
+        "of_full": "100",
     }
     return [*values, *([full] if ceiling is not None else [])]
 

@@ -27,7 +27,7 @@ def controls(plays: SettingPlays) -> list[str]:
     return [policy for policy in plays.policies if is_control(plays.tags[policy])]
 
 
-def contenders(plays: SettingPlays) -> list[str]:
+def rivals(plays: SettingPlays) -> list[str]:
     """The other policies; none where no control was played."""
     found = controls(plays)
     return [policy for policy in plays.policies if policy not in found] if found else []
@@ -56,15 +56,15 @@ def over_control(
 
 
 def control_tables(plays: SettingPlays) -> list[Table]:
-    """First-sighting and overall recall of every contender less the best control's; none without a
-    control or a contender.
+    """First-sighting and overall recall of every other policy less the best control's; none without
+    a control or another policy.
     """
-    if not contenders(plays):
+    if not rivals(plays):
         return []
     measured = {
         ratio: {
             policy: [over_control(plays, ratio, policy, budget) for budget in plays.budgets]
-            for policy in contenders(plays)
+            for policy in rivals(plays)
         }
         for ratio in CONTROL_RATIOS
     }

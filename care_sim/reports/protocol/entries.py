@@ -7,15 +7,14 @@ from collections.abc import Iterator
 from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.evaluation.strata import AT_START, BEYOND, EMERGENCE, RING, RING_M
+from care_sim.evaluation.strata import AT_START, BEYOND, EMERGENCE, ENTRY, RING, RING_M
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.protocol.formatting import share, share_ends, written
+from care_sim.reports.protocol.formatting import share_with_ends, written
 from care_sim.reports.protocol.notes import left_out, of_full
 from care_sim.reports.protocol.rows import SettingPlays
 from care_sim.reports.table import Table
 from care_sim.study.run_config import FULL
 
-ENTRY = "entry"
 _TOLD = {
     EMERGENCE: f"first shown nearer than {RING_M:.0f} m: out from behind a body",
     RING: f"first shown from {RING_M:.0f} to {RANGE_M:.0f} m: over the ring",
@@ -65,7 +64,7 @@ def _lines(plays: SettingPlays, entry: str) -> Iterator[tuple[str, ...]]:
 def _level(plays: SettingPlays, policy: str, budget: float, within: str) -> str:
     plain = written(FIRST_SIGHTING, _plain(plays, policy, budget, within))
     found = plays.share_of_full(FIRST_SIGHTING, policy, budget, within)
-    return f"{plain} ({f'{share(found)} {share_ends(found)}'.rstrip()})" if found else plain
+    return f"{plain} ({share_with_ends(found)})" if found else plain
 
 
 def _plain(plays: SettingPlays, policy: str, budget: float, within: str) -> float | None:

@@ -53,6 +53,11 @@ def share_ends(found: SceneShare | None) -> str:
     return bounds(found.interval, 0)
 
 
+def share_with_ends(found: SceneShare | None) -> str:
+    """A share with its interval if it has one."""
+    return f"{share(found)} {share_ends(found)}".strip()
+
+
 def claims_of_paper(claims: Claims | None, budgets: Sequence[float]) -> tuple[str, ...]:
     """What the paper says at each of these budgets; nothing at all where it speaks of none."""
     if claims is None or not claims.any_at(budgets):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.evaluation.strata import SCENE_THIRDS
+from care_sim.evaluation.strata import ENTRY, SCENE_THIRDS
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import (
     DENSE_LESS_SPARSE,
@@ -16,7 +16,7 @@ from care_sim.reports.protocol.differences import (
     PolicyPair,
     SceneThird,
 )
-from care_sim.reports.protocol.entries import ENTRY, ENTRY_NOTE
+from care_sim.reports.protocol.entries import ENTRY_NOTE
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded, written
 from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, papers
 from care_sim.reports.protocol.paper import (

@@ -19,7 +19,7 @@ from care_sim.study.designs import ablations, faults
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.rows.parquet import write_rows
-from care_sim.study.rows.reading import with_added_columns, with_tags
+from care_sim.study.rows.reading import with_added_columns
 from tests.helpers import made_plays
 from tests.helpers.made_rows import CROWD, STUDY, row, rows
 from tests.helpers.places import ROOT
@@ -302,13 +302,13 @@ def test_everything_is_open_in_print(opened, played):
 
 FAULTY = [row(config, 9.0) for config in faults.fault_study([0]) if config.scenario == "dartout"]
 ABLATED = [row(config, 9.0) for config in ablations.ablation_study([0])[:12]]
-PLAYED = with_tags(made_plays.study({"history": (4, 2), "care": (8, 4), "full": (9, 5)}))
+PLAYED = made_plays.study({"history": (4, 2), "care": (8, 4), "rows": (5, 3), "full": (9, 5)})
 STUDIES = {
     "paper": (STUDY + rows("care", [9.0, None], budget=0.1), "Collisions: 0 in 22 episodes", 1),
     "crowding": (CROWD, "standing vehicles", 1),
     "faults": (FAULTY, "Where the order of policies changes", 6),
     "ablate": (ABLATED, "Collisions: 0 in 12 episodes", 0),
-    "protocol": (PLAYED, "There are none to watch", 2),
+    "protocol": (PLAYED, "There are none to watch", 3),
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 from care_sim.reports.controls import best_control, is_control
 from care_sim.reports.figures.protocol import protocol_figures
 from care_sim.reports.page.protocol_charts import protocol_charts
-from care_sim.reports.protocol.controls import RULE, contenders, control_at, controls
+from care_sim.reports.protocol.controls import RULE, control_at, controls, rivals
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.table import Bold
@@ -53,7 +53,7 @@ def test_the_best_control_has_the_highest_level_and_of_equal_ones_is_the_first()
 
 def test_it_is_chosen_by_first_sightings_at_every_budget_whatever_its_overall_recall():
     assert controls(plays()) == ["rows", "place"]
-    assert contenders(plays()) == ["care", "seed-finder"]
+    assert rivals(plays()) == ["care", "seed-finder"]
     assert [control_at(plays(), budget) for budget in (0.1, 0.2, 0.35)] == ["place", "rows", None]
 
 
@@ -76,7 +76,7 @@ def test_every_policy_is_held_against_the_control_of_its_own_budget():
     assert list(tables()).index(NAME) < list(tables()).index("levels")
 
 
-def test_without_a_control_or_a_contender_there_is_no_table():
+def test_without_a_control_or_another_policy_there_is_no_table():
     assert NAME not in tables(study({"care": (6, 5), "seed-finder": (9, 9), "full": (8, 8)}))
     assert NAME not in tables(study({"rows": (4, 8), "place": (5, 3), "full": (8, 8)}))
     untagged = [row | {"tags": None} for row in ROWS]
