@@ -14,8 +14,8 @@ from care_sim.reports.table import Table
 CONTROL_RATIOS = (FIRST_SIGHTING, OVERALL)
 """The measures in which policies are held against the control."""
 RULE = (
-    f"The {BEST_CONTROL} is that with the highest first-sighting recall at the budget. "
-    f"{IN_HINDSIGHT}"
+    f"The {BEST_CONTROL} is that with the highest first-sighting recall at the budget, in overall "
+    f"recall too, where another control may have more. {IN_HINDSIGHT}"
 )
 
 _Measured = Mapping[Ratio, Mapping[str, Sequence[MeasuredDifference | None]]]
