@@ -12,6 +12,7 @@ from care_sim.reports.figures.files import check_figure, save
 from care_sim.training.config import PpoConfig, RecurrentPpoConfig, SacConfig
 from care_sim.training.curves import grouped_runs, read_run
 from care_sim.training.curves_figure import curves_figure
+from care_sim.training.place_map import TrainPlace
 from care_sim.training.run import train_agent
 from care_sim.training.scorer import TrainScorer
 
@@ -72,6 +73,7 @@ LEARNERS: dict[str, Callable[..., Any]] = {
     "sac": TrainSac,
     "recurrent-ppo": TrainRecurrentPpo,
     "learned-scorer": TrainScorer,
+    "place": TrainPlace,
     "curves": DrawCurves,
 }
 """Commands of `care-sim train`, by name."""

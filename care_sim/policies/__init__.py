@@ -9,6 +9,12 @@ import gymnasium
 from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
 from care_sim.policies.base import Policy
+from care_sim.policies.controls.fan import Fan
+from care_sim.policies.controls.history_rows import HistoryRows
+from care_sim.policies.controls.place import HistoryPlace, Place
+from care_sim.policies.controls.rows import Rows
+from care_sim.policies.controls.stride import Stride
+from care_sim.policies.controls.sweep import Sweep
 from care_sim.policies.learned.learned_scorer import LearnedScorer
 from care_sim.policies.learned.ppo import PpoDartoutPolicy, PpoPolicy
 from care_sim.policies.makers import (
@@ -17,6 +23,8 @@ from care_sim.policies.makers import (
     is_privileged,
     policy_faults,
 )
+from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.care_spread import CareSpread
 from care_sim.policies.paper.all_camera import AllCamera
 from care_sim.policies.paper.beam_reduce import BeamReduce
 from care_sim.policies.paper.care import Care
@@ -60,6 +68,15 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         LearnedScorer,
         PpoPolicy,
         PpoDartoutPolicy,
+        CareSpread,
+        CareSightlines,
+        Rows,
+        Fan,
+        Stride,
+        Sweep,
+        Place,
+        HistoryRows,
+        HistoryPlace,
     )
 }
 # Loaded when it is asked for, as those of installed packages are: it plays scenarios by itself, and

@@ -1,0 +1,35 @@
+"""A control: a fan straight ahead, without camera, tracks or memory."""
+
+import numpy as np
+
+from care_sim.core.belief import Belief
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy
+
+LOWEST_DEG = -10.7
+"""The fan reaches from the horizon down to where the road is 10 m away."""
+
+
+class Fan(Policy):
+    """Fires what lies ahead, between the horizon and `LOWEST_DEG`, the columns nearest to straight
+    ahead first: at 3% of the paper's grid 20 degrees to either side.
+    """
+
+    name = "fan"
+    tags = ("causal", "control")
+    source = "own: a pattern that never changes"
+
+    def __init__(self, rig: Rig):
+        super().__init__(rig)
+        grid = rig.grid
+        elevations = np.linspace(grid.top, grid.bottom, grid.rows)
+        below = np.flatnonzero(
+            (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
+        )
+        ahead = np.argsort(np.abs(np.arange(grid.columns) + 0.5 - grid.columns / 2), kind="stable")
+        self._pattern = (below * grid.columns + ahead[:, None]).ravel()
+
+    def demand(self, belief: Belief) -> Demand:
+        """The same cells at every keyframe."""
+        return Demand(layers=[[self._pattern]])

@@ -1,0 +1,57 @@
+"""A control: where first sightings were in other streets, without camera, tracks or memory."""
+
+from os import PathLike
+
+import numpy as np
+
+from care_sim.core.belief import Belief
+from care_sim.core.grid import Cells
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy
+from care_sim.policies.learned.weights import load_weights, shipped_weights
+
+
+class Place(Policy):
+    """Fires the cells in which most first sightings were detected in the calibration's streets. It
+    knows a place and sees nothing: what a policy with a camera must beat.
+
+    `path` is a map that `care-sim train place` wrote; the shipped one, unless given. Raises
+    InvalidInput for a file of something else or made for another grid.
+    """
+
+    name = "place"
+    tags = ("causal", "learned", "control")
+    source = "own: a map that never changes"
+
+    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
+        super().__init__(rig)
+        self._pattern = likeliest_cells(rig, path)
+
+    def demand(self, belief: Belief) -> Demand:
+        """The same cells at every keyframe."""
+        return Demand(layers=[[self._pattern]])
+
+
+class HistoryPlace(Policy):
+    """The hulls of the history policy; the reserve goes to the map of `place`."""
+
+    name = "history-place"
+    tags = ("causal", "learned", "control")
+    source = "own: history, and a map that never changes"
+
+    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
+        super().__init__(rig)
+        self._pattern = likeliest_cells(rig, path)
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then the map."""
+        return Demand(self.rig.hulls(belief.tracks.boxes), [[self._pattern]])
+
+
+def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:
+    """(N,) all cells, those with most first sightings first; equals by index."""
+    weights = load_weights(shipped_weights("place") if path is None else path)
+    weights.check("place", rig)
+    sightings = weights.array("sightings", *rig.grid.shape)
+    return np.argsort(-sightings.ravel(), kind="stable")

@@ -1,0 +1,43 @@
+"""A control: whole rows of the grid, without camera, tracks or memory."""
+
+import numpy as np
+
+from care_sim.core.belief import Belief
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy
+from care_sim.policies.paper.history_uniform import GOLDEN
+
+RING_ELEVATION_DEG = -1.25
+"""Where the middle of a car 1.5 m high stands, 50 m away, for a sensor 1.84 m above the road:
+atan((0.75 - 1.84) / 50). What enters the range of scoring by driving enters it there."""
+
+
+class Rows(Policy):
+    """Fires the rows nearest to the elevation at which things enter the range, nearest first; the
+    last row is thinned evenly.
+    """
+
+    name = "rows"
+    tags = ("causal", "control")
+    source = "own: a pattern that never changes"
+
+    def __init__(self, rig: Rig, elevation_deg: float = RING_ELEVATION_DEG):
+        super().__init__(rig)
+        self._pattern = nearest_rows(rig.grid, elevation_deg)
+
+    def demand(self, belief: Belief) -> Demand:
+        """The same cells at every keyframe."""
+        return Demand(layers=[[self._pattern]])
+
+
+def nearest_rows(grid: AngularGrid, elevation_deg: float = RING_ELEVATION_DEG) -> Cells:
+    """(N,) all cells, row after row, the row nearest to an elevation first; every first few cells
+    of a row lie evenly over it.
+    """
+    elevations = np.rad2deg(np.linspace(grid.top, grid.bottom, grid.rows))
+    rows = np.argsort(np.abs(elevations - elevation_deg), kind="stable")
+    columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
+    cells: Cells = (rows[:, None] * grid.columns + columns).ravel()
+    return cells

@@ -1,0 +1,25 @@
+"""A control: every so manyth cell of the grid, without camera, tracks or memory."""
+
+from care_sim.core.belief import Belief
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy
+from care_sim.policies.paper.history_uniform import uniform_pattern
+
+
+class Stride(Policy):
+    """Spends the whole budget on one even pattern over all the grid: what `history-uniform` does
+    with the reserve.
+    """
+
+    name = "stride"
+    tags = ("causal", "control")
+    source = "own: a pattern that never changes"
+
+    def __init__(self, rig: Rig):
+        super().__init__(rig)
+        self._pattern = uniform_pattern(rig.grid, rig.budget)
+
+    def demand(self, belief: Belief) -> Demand:
+        """The same cells at every keyframe."""
+        return Demand(layers=[[self._pattern]])

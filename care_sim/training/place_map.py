@@ -1,0 +1,84 @@
+"""Make the map of the control `place`: in which cells first sightings were detected in the
+calibration's streets.
+"""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from care_sim.base.files import ZIP, check_output
+from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.envs.open_loop import FilmEnv
+from care_sim.loops.film import Film
+from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.policies.paper.full import Full
+from care_sim.sources.streets.recording import street_film
+from care_sim.sources.streets.street import CALIBRATION_SEEDS
+from care_sim.study.provenance import machine_line, package_versions
+
+
+@dataclass(frozen=True)
+class TrainPlace:
+    """Make the map of `place` from the 20 calibration streets and write it."""
+
+    out: Path
+    """File to write."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        check_output(self.out, ZIP)
+        grid = AngularGrid()
+        found: list[Cells] = []
+        for number, seed in enumerate(CALIBRATION_SEEDS, 1):
+            told = f"street {number} of {len(CALIBRATION_SEEDS)}"
+            print(told, end="\r", file=sys.stderr, flush=True)
+            found += first_returns(street_film(seed))
+        save_weights(self.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))
+        print(f"{self.out}: {len(found)} first sightings")
+        return 0
+
+
+def first_returns(film: Film) -> Iterator[Cells]:
+    """The cells of every first sighting of a film that a full scan detects at once."""
+    with FilmEnv(film, budget=1.0) as env:
+        observation, _ = env.reset(seed=0)
+        full = Full(env.rig)
+        while not env.loop.over:
+            observation, *_ = env.step(full(observation))
+        score = env.score
+    for row in score.sightings.events[score.delays == 0]:
+        cloud = film.shots[score.sightings.frames.keyframes[row]].cloud
+        yield np.unique(cloud.cells[cloud.objects == score.sightings.frames.objects[row]])
+
+
+def sighting_map(found: list[Cells], grid: AngularGrid) -> NDArray[np.float32]:
+    """(E, A) first sightings per cell; those of `found` weigh 1 each, however many cells they have.
+
+    They are few beside the cells, so they are smoothed over the margins of the paper, which are its
+    guess of how far off a box can be; columns are closed to a circle.
+    """
+    sightings = np.zeros(grid.size)
+    for cells in found:
+        sightings[cells] += 1 / len(cells)
+    return gaussian_filter(
+        sightings.reshape(grid.shape),
+        (ELEVATION_MARGIN, AZIMUTH_MARGIN),
+        mode=("nearest", "wrap"),
+    ).astype(np.float32)
+
+
+def _card(grid: AngularGrid, count: int) -> Card:
+    return Card(
+        "place",
+        grid,
+        scenario="CARE-Street-v0",
+        data=f"cells of {count} first sightings that a full scan detects at once",
+        seeds={"calibration": list(CALIBRATION_SEEDS)},
+        machine=machine_line(),
+        versions=package_versions("care-sim", "numpy", "scipy"),
+    )

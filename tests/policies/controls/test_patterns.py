@@ -1,0 +1,110 @@
+"""Controls that never look: their cells by hand."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+from care_sim.policies import make_policy, tags_of
+from care_sim.policies.controls.fan import Fan
+from care_sim.policies.controls.place import Place
+from care_sim.policies.controls.rows import Rows, nearest_rows
+from care_sim.policies.controls.stride import Stride
+from care_sim.policies.controls.sweep import Sweep
+from care_sim.policies.learned.weights import Card, save_weights
+
+CONTROLS = ["rows", "fan", "stride", "sweep", "place", "history-rows", "history-place"]
+PATTERNS = [Rows, Fan, Stride, Sweep, Place]
+GRID = AngularGrid()
+
+
+def chosen(policy):
+    """The cells asked for at the first keyframe, best first."""
+    ((cells,),) = policy.demand(None).layers
+    return cells
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_a_control_is_tagged_and_no_contender(name):
+    assert "control" in tags_of(name)
+    assert name not in care_sim.policies.contenders()
+
+
+@pytest.mark.parametrize("make", PATTERNS)
+@pytest.mark.parametrize("budget", [1, 164, 492, GRID.size])
+def test_a_pattern_names_enough_cells_once(make, budget):
+    cells = chosen(make(Rig(budget=budget)))
+    assert len(np.unique(cells)) == len(cells) >= min(budget, 504)
+    assert 0 <= cells.min() <= cells.max() < GRID.size
+
+
+@pytest.mark.parametrize("name", CONTROLS[:5])
+def test_a_pattern_fires_the_same_whatever_it_is_shown(name):
+    """Two scenarios and two seeds, of which it sees nothing."""
+    fired = []
+    for scenario, seed in (("CARE-Dartout-v0", 0), ("CARE-CutIn-v0", 5)):
+        with gymnasium.make(f"care_sim:{scenario}", budget=0.03) as env:
+            policy = make_policy(name, env)
+            observation, _ = env.reset(seed=seed)
+            policy.reset()
+            fired.append([])
+            for _ in range(3):
+                action = policy(observation)
+                observation, *_ = env.step(action)
+                fired[-1].append(np.flatnonzero(action))
+    assert all(np.array_equal(a, b) for a, b in zip(*fired, strict=True))
+
+
+def test_rows_begin_where_a_car_enters_the_range():
+    """-1.25 degrees lies nearest to row 9 at -1.33, then row 8 at 0.0 and row 10 at -2.67."""
+    rows = nearest_rows(GRID)[:: GRID.columns] // GRID.columns
+    assert rows[:3].tolist() == [9, 8, 10]
+    assert sorted(rows) == [*range(GRID.rows)]
+
+
+def test_the_last_row_is_thinned_evenly():
+    cells = chosen(Rows(Rig(budget=GRID.columns + 64)))[GRID.columns : GRID.columns + 64]
+    gaps = np.diff(np.sort(cells % GRID.columns))
+    assert set(cells // GRID.columns) == {8}
+    assert gaps.min() >= 4
+    assert gaps.max() <= 13
+
+
+def test_the_fan_is_the_cone_ahead():
+    cells = chosen(Fan(Rig(budget=504)))[:504]
+    x, y, z = GRID.directions[cells].T
+    assert np.abs(np.rad2deg(np.arctan2(y, x))).max() < 20
+    elevations = np.rad2deg(np.arcsin(z))
+    assert elevations.min() > -10.7
+    assert elevations.max() < 0.1
+    everything = np.rad2deg(np.arctan2(GRID.directions[:, 1], GRID.directions[:, 0]))
+    level = np.rad2deg(np.arcsin(GRID.directions[:, 2]))
+    cone = (np.abs(everything) < 19) & (level < 0.1) & (level > -10.7)
+    assert set(np.flatnonzero(cone)) <= set(cells)
+
+
+def test_the_sweep_goes_on_where_it_stopped():
+    policy = Sweep(Rig(budget=100))
+    first, second = (policy.demand(None).layers[0][0] for _ in range(2))
+    assert (first % GRID.columns).tolist() == [n // 32 for n in range(100)]
+    assert second[0] == 3 + 4 * GRID.columns
+    policy.reset()
+    assert np.array_equal(policy.demand(None).layers[0][0], first)
+
+
+def test_place_takes_the_highest_of_its_map(tmp_path):
+    sightings = np.zeros(GRID.shape, np.float32)
+    sightings[9, 300] = 2
+    sightings[4, 7] = 3
+    save_weights(tmp_path / "map.npz", {"sightings": sightings}, Card("place", GRID))
+    cells = chosen(Place(Rig(), tmp_path / "map.npz"))
+    assert cells[:3].tolist() == [4 * 512 + 7, 9 * 512 + 300, 0]
+
+
+def test_place_refuses_weights_of_another_kind(tmp_path):
+    save_weights(tmp_path / "other.npz", {}, Card("learned-scorer", GRID))
+    with pytest.raises(InvalidInput, match="kind is 'learned-scorer', needed is 'place'"):
+        Place(Rig(), tmp_path / "other.npz")
