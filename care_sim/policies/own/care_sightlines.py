@@ -1,6 +1,8 @@
 """CARE in rounds, with a watch on open lines of sight for what the camera has not told yet."""
 
+from care_sim.base.checks import check_flag, check_known, check_whole
 from care_sim.core.belief import Belief
+from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
@@ -45,6 +47,11 @@ class CareSightlines(Policy):
         camera: bool = True,
     ):
         super().__init__(rig)
+        check_whole("min_returns", min_returns, 1)
+        check_known("cell_order", cell_order, CELL_ORDERS)
+        switches = {"sight_lines": sight_lines, "explained": explained, "rows": rows}
+        for name, value in (switches | {"camera": camera}).items():
+            check_flag(name, value)
         self._order = cell_order
         self._few = HULL_CELLS_PER_RETURN * min_returns
         self._more = WEDGE_CELLS_PER_RETURN * min_returns

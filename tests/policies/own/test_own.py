@@ -1,0 +1,198 @@
+"""Policies of our own: rounds, cores, lines of sight, on beliefs with known answers."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import MAX_DETECTIONS, Belief
+from care_sim.core.grid import AngularGrid
+from care_sim.core.residual import camera_layers
+from care_sim.core.rig import Rig
+from care_sim.core.types import Ego, ImageDetections
+from care_sim.policies.controls.rows import nearest_rows
+from care_sim.policies.own.care_sightlines import CareSightlines
+from care_sim.policies.own.care_spread import CareSpread
+from care_sim.policies.own.sight_lines import EDGE_COLUMNS, SightLines
+
+GRID = AngularGrid()
+COLUMNS = GRID.columns
+ROW = 9
+
+
+def scan_of(row_ranges):
+    """The last scan (E, A), in which nothing but row 9 was fired."""
+    ranges = np.zeros(GRID.shape, np.float32)
+    ranges[ROW] = row_ranges
+    return ranges
+
+
+def blind(observation):
+    """The same observation without a camera detection."""
+    padding = np.zeros((MAX_DETECTIONS, len(ImageDetections.COLUMNS)), np.float32)
+    padding[:, 0] = -1
+    return {**observation, "detections": padding}
+
+
+@pytest.fixture
+def lines():
+    return SightLines(Rig(keyframe_s=0.5), ROW)
+
+
+def columns_of(lines):
+    return (lines.cells() - ROW * COLUMNS).tolist()
+
+
+def test_lines_that_were_never_fired_are_open(lines):
+    assert columns_of(lines) == [*range(COLUMNS)]
+
+
+def test_open_lines_and_the_edges_of_what_hides_are_watched(lines, belief_of):
+    """A wall at 10 m in columns 100 to 199, nothing elsewhere: its inside is not watched."""
+    ranges = np.full(COLUMNS, GRID.range_m)
+    ranges[100:200] = 10
+    lines.update(belief_of(ranges=scan_of(ranges)))
+    hidden = range(100 + EDGE_COLUMNS, 200 - EDGE_COLUMNS)
+    assert columns_of(lines) == [n for n in range(COLUMNS) if n not in hidden]
+
+
+def test_a_wall_all_round_has_no_edge_over_the_seam(lines, belief_of):
+    lines.update(belief_of(ranges=scan_of(10)))
+    assert columns_of(lines) == []
+    ranges = np.full(COLUMNS, 10.0)
+    ranges[0] = 20
+    lines.update(belief_of(ranges=scan_of(ranges)))
+    near = [n % COLUMNS for n in range(-EDGE_COLUMNS, EDGE_COLUMNS + 1)]
+    assert columns_of(lines) == sorted(near)
+
+
+def test_what_was_not_fired_is_remembered_and_turns_with_the_car(lines, belief_of):
+    """0.5 s at 1 rad/s are 40.7 columns. The car turns to the left, so things go to the right."""
+    ranges = np.full(COLUMNS, 10.0)
+    ranges[300] = 40
+    lines.update(belief_of(ranges=scan_of(ranges)))
+    lines.update(belief_of(ego=Ego(yaw_rate=1.0)))
+    assert 300 - 41 in columns_of(lines)
+    assert 300 not in columns_of(lines)
+    # What is left of whole columns adds up: twice 40.74 are 81.5, three times 122.2.
+    lines.update(belief_of(ego=Ego(yaw_rate=1.0)))
+    lines.update(belief_of(ego=Ego(yaw_rate=1.0)))
+    assert 300 - 122 in columns_of(lines)
+
+
+def test_every_hull_begins_with_its_core(belief_of, car):
+    rig = Rig()
+    belief = belief_of([car(1, 20, 3), car(2, 12, -9), car(3, -30, 2)])
+    demand = CareSpread(rig).demand(belief)
+    for first, bare, whole in zip(
+        demand.layers[1],
+        rig.grid.hulls(belief.tracks.boxes, 0, 0),
+        rig.hulls(belief.tracks.boxes),
+        strict=True,
+    ):
+        count = min(len(first), len(bare))
+        assert set(first[:count]) <= set(bare)
+        assert set(first) <= set(whole)
+        assert len(first) == min(6, len(whole))
+
+
+@pytest.mark.parametrize("make", [CareSpread, CareSightlines])
+@pytest.mark.parametrize("returns", [1, 3, 5])
+def test_rounds_are_multiples_of_what_a_detection_needs(make, returns, belief_of, car):
+    demand = make(Rig(), min_returns=returns).demand(belief_of([car(1, 5, 0), car(2, 9, 5)]))
+    assert [len(cells) for cells in demand.layers[1]] == [2 * returns] * 2
+
+
+def test_no_cell_of_a_set_is_asked_for_twice_in_a_round(environment, encounter):
+    for name in ("care-spread", "care-sightlines"):
+        policy = care_sim.make_policy(name, environment)
+        for observation in encounter:
+            policy(observation)
+            for layer in policy.demanded.layers:
+                for cells in layer:
+                    assert len(np.unique(cells)) == len(cells)
+
+
+def test_an_unexplained_wedge_is_served_before_any_hull(environment, encounter):
+    policy = care_sim.make_policy("care-spread", environment)
+    served = 0
+    for observation in encounter:
+        belief = Belief.from_observation(observation)
+        unexplained, _ = camera_layers(belief, policy.rig)
+        policy(observation)
+        assert [len(cells) for cells in policy.demanded.layers[0]] == [
+            min(9, len(cells)) for cells in unexplained
+        ]
+        served += len(unexplained)
+    assert served
+
+
+def test_without_camera_detections_it_plays_as_without_a_camera(environment, encounter):
+    seeing, unseeing = (
+        care_sim.make_policy("care-sightlines", environment, camera=camera)
+        for camera in (True, False)
+    )
+    differing = 0
+    for observation in encounter:
+        differing += not np.array_equal(seeing(observation), unseeing(observation))
+    assert differing
+    for policy in (seeing, unseeing):
+        policy.reset()
+    for observation in encounter:
+        assert np.array_equal(seeing(blind(observation)), unseeing(observation))
+
+
+@pytest.mark.parametrize(
+    ("idea", "layer"), [("sight_lines", 3), ("explained", 2), ("rows", 5), ("rows", 7)]
+)
+def test_an_idea_can_be_switched_off(idea, layer, environment, encounter):
+    policies = [
+        care_sim.make_policy("care-sightlines", environment, **{idea: on}) for on in (True, False)
+    ]
+    asked = [0, 0]
+    for observation in encounter:
+        for number, policy in enumerate(policies):
+            policy(observation)
+            asked[number] += sum(map(len, policy.demanded.layers[layer]))
+    assert asked[0] > 0
+    assert asked[1] == 0
+
+
+def test_the_budget_is_spent_without_the_floor(environment, encounter):
+    policy = care_sim.make_policy("care-sightlines", environment)
+    for observation in encounter:
+        assert np.count_nonzero(policy(observation)) == policy.rig.budget
+
+
+def test_the_last_layer_is_the_pattern_rows(environment, encounter):
+    policy = care_sim.make_policy("care-sightlines", environment)
+    policy(encounter[0])
+    ((cells,),) = policy.demanded.layers[-1:]
+    assert np.array_equal(cells, nearest_rows(policy.rig.grid))
+
+
+@pytest.mark.parametrize("name", ["care-spread", "care-sightlines"])
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"cell_order": "upwards"}, "unknown cell_order 'upwards'; known: as-demanded"),
+        ({"min_returns": 0}, "min_returns must be a whole number"),
+        ({"min_returns": 2.5}, "min_returns must be a whole number"),
+    ],
+)
+def test_bad_parameters_are_named(name, parameters, message):
+    with (
+        gymnasium.make("CARE-Dense-v0") as env,
+        pytest.raises(InvalidInput, match=message),
+    ):
+        care_sim.make_policy(name, env, **parameters)
+
+
+@pytest.mark.parametrize("idea", ["sight_lines", "explained", "rows", "camera"])
+def test_a_switch_is_true_or_false(idea):
+    with (
+        gymnasium.make("CARE-Dense-v0") as env,
+        pytest.raises(InvalidInput, match=f"{idea} must be True or False"),
+    ):
+        care_sim.make_policy("care-sightlines", env, **{idea: 0.5})
