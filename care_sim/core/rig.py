@@ -1,5 +1,6 @@
 """What is fixed about the sensing task: grid, cameras, budget, margins."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, islice
@@ -97,8 +98,18 @@ class Rig:
         if self.cell_order == AS_DEMANDED:
             return demand
         stages = stages_of(demand)
-        margins = SetMargins(self.azimuth_margin, self.elevation_margin)
-        sets = [*chain(*stages)]
-        listed = iter(reordered(sets, self.cell_order, self.grid.spacing, margins))
+        listed = iter(self.listed([*chain(*stages)]))
         exploitation, *layers = ([*islice(listed, len(stage))] for stage in stages)
         return Demand(exploitation, layers)
+
+    def listed(self, sets: Sequence[Cells], usual: str = AS_DEMANDED) -> list[Cells]:
+        """The sets, the cells of each listed in the rig's `cell_order`; in the `usual` one where
+        the rig's is `as-demanded`.
+
+        Raises InvalidInput for another order, and for a cell that the grid does not have.
+        """
+        order = usual if self.cell_order == AS_DEMANDED else self.cell_order
+        if order == AS_DEMANDED:
+            return [*sets]
+        margins = SetMargins(self.azimuth_margin, self.elevation_margin)
+        return reordered(sets, order, self.grid.spacing, margins)

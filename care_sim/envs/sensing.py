@@ -85,6 +85,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self._running
 
     @property
+    def min_returns(self) -> int:
+        """How many fired rays must hit an object for it to be detected."""
+        return self.conditions.min_returns
+
+    @property
     def truth(self) -> Truth:
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
         return EpisodeTruth(lambda: self.loop)

@@ -28,14 +28,17 @@ class Policy(ABC):
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
     parameters to the attributes of the environment that `make_policy` fills them from, unless they
-    are given. `demanded` is what `demand` last answered a call with, in the rig's order of cells,
-    for those who watch.
+    are given. `keeps_order` says that the rig's `cell_order` leaves the demand as it is, because the
+    order of its cells is the idea, or because the policy has asked `Rig.listed` for its hulls and
+    wedges itself. `demanded` is what `demand` last answered a call with, in the order in which it
+    was served, for those who watch.
     """
 
     name: ClassVar[str] = ""
     tags: ClassVar[tuple[str, ...]] = ("causal",)
     source: ClassVar[str] = ""
     told: ClassVar[Mapping[str, str]] = {}
+    keeps_order: ClassVar[bool] = False
     demanded: Demand | None = None
 
     def __init__(self, rig: Rig):
@@ -64,7 +67,8 @@ class Policy(ABC):
         demand = self.demand(belief)
         if not isinstance(demand, Demand):
             raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")
-        demand = self.rig.in_cell_order(demand)
+        if not self.keeps_order:
+            demand = self.rig.in_cell_order(demand)
         self.demanded = demand
         cells = allocate(demand, belief.budget, self.rig.reserve_fraction)
         if cells.min(initial=0) < 0 or cells.max(initial=0) >= self.rig.grid.size:

@@ -13,22 +13,23 @@ LOWEST_DEG = -10.7
 
 class Fan(Policy):
     """Fires what lies ahead, between the horizon and `LOWEST_DEG`, the columns nearest to straight
-    ahead first: at 3% of the paper's grid 20 degrees to either side.
+    ahead first: at 3% of the paper's grid 20 degrees to either side. When the fan has gone all
+    round, the other rows follow in the same way.
     """
 
     name = "fan"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
+    keeps_order = True
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
         grid = rig.grid
         elevations = np.linspace(grid.top, grid.bottom, grid.rows)
-        below = np.flatnonzero(
-            (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
-        )
+        is_low = (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
         ahead = np.argsort(np.abs(np.arange(grid.columns) + 0.5 - grid.columns / 2), kind="stable")
-        self._pattern = (below * grid.columns + ahead[:, None]).ravel()
+        parts = [np.flatnonzero(rows) * grid.columns + ahead[:, None] for rows in (is_low, ~is_low)]
+        self._pattern = np.concatenate([part.ravel() for part in parts])
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""

@@ -15,6 +15,7 @@ class HistoryRows(Policy):
     name = "history-rows"
     tags = ("causal", "control")
     source = "own: history, and a pattern that never changes"
+    keeps_order = True
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
@@ -22,4 +23,5 @@ class HistoryRows(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then rows."""
-        return Demand(self.rig.hulls(belief.tracks.boxes), [[self._rows]])
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
+        return Demand(hulls, [[self._rows]])

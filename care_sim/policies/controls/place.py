@@ -9,6 +9,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
+from care_sim.policies.controls.rows import nearest_rows
 from care_sim.policies.learned.weights import load_weights, shipped_weights
 
 
@@ -23,6 +24,7 @@ class Place(Policy):
     name = "place"
     tags = ("causal", "learned", "control")
     source = "own: a map that never changes"
+    keeps_order = True
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
@@ -39,6 +41,7 @@ class HistoryPlace(Policy):
     name = "history-place"
     tags = ("causal", "learned", "control")
     source = "own: history, and a map that never changes"
+    keeps_order = True
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)
@@ -46,12 +49,15 @@ class HistoryPlace(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the map."""
-        return Demand(self.rig.hulls(belief.tracks.boxes), [[self._pattern]])
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
+        return Demand(hulls, [[self._pattern]])
 
 
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:
-    """(N,) all cells, those with most first sightings first; equals by index."""
+    """(N,) all cells, those with most first sightings first; equals as the control `rows` has them."""
     weights = load_weights(shipped_weights("place") if path is None else path)
     weights.check("place", rig)
     sightings = weights.array("sightings", *rig.grid.shape)
-    return np.argsort(-sightings.ravel(), kind="stable")
+    # Most cells of the map have none: without the rows, larger budgets would go to the sky.
+    rows = nearest_rows(rig.grid)
+    return rows[np.argsort(-sightings.ravel()[rows], kind="stable")]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from care_sim.base.checks import check_number
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.rig import Rig
@@ -16,15 +17,17 @@ atan((0.75 - 1.84) / 50). What enters the range of scoring by driving enters it 
 
 class Rows(Policy):
     """Fires the rows nearest to the elevation at which things enter the range, nearest first; the
-    last row is thinned evenly.
+    last row is thinned evenly. Raises InvalidInput for an elevation that is none.
     """
 
     name = "rows"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
+    keeps_order = True
 
     def __init__(self, rig: Rig, elevation_deg: float = RING_ELEVATION_DEG):
         super().__init__(rig)
+        check_number("elevation_deg", elevation_deg, -90, 90)
         self._pattern = nearest_rows(rig.grid, elevation_deg)
 
     def demand(self, belief: Belief) -> Demand:

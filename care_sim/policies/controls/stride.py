@@ -1,7 +1,6 @@
 """A control: every so manyth cell of the grid, without camera, tracks or memory."""
 
 from care_sim.core.belief import Belief
-from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.paper.history_uniform import uniform_pattern
@@ -15,11 +14,8 @@ class Stride(Policy):
     name = "stride"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
-
-    def __init__(self, rig: Rig):
-        super().__init__(rig)
-        self._pattern = uniform_pattern(rig.grid, rig.budget)
+    keeps_order = True
 
     def demand(self, belief: Belief) -> Demand:
-        """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern]])
+        """The pattern of the budget."""
+        return Demand(layers=[[uniform_pattern(self.rig.grid, belief.budget)]])

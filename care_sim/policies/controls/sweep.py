@@ -16,6 +16,7 @@ class Sweep(Policy):
     name = "sweep"
     tags = ("causal", "control")
     source = "own: a pattern that turns"
+    keeps_order = True
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
@@ -29,6 +30,6 @@ class Sweep(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The budget's next cells."""
-        places = (self._next + np.arange(self.rig.budget)) % len(self._turn)
-        self._next += self.rig.budget
+        places = (self._next + np.arange(belief.budget)) % len(self._turn)
+        self._next = (self._next + belief.budget) % len(self._turn)
         return Demand(layers=[[self._turn[places]]])

@@ -1,8 +1,10 @@
 """CARE in rounds, with a watch on open lines of sight for what the camera has not told yet."""
 
-from care_sim.base.checks import check_flag, check_known, check_whole
+from collections.abc import Mapping
+from typing import ClassVar
+
+from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.belief import Belief
-from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
@@ -11,81 +13,92 @@ from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.rows import nearest_rows
 from care_sim.policies.own.care_spread import (
+    CORE_FIRST,
     HULL_CELLS_PER_RETURN,
     WEDGE_CELLS_PER_RETURN,
     part,
 )
 from care_sim.policies.own.sight_lines import SightLines
 
-_NONE: list[Cells] = []
 WEDGE_ROUNDS = 4
-"""Rounds that a wedge gets at most: a walker whose head alone shows fills a fourth of its box."""
+"""Rounds that an unexplained wedge gets at most."""
+_NONE: list[Cells] = []
 
 
 class CareSightlines(Policy):
     """`care-spread` with a watch for what no camera box asks for.
 
-    After the first round of wedges and hulls come a few cells of every explained wedge, since a new
-    object can stand in front of a known one, and the lines of sight along which something can
-    appear (`care_sim.policies.own.sight_lines`). Then the wedges get what is left of them, which
-    helps with walkers half hidden; then come the rest of the row at which things enter the range, a
-    second round of hulls, and the pattern `rows` in the place of the random floor. Each can be
-    switched off: `sight_lines`, `explained`, `rows`; `camera=False` leaves out all wedges.
+    In order of priority: a round of unexplained wedges; the lines of sight ahead along which
+    something can drive into the range (`care_sim.policies.own.sight_lines`); a round of hulls; a
+    round of explained wedges, since a new object can stand in front of a known one; all lines of
+    sight; the rest of the wedges, up to `wedge_rounds` rounds in all, unless the picture is late
+    and says where things were; the rest of the row at which things enter the range; more of the
+    hulls; and the pattern `rows` in the place of the random floor.
+
+    Each idea can be switched off, to see what it does: `camera` (all wedges), `ahead`, `explained`,
+    `sight_lines`, `rows`.
     """
 
     name = "care-sightlines"
     source = "own: the reserve of CARE in rounds, open lines of sight, rows"
+    told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
+    keeps_order = True
 
     def __init__(
         self,
         rig: Rig,
         min_returns: int = MIN_RETURNS,
-        cell_order: str = "core-spread",
-        sight_lines: bool = True,
-        explained: bool = True,
-        rows: bool = True,
+        wedge_rounds: int = WEDGE_ROUNDS,
         camera: bool = True,
+        ahead: bool = True,
+        explained: bool = True,
+        sight_lines: bool = True,
+        rows: bool = True,
     ):
         super().__init__(rig)
         check_whole("min_returns", min_returns, 1)
-        check_known("cell_order", cell_order, CELL_ORDERS)
-        switches = {"sight_lines": sight_lines, "explained": explained, "rows": rows}
-        for name, value in (switches | {"camera": camera}).items():
+        check_whole("wedge_rounds", wedge_rounds, 1)
+        switches = {"camera": camera, "ahead": ahead, "explained": explained}
+        for name, value in (switches | {"sight_lines": sight_lines, "rows": rows}).items():
             check_flag(name, value)
-        self._order = cell_order
-        self._few = HULL_CELLS_PER_RETURN * min_returns
-        self._more = WEDGE_CELLS_PER_RETURN * min_returns
-        self._watches = sight_lines
+        self._hull_round = HULL_CELLS_PER_RETURN * min_returns
+        self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
+        self._wedge_most = wedge_rounds * self._wedge_round
+        self._uses_camera = camera
+        self._looks_ahead = ahead
         self._rechecks = explained
-        self._camera = camera
-        self._fills = rows
-        self._rows = nearest_rows(rig.grid)
+        self._watches = sight_lines
+        self._rows = [nearest_rows(rig.grid)] if rows else []
         self.reset()
 
     def reset(self) -> None:
         """Forget what was seen."""
-        self._lines = SightLines(self.rig, int(self._rows[0] // self.rig.grid.columns))
+        row = int(nearest_rows(self.rig.grid)[0]) // self.rig.grid.columns
+        self._lines = SightLines(self.rig, row)
 
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
-        few, more = self._few, self._more
-        unexplained, known = camera_layers(belief, self.rig) if self._camera else (_NONE, _NONE)
-        wedges = self.rig.reordered(unexplained, self._order)
-        hulls = self.rig.reordered(self.rig.hulls(belief.tracks.boxes), self._order)
+        unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else (_NONE,) * 2
+        wedges = self.rig.listed(unexplained, CORE_FIRST)
+        rechecked = self.rig.listed(known, CORE_FIRST) if self._rechecks else []
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST)
         self._lines.update(belief)
-        known = known if self._rechecks else []
-        lines = [self._lines.cells()] if self._watches else []
-        rows = [self._rows] if self._fills else []
-        ring = part(rows, 0, self.rig.grid.columns)
+        few, more = self._hull_round, self._wedge_round
         return Demand(
             layers=[
                 part(wedges, 0, more),
+                [self._lines.ahead()] if self._looks_ahead else [],
                 part(hulls, 0, few),
-                part(self.rig.reordered(known, self._order), 0, few),
-                lines,
-                part(wedges, more, WEDGE_ROUNDS * more),
-                ring,
+                part(rechecked, 0, few),
+                [self._lines.cells()] if self._watches else [],
+                [] if self._is_late(belief) else part(wedges, more, self._wedge_most),
+                part(self._rows, 0, self.rig.grid.columns),
                 part(hulls, few, few + more),
-                rows,
+                self._rows,
             ]
         )
+
+    def _is_late(self, belief: Belief) -> bool:
+        """Whether the newest picture is at least half a keyframe old."""
+        ages = belief.detections.ages
+        return len(ages) > 0 and bool(ages.min() >= self.rig.keyframe_s / 2)

@@ -1,10 +1,10 @@
 """CARE whose sets give their best cells first, and whose first round serves every set."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
-from care_sim.base.checks import check_known, check_whole
+from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
-from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
@@ -12,48 +12,48 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
+CORE_FIRST = "core-spread"
+"""The order of the cells in hulls and wedges (`care_sim.core.cell_order`), unless the rig has one:
+the rim is there for errors of the forecast and holds nothing without them."""
 HULL_CELLS_PER_RETURN = 2
-"""Cells of a hull for every return that a detection needs: about half the rays through the middle
-of a forecast meet the object."""
+"""Cells that a hull gets in a round for every return that a detection needs."""
 WEDGE_CELLS_PER_RETURN = 3
-"""Cells of a wedge for every return that a detection needs: fewer meet the object, since an image
-box is no body and holds its surroundings, too."""
+"""Cells that a wedge gets in a round for every return that a detection needs: more than a hull,
+since an image box also holds what stands before and behind."""
 
 
 class CareSpread(Policy):
     """The reserve of CARE, spent otherwise. It asks no more of a set than a detection needs, before
     another set has had as much.
 
-    First every unexplained wedge gets a few cells, then every hull; then the wedges get as many
-    again, then the hulls. What is left goes to the floor. Sets are listed in a `cell_order` of
-    `care_sim.core.cell_order.CELL_ORDERS`: by default their undilated core first, spread evenly,
-    since the rim is there for errors of the forecast and holds nothing without them. All of it is
-    in the reserve layers, in order of priority: the share rho plays no part. `min_returns` is what
-    the detector needs.
+    First every unexplained wedge gets a few cells, then every hull; then both get as many again.
+    What is left goes to the floor. Sets are listed with their undilated core first, spread evenly
+    (`core-spread`), unless the rig has an order. All of it is in the reserve layers, in order of
+    priority: the share rho plays no part. `min_returns` is what the detector needs.
     """
 
     name = "care-spread"
     source = "own: the reserve of CARE, core first, in rounds"
+    told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
+    keeps_order = True
 
-    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS, cell_order: str = "core-spread"):
+    def __init__(self, rig: Rig, min_returns: int = MIN_RETURNS):
         super().__init__(rig)
         check_whole("min_returns", min_returns, 1)
-        check_known("cell_order", cell_order, CELL_ORDERS)
-        self._order = cell_order
         self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
         self._hull_round = HULL_CELLS_PER_RETURN * min_returns
 
     def demand(self, belief: Belief) -> Demand:
         """Layers: a round of wedges, a round of hulls, and both again."""
         unexplained, _ = camera_layers(belief, self.rig)
-        wedges = self.rig.reordered(unexplained, self._order)
-        hulls = self.rig.reordered(self.rig.hulls(belief.tracks.boxes), self._order)
+        wedges = self.rig.listed(unexplained, CORE_FIRST)
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST)
         return Demand(
             layers=[
                 part(wedges, 0, self._wedge_round),
                 part(hulls, 0, self._hull_round),
                 part(wedges, self._wedge_round, 2 * self._wedge_round),
-                part(hulls, self._hull_round, self._hull_round + self._wedge_round),
+                part(hulls, self._hull_round, 2 * self._hull_round),
             ]
         )
 
