@@ -28,10 +28,10 @@ class Policy(ABC):
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
     parameters to the attributes of the environment that `make_policy` fills them from, unless they
-    are given. `keeps_order` says that the rig's `cell_order` leaves the demand as it is, because the
-    order of its cells is the idea, or because the policy has asked `Rig.listed` for its hulls and
-    wedges itself. `demanded` is what `demand` last answered a call with, in the order in which it
-    was served, for those who watch.
+    are given. `keeps_order` leaves the demand as it is whatever `cell_order` the rig has: the order
+    of its cells is the idea, or the policy asks `Rig.listed` for its hulls and wedges itself.
+    `demanded` is what `demand` last answered a call with, in the order in which it was served, for
+    those who watch.
     """
 
     name: ClassVar[str] = ""

@@ -54,7 +54,7 @@ class HistoryPlace(Policy):
 
 
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:
-    """(N,) all cells, those with most first sightings first; equals as the control `rows` has them."""
+    """(N,) all cells, those with most first sightings first; of equals, as `rows` has them."""
     weights = load_weights(shipped_weights("place") if path is None else path)
     weights.check("place", rig)
     sightings = weights.array("sightings", *rig.grid.shape)

@@ -33,25 +33,29 @@ class SightLines:
     """A memory of the last range in every column of one `row`, moved with the car.
 
     What drives into the range enters it at the end of an open line of sight; what was hidden shows
-    itself at an edge. A line along which nothing is remembered counts as open.
+    itself at an edge. A line along which nothing is remembered counts as open. `ranges` (A,) are
+    metres as of the coming keyframe, the grid's reach where nothing is remembered.
     """
+
+    ranges: Floats
 
     def __init__(self, rig: Rig, row: int):
         self._rig = rig
         self._row = row
         columns = rig.grid.columns
-        self._azimuths = (np.arange(columns) + 0.5) * rig.grid.column_width - np.pi
+        middles = np.arange(columns, dtype=np.float64) + 0.5
+        self._azimuths: Floats = np.asarray(middles * rig.grid.column_width - np.pi)
         # On a grid of shorter reach, a line without a return is open all the same.
         self._open_m = min(OPEN_M, rig.grid.range_m / 2)
-        self._ranges = np.full(columns, rig.grid.range_m)
+        self.ranges = np.full(columns, rig.grid.range_m, np.float64)
 
     def update(self, belief: Belief) -> None:
         """Take in the last scan, and move what is remembered by what the car has driven since."""
         seen = belief.ranges[self._row]
-        self._ranges[seen > 0] = seen[seen > 0]
+        self.ranges[seen > 0] = seen[seen > 0]
         driven = belief.ego.speed * self._rig.keyframe_s
         turned = belief.ego.yaw_rate * self._rig.keyframe_s
-        self._ranges = _moved(self._ranges, self._azimuths, driven, turned, self._rig.grid.range_m)
+        self.ranges = _moved(self.ranges, self._azimuths, driven, turned, self._rig.grid.range_m)
 
     def ahead(self) -> Cells:
         """What is worth a look within `AHEAD_RAD` of straight ahead, the nearest to it first."""
@@ -64,17 +68,15 @@ class SightLines:
         return self._cells(np.flatnonzero(self._watched()))
 
     def _watched(self) -> Mask:
-        return _open_or_edge(self._ranges, self._open_m)
+        return _open_or_edge(self.ranges, self._open_m)
 
     def _cells(self, columns: Cells) -> Cells:
-        cells: Cells = self._row * len(self._ranges) + columns
+        cells: Cells = self._row * len(self.ranges) + columns
         return cells
 
 
 @compiled()
-def _moved(
-    ranges: Floats, azimuths: Floats, driven: float, turned: float, reach: float
-) -> Floats:
+def _moved(ranges: Floats, azimuths: Floats, driven: float, turned: float, reach: float) -> Floats:
     """The `ranges` (A,) of things that stand still, after the car has `driven` metres ahead and
     `turned` radians to the left; `reach` where nothing is left of them.
     """
