@@ -9,9 +9,7 @@ from care_sim.study.designs.ablations import ablation_study
 
 @dataclass(frozen=True, kw_only=True)
 class Ablate(FixedStudy):
-    """Vary one thing at a time as the paper's ablations do, 162 configurations per seed, one table
-    per thing varied.
-    """
+    """Vary one thing at a time as the paper's ablations do, one table per thing varied."""
 
     out: Path = Path("runs/ablate")
     """Folder of the results; an interrupted study goes on there."""

@@ -9,9 +9,7 @@ from care_sim.study.designs.crowding import crowding_study
 
 @dataclass(frozen=True, kw_only=True)
 class Crowding(FixedStudy):
-    """Find where the all-camera reserve collapses as vehicles fill the dense street, 221
-    configurations per seed.
-    """
+    """Find where the all-camera reserve collapses as vehicles fill the dense street."""
 
     out: Path = Path("runs/crowding")
     """Folder of the results; an interrupted study goes on there."""

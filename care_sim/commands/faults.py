@@ -9,9 +9,7 @@ from care_sim.study.designs.faults import fault_study
 
 @dataclass(frozen=True, kw_only=True)
 class Faults(FixedStudy):
-    """Let every fault grow and find where the order of the policies changes, 318 configurations per
-    seed.
-    """
+    """Let every fault grow and find where the order of the policies changes."""
 
     out: Path = Path("runs/faults")
     """Folder of the results; an interrupted study goes on there."""

@@ -23,6 +23,8 @@ _PAPER_POLICIES = (
     "learned-scorer",
 )
 """The policies of the paper's Sec. 5.1, and `random`, the floor alone."""
+_CONTROLS = ("rows", "place")
+"""The best patterns without a camera."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +36,7 @@ class Protocol(StudyCommand, PlayOptions):
     scenes: tuple[str, ...] = ()
     """One number: that many scenes, from the first. Otherwise names of scenes. Without this
     option, all scenes."""
-    policies: tuple[str, ...] = (*_PAPER_POLICIES, "full")
+    policies: tuple[str, ...] = (*_PAPER_POLICIES, "care-sightlines", *_CONTROLS, "full")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
     budget 1.0. Allocations are compared with those of `care`, which is played for that in any case.
     """

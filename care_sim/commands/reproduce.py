@@ -9,8 +9,8 @@ from care_sim.study.designs.paper import paper_study
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(FixedStudy):
-    """Play the paper's closed-loop study, 49 configurations per seed, and print it beside the
-    paper's figures.
+    """Play the paper's closed-loop study, 49 configurations per seed and those of --also, and
+    print it beside the paper's figures.
     """
 
     out: Path = Path("runs/reproduce")

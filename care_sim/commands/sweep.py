@@ -20,7 +20,7 @@ class Sweep(EpisodeStudy):
 
     scenarios: tuple[str, ...] = ("dartout", "dense", "cutin")
     """Names of `care-sim scenarios`; `all` stands for all of them."""
-    policies: tuple[str, ...] = ("history", "all-camera", "care", "full")
+    policies: tuple[str, ...] = ("history", "all-camera", "care", "care-sightlines", "fan", "full")
     """Names of `care-sim policies`; `all` stands for all but the controls. `full` always runs with
     budget 1.0."""
     budgets: tuple[float, ...] = (0.1,)

@@ -26,8 +26,9 @@ class EpisodeStudy(StudyCommand):
 class FixedStudy(EpisodeStudy):
     """A study whose episodes are fixed, except for the seeds and for further policies."""
 
-    also: tuple[str, ...] = ()
-    """Further policies, installed ones too, that are played and shown beside those of the study."""
+    also: tuple[str, ...] = ("fan",)
+    """Further policies, installed ones too, that are played and shown beside those of the study;
+    `fan` is the best pattern without a camera in these scenes."""
 
     def play(self, study: str, configurations: _Configurations, out: Path) -> int:
         """Play the configurations of the seeds, with the further policies."""
