@@ -1,6 +1,7 @@
 """CARE in rounds, with a watch on open lines of sight for what the camera has not told yet."""
 
 from collections.abc import Mapping
+from itertools import islice
 from typing import ClassVar
 
 from care_sim.base.checks import check_flag, check_whole
@@ -79,9 +80,13 @@ class CareSightlines(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
         unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else (_NONE,) * 2
-        wedges = self.rig.listed(unexplained, CORE_FIRST)
-        rechecked = self.rig.listed(known, CORE_FIRST) if self._rechecks else []
-        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST)
+        rechecked = known if self._rechecks else _NONE
+        hulls = self.rig.hulls(belief.tracks.boxes)
+        # All at once, which takes less time than one kind after the other.
+        listed = iter(self.rig.listed([*unexplained, *rechecked, *hulls], CORE_FIRST))
+        wedges = [*islice(listed, len(unexplained))]
+        rechecked = [*islice(listed, len(rechecked))]
+        hulls = [*listed]
         self._lines.update(belief)
         few, more = self._hull_round, self._wedge_round
         return Demand(
