@@ -23,12 +23,14 @@ FOUND = ""
 class Account:
     """Event by event, e of them in the order of `Sightings.events`: the censored times to first
     detection `delays` in keyframes, the `reasons` why they were missed at their first keyframe,
-    `FOUND` where they were not, and `rays` (e, 5) by share of those that hit them there.
+    `FOUND` where they were not, the marks 1 or 0 of those that had a track already (`tracked`), and
+    `rays` (e, 5) by share of those that hit them at that keyframe.
     """
 
     keyframes: int
     delays: list[int]
     reasons: list[str]
+    tracked: list[int]
     rays: Integers
 
 
@@ -38,6 +40,7 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Accoun
     Raises InvalidInput for a policy that answers without a demand.
     """
     reasons: list[str] = []
+    tracked: list[int] = []
     rays = [np.empty((0, len(RAY_SHARES)), np.int64)]
     with config.make_env(film) as env:
         policy = config.make_policy(env)
@@ -59,9 +62,10 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Accoun
             for new in entries:
                 seen = new.appearance
                 reasons.append(miss_reason(seen, served, config.min_returns))
+                tracked.append(int(seen.tracked))
                 rays.append(rays_by_share(seen.returns, served)[None])
         delays = env.score.delays.tolist()
         keyframes = len(env.keyframes)
     # A reason was worked out for every event; only those of misses stand.
     told = [reason if delay else FOUND for reason, delay in zip(reasons, delays, strict=True)]
-    return Account(keyframes, delays, told, np.concatenate(rays))
+    return Account(keyframes, delays, told, tracked, np.concatenate(rays))

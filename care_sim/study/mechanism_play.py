@@ -14,12 +14,16 @@ from care_sim.study.run_config import FULL, Row
 from care_sim.study.scene_play import film_hash
 from care_sim.study.shared_belief import SharedBelief, share_belief
 
+ACCOUNT_COLUMNS = ("ttfds", "misses", "tracked", *(f"rays_{share}" for share in RAY_SHARES))
+"""What every row says of the events of its own play, in order."""
+DIFFERING = ("differing_keyframes", "differing_cells")
+"""What a policy that was asked has, and the driver has not."""
+RECEIVED = "received"
+"""Of every new object of the shared belief, the cells that the policy would give it."""
 BELIEF_SUMS = ("filled", "filled_rho", "explained_cells", "untaken_cells")
 """Sums over keyframes that the row of the driver has: those of `ReserveUse`."""
-BELIEF_MARKS = ("pictured", "tracked", "falsely_explained", "covered")
+BELIEF_MARKS = ("pictured", "falsely_explained", "covered")
 """What it says of every new object, 1 or 0."""
-_ASKED = ("differing_keyframes", "differing_cells", "received")
-"""What a policy was asked on the shared belief."""
 
 
 def play_mechanism(batch: Sequence[MechanismConfig]) -> list[Row | str]:
@@ -79,14 +83,15 @@ class MechanismScene:
         return share_belief(driver, others, self._film, self._sightings)
 
     def _asked_columns(self, config: MechanismConfig) -> Row:
+        columns: Row = dict.fromkeys((*DIFFERING, RECEIVED))
         shared = self._shared
         if shared is None or config.policy == FULL:
-            return dict.fromkeys(_ASKED)
-        received = tuple(shared.received[config.policy])
+            return columns
+        columns[RECEIVED] = tuple(shared.received[config.policy])
         if config.policy == config.driver:
-            return dict.fromkeys(_ASKED) | {"received": received}
+            return columns
         moved = allocation_difference(shared.fired[config.policy], shared.fired[config.driver])
-        return dict(zip(_ASKED, (moved.differing, moved.cells, received), strict=True))
+        return columns | dict(zip(DIFFERING, (moved.differing, moved.cells), strict=True))
 
     def _belief_columns(self, config: MechanismConfig) -> Row:
         shared = self._shared
@@ -95,16 +100,12 @@ class MechanismScene:
         seen = [new.appearance for new in shared.entries]
         return {name: getattr(shared.reserve, name) for name in BELIEF_SUMS} | {
             "pictured": tuple(int(bool(each.wedges)) for each in seen),
-            "tracked": tuple(int(each.tracked) for each in seen),
             "falsely_explained": tuple(int(each.falsely_explained) for each in seen),
             "covered": tuple(int(new.covered) for new in shared.entries),
         }
 
 
 def _account_columns(account: Account) -> Row:
-    rays = zip(RAY_SHARES, account.rays.T.tolist(), strict=True)
-    return {
-        "ttfds": tuple(account.delays),
-        "misses": tuple(account.reasons),
-        **{f"rays_{share}": tuple(counts) for share, counts in rays},
-    }
+    rays = account.rays.T.tolist()
+    lists = (account.delays, account.reasons, account.tracked, *rays)
+    return dict(zip(ACCOUNT_COLUMNS, map(tuple, lists), strict=True))

@@ -7,10 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.evaluation.ray_shares import RAY_SHARES
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
-from care_sim.study.mechanism_play import BELIEF_MARKS, BELIEF_SUMS, play_mechanism
+from care_sim.study.mechanism_play import (
+    ACCOUNT_COLUMNS,
+    BELIEF_MARKS,
+    BELIEF_SUMS,
+    DIFFERING,
+    RECEIVED,
+    play_mechanism,
+)
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
 from care_sim.study.rows.reading import with_added_columns, with_tags
 from care_sim.study.rows.schema import (
@@ -116,13 +122,11 @@ _PLAYS = Schema(
 )
 _MECHANISM = Schema(
     _ANY_PLAY
+    | dict.fromkeys(ACCOUNT_COLUMNS, _COUNTS)
     | {"driver": TEXT, "misses": Column("lists of texts")}
-    | {f"rays_{share}": _COUNTS for share in RAY_SHARES}
     # The full scan is not asked on the shared belief; what is of that belief, the driver's row has.
-    | dict.fromkeys(("differing_keyframes", "differing_cells"), as_optional(COUNT))
-    | {"received": as_optional(_COUNTS)}
-    | dict.fromkeys(BELIEF_SUMS, as_optional(COUNT))
-    | dict.fromkeys(BELIEF_MARKS, as_optional(_COUNTS)),
+    | dict.fromkeys((*DIFFERING, *BELIEF_SUMS), as_optional(COUNT))
+    | dict.fromkeys((RECEIVED, *BELIEF_MARKS), as_optional(_COUNTS)),
     _BY_WRITER | _OF_SOME_PLAYS,
 )
 EPISODES = ResultsFormat(

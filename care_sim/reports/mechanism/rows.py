@@ -5,12 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.detection_order import DetectionOrder, detection_order
 from care_sim.evaluation.miss_reasons import MISS_REASONS
 from care_sim.evaluation.ray_shares import RAY_SHARES, shares_of_credit
 from care_sim.evaluation.reserve_use import ReserveUse
+from care_sim.study.mechanism_play import (
+    ACCOUNT_COLUMNS,
+    BELIEF_MARKS,
+    BELIEF_SUMS,
+    DIFFERING,
+    RECEIVED,
+)
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
@@ -34,9 +43,13 @@ class NewEntries:
 class MechanismRows:
     """The rows of one study: one driver, one budget, one setting. Policies are named with their
     parameters; the full scan is none of them.
+
+    Raises InvalidInput for rows that do not tell of the same events of a scene, and for one that
+    lacks what its policy must have.
     """
 
     def __init__(self, rows: Sequence[Row]):
+        _check(rows)
         budgeted = [row for row in rows if row["policy"] != FULL]
         self.scenes = list(dict.fromkeys(row["scene"] for row in rows))
         self.driver: str = rows[0]["driver"]
@@ -117,16 +130,18 @@ class MechanismRows:
             DetectionOrder(),
         )
 
-    def credit(self, first: str, second: str) -> Floats:
+    def credit(self, first: str, second: str) -> tuple[Floats, Mask]:
         """(e, 5) the part of every ray share in each event that the `first` caught at once and the
-        `second` missed.
+        `second` missed, and (e,) whether the first had a track of it already.
         """
         caught = [np.empty((0, len(RAY_SHARES)))]
+        tracked = [np.empty(0, bool)]
         for ours, theirs in self._pairs(first, second):
-            rays = np.array([ours[f"rays_{share}"] for share in RAY_SHARES]).T
+            rays = np.array([ours[f"rays_{share}"] for share in RAY_SHARES], np.int64).T
             won = (np.array(ours["ttfds"]) == 0) & (np.array(theirs["ttfds"]) > 0)
-            caught.append(shares_of_credit(rays[won].reshape(-1, len(RAY_SHARES))))
-        return np.concatenate(caught)
+            caught.append(shares_of_credit(rays[won]))
+            tracked.append(np.array(ours["tracked"], bool)[won])
+        return np.concatenate(caught), np.concatenate(tracked)
 
     def found_by_full(self, policy: str) -> int:
         """Events that the full scan finds at once, of the scenes that both have."""
@@ -154,3 +169,35 @@ class MechanismRows:
         for row in self._of(policy):
             if row["scene"] in self._full:
                 yield row, self._full[row["scene"]]
+
+
+def _check(rows: Sequence[Row]) -> None:
+    """Raise InvalidInput for what no study writes: a file may be anybody's."""
+    events = {row["scene"]: len(row["ttfds"]) for row in rows}
+    for row in rows:
+        place = f"scene {row['scene']}, {row['policy']}"
+        if row["driver"] != rows[0]["driver"]:
+            raise InvalidInput(
+                f"{place}: all rows must have one driver, got {row['driver']} beside "
+                f"{rows[0]['driver']}"
+            )
+        for name in _needed(row):
+            if row[name] is None:
+                raise InvalidInput(f"{place}: {name} must be given")
+            if isinstance(row[name], tuple) and len(row[name]) != events[row["scene"]]:
+                raise InvalidInput(
+                    f"{place}: {name} must tell of the {events[row['scene']]} events of the scene, "
+                    f"got {len(row[name])}"
+                )
+        for reason in row["misses"]:
+            if reason:
+                check_known("reason for a miss", reason, MISS_REASONS)
+
+
+def _needed(row: Row) -> tuple[str, ...]:
+    """What the row of its policy must have."""
+    if row["policy"] == FULL:
+        return ACCOUNT_COLUMNS
+    if row["policy"] == row["driver"]:
+        return (*ACCOUNT_COLUMNS, RECEIVED, *BELIEF_SUMS, *BELIEF_MARKS)
+    return (*ACCOUNT_COLUMNS, RECEIVED, *DIFFERING)

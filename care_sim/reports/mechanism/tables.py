@@ -145,19 +145,20 @@ def credit_table(study: MechanismRows) -> Table:
     """Who fired the rays of the first sightings that one policy caught and another missed."""
     lines = []
     for caught, missed in permutations(study.policies, 2):
-        credit = study.credit(caught, missed)
+        credit, tracked = study.credit(caught, missed)
         # A pair without such a sighting has nothing to share out.
         if len(credit):
             shares = (f"{100 * share:.0f}%" for share in credit.mean(axis=0))
             names = _name(study, caught), _name(study, missed)
-            lines.append((*names, str(len(credit)), *shares))
+            lines.append((*names, str(len(credit)), *shares, str(tracked.sum())))
     return Table(
         f"{_heading(study)}: whose rays caught what the other missed",
-        ("caught by", "missed by", "first sightings", *_CREDIT_COLUMNS),
+        ("caught by", "missed by", "first sightings", *_CREDIT_COLUMNS, "tracked already"),
         tuple(lines),
         (
             "Of the rays that hit the object at its first keyframe, in the play that caught it; "
-            "every sighting weighs the same. Layer 1 of care is U.",
+            "every sighting weighs the same. Layer 1 of care is U. Tracked already: sightings of "
+            "objects that the catching policy had detected before, beyond 50 m.",
             *_notes(study),
         ),
     )
