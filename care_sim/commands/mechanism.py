@@ -14,9 +14,7 @@ from care_sim.study.run_config import REFERENCE
 
 @dataclass(frozen=True, kw_only=True)
 class Mechanism(StudyCommand, PlayOptions):
-    """Find why policies differ: what all would fire on one shared belief, whose rays hit the
-    objects that one caught and another missed, and why each miss happened.
-    """
+    """Find why policies differ: on one shared belief, and ray by ray, on streets or recordings."""
 
     scenes: tuple[str, ...] = ()
     """One number: that many scenes, from the first. Otherwise names of scenes. Without this

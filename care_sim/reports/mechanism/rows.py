@@ -21,7 +21,7 @@ from care_sim.study.mechanism_play import (
     RECEIVED,
 )
 from care_sim.study.rows.reading import policy_of, setting_of, tags_of_row
-from care_sim.study.run_config import FULL, Row
+from care_sim.study.run_config import FULL, REFERENCE, Row
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,13 @@ class MechanismRows:
     def policies(self) -> tuple[str, ...]:
         """All but the full scan, in the order of their first rows."""
         return tuple(self.tags)
+
+    @property
+    def as_in_paper(self) -> bool:
+        """Whether the paper's figures are of the same: the belief is CARE's, and nothing departs
+        from the default conditions.
+        """
+        return self.driver == REFERENCE and not self.setting.conditions
 
     @property
     def events(self) -> int:

@@ -12,6 +12,7 @@ from care_sim.evaluation.ray_shares import RAY_SHARES
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.mechanism import paper
 from care_sim.reports.mechanism.rows import MechanismRows, NewEntries
+from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.protocol.notes import papers
 from care_sim.reports.table import Table, TableRow
 from care_sim.study.run_config import Row
@@ -46,7 +47,6 @@ def mechanism_closing(rows: Sequence[Row]) -> list[str]:
 def belief_table(study: MechanismRows) -> Table:
     """What the driver's belief makes of the camera's boxes, beside the paper's figures."""
     use = study.reserve_use()
-    entries = study.entries()
     lines = [
         ("keyframes at which U alone takes all that exploitation leaves",
          _share(use.filled, use.keyframes), paper.FILLED),
@@ -56,13 +56,13 @@ def belief_table(study: MechanismRows) -> Table:
          _mean(use.explained_cells, use.keyframes), paper.REMOVED_CELLS),
         ("of these, cells that exploitation had not taken",
          _mean(use.untaken_cells, use.keyframes), ""),
-        *_entry_lines(entries, study.driver),
+        *_entry_lines(study.entries(), study.driver),
     ]  # fmt: skip
     return Table(
         f"{_heading(study)}: on the belief of {study.driver}",
-        ("quantity", "here", "paper"),
-        tuple(lines),
-        quotes=papers((paper.MECHANICAL, paper.CLASS_GATE)),
+        ("quantity", "here", PAPER),
+        tuple((name, here, _said(study, there)) for name, here, there in lines),
+        quotes=_quotes(study, paper.MECHANICAL, paper.CLASS_GATE),
     )
 
 
@@ -89,7 +89,7 @@ def allocation_table(study: MechanismRows) -> Table:
         (
             "policy",
             "keyframes that differ",
-            "(paper)",
+            PAPER,
             "cells that differ, where any",
             "cells at first appearance",
             "inside coverage",
@@ -98,10 +98,10 @@ def allocation_table(study: MechanismRows) -> Table:
         (
             "Cells at first appearance: of those in the new object's dilated hull, median "
             "[quartiles] (number of objects); inside coverage where hulls of tracks hold half of "
-            f"it or more. Paper, on a vehicle: {' and '.join(paper.CELLS_AT_APPEARANCE)}.",
+            "it or more.",
             *_notes(study),
         ),
-        papers((paper.MECHANICAL, paper.VEHICLE_CELLS)),
+        _quotes(study, paper.MECHANICAL, paper.VEHICLE_CELLS),
     )
 
 
@@ -114,7 +114,7 @@ def _allocation_line(study: MechanismRows, policy: str) -> TableRow:
     return (
         _name(study, policy),
         _share(moved.differing, moved.keyframes),
-        paper.CHANGED.get(policy, ""),
+        _said(study, paper.CHANGED.get(policy, "")),
         f"{moved.cells_where_differing:.0f}",
         *own,
     )
@@ -125,19 +125,19 @@ def order_table(study: MechanismRows) -> Table:
     lines = []
     for first, second in combinations(study.policies, 2):
         order = study.order(first, second)
-        said = paper.ORDER.get((first, second), "")
+        said = _said(study, paper.ORDER.get((first, second), ""))
         counts = map(str, (order.earlier, order.later, order.tied))
         lines.append((_name(study, first), _name(study, second), *counts, said))
     return Table(
         f"{_heading(study)}: events found earlier, later or at the same keyframe",
-        ("first", "second", "earlier", "later", "tied", "(paper, of 104)"),
+        ("first", "second", "earlier", "later", "tied", f"{PAPER} of 104"),
         tuple(lines),
         (
             "Each policy on its own play; two that do not find an event within 6 keyframes are "
             "tied.",
             *_notes(study),
         ),
-        papers((paper.VEHICLE_ORDER,)),
+        _quotes(study, paper.VEHICLE_ORDER),
     )
 
 
@@ -191,6 +191,15 @@ def _name(study: MechanismRows, policy: str) -> str:
     return marked(policy, study.tags[policy])
 
 
+def _said(study: MechanismRows, figure: str) -> str:
+    """A figure of the paper, where it is of the same."""
+    return figure if study.as_in_paper else ""
+
+
+def _quotes(study: MechanismRows, *sentences: str) -> tuple[str, ...]:
+    return papers(sentences) if study.as_in_paper else ()
+
+
 def _notes(study: MechanismRows) -> tuple[str, ...]:
     return tag_notes(study.tags.values())
 
@@ -201,7 +210,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def _mean(total: int, count: int) -> str:
-    return f"{total / count:,.0f}"
+    return f"{total / count:,.0f}" if count else "none"
 
 
 def _spread(cells: Integers) -> str:

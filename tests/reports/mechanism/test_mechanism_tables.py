@@ -152,6 +152,27 @@ def test_the_rows_survive_their_file(tmp_path):
     assert mechanism_closing(read) == ["Scenes: 2, with 6 first sightings; plays: 6."]
 
 
+def test_the_paper_stands_beside_its_own_belief_and_conditions_alone():
+    late = [each | {"camera_latency": 1} for each in ROWS if each["policy"] != "full"]
+    led = [each | {"driver": "history"} for each in ROWS if each["policy"] == "full"]
+    for rows in (late, [*led, *_driven_by_history()]):
+        shown = str([(table.rows, table.quotes) for table in mechanism_tables(rows)])
+        assert "79%" not in shown
+        assert "17 / 8" not in shown
+        assert "Paper" not in shown
+
+
+def _driven_by_history():
+    """The same rows with their parts on the shared belief exchanged."""
+    care, history = ROWS[:2]
+    own = {name: care[name] for name in (*BELIEF_SUMS, *BELIEF_MARKS)}
+    moved = {name: history[name] for name in DIFFERING}
+    return [
+        care | dict.fromkeys(own) | moved | {"driver": "history"},
+        history | own | dict.fromkeys(moved) | {"driver": "history"},
+    ]
+
+
 def test_full_scans_alone_show_nothing():
     assert mechanism_tables([ROWS[2]]) == []
     assert mechanism_closing([ROWS[2]]) == ["Scenes: 1, with 3 first sightings; plays: 1."]
