@@ -330,6 +330,15 @@ def test_what_an_action_would_fire_is_what_it_fires_and_asking_changes_nothing(r
             assert np.array_equal(unasked.step(action)[-1]["fired"], fired)
 
 
+def test_the_floor_that_is_asked_for_is_another_at_every_keyframe(replay):
+    with replay() as env:
+        env.reset(seed=0)
+        first = env.unwrapped.would_fire(NOTHING)
+        assert np.array_equal(env.unwrapped.would_fire(NOTHING), first)
+        assert np.array_equal(env.step(NOTHING)[-1]["fired"], first)
+        assert not np.array_equal(env.unwrapped.would_fire(NOTHING), first)
+
+
 def test_what_is_no_action_would_fire_nothing(replay):
     with replay() as env:
         env.reset(seed=0)
