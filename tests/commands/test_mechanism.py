@@ -19,7 +19,7 @@ def test_the_command_plays_prints_resumes_and_is_reported_again(drive, tmp_path,
     assert run(*options, "--budget", "0.05", "--out", str(out)) == 0
     printed = capsys.readouterr().out
     assert "on the belief of care" in printed
-    assert "Scenes: 1, with 1 first sightings; plays: 3." in printed
+    assert "Scenes: 1, with 1 first sighting; plays: 3." in printed
     rows = read_rows(out / MECHANISM.file, MECHANISM.schema)
     assert [row["policy"] for row in rows] == ["care", "history", "full"]
     assert all(len(row["misses"]) == 1 for row in rows)

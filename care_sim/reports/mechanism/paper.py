@@ -16,6 +16,8 @@ CHANGED = {"all-camera": "17% at 10%, 68% at 35%"}
 """Of the keyframes, by the policy that is compared with CARE."""
 ORDER = {("care", "history"): "17 / 8 / 79"}
 """Events of 104 on the vehicle: earlier, later, tied. Each policy held its own tracks."""
+CELLS_AT_APPEARANCE = ("1 to 5", "117 to 123")
+"""On the vehicle: outside, and inside established coverage."""
 
 MECHANICAL = (
     "The near-tie is mechanical: the filter removes about a thousand cells of explained wedges per "

@@ -92,6 +92,7 @@ def test_allocations_on_it():
     assert tables()["allocations on the belief of care"].rows == (
         ("care", "", "", "", "40 [0, 50] (5)", "7 [7, 7] (1)"),
         ("history", "62.5% of 80", "", "30", "0 [0, 1] (5)", "9 [9, 9] (1)"),
+        ("(paper), no camera", "", "", "", "1 to 5", "117 to 123"),
     )
 
 
