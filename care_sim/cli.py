@@ -94,6 +94,11 @@ COMMANDS = {
         "Play the paper's first-sighting protocol: every policy over the same keyframes, on "
         "streets or recordings.",
     ),
+    "mechanism": CommandEntry(
+        "mechanism",
+        "Mechanism",
+        "Find why policies differ: on one shared belief, and ray by ray, on streets or recordings.",
+    ),
     "report": CommandEntry(
         "report",
         "PrintReport",
@@ -145,7 +150,7 @@ COMMANDS = {
     ),
 }
 
-_STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol")
+_STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol", "mechanism")
 _AGENTS = ("train ppo", "train sac", "train recurrent-ppo")
 _KEPT = {
     **dict.fromkeys(_STUDIES, "; what is finished is kept, the same command goes on from there"),

@@ -80,6 +80,19 @@ def stages_of(demand: Demand) -> list[Sequence[Cells]]:
     ]
 
 
+def taken_by_stage(demand: Demand, budget: int, reserve_fraction: float) -> list[Cells]:
+    """The cells that each stage of a demand takes, in order of selection: exploitation, then each
+    reserve layer. Joined they are what `allocate` chooses without a floor. Raises as it does.
+    """
+    chosen = allocate(demand, budget, reserve_fraction)
+    # A stage is full before the next begins, so that without the later ones it takes the same.
+    ends = [
+        len(allocate(Demand(demand.exploitation, demand.layers[:count]), budget, reserve_fraction))
+        for count in range(len(demand.layers))
+    ]
+    return np.split(chosen, ends)
+
+
 class RandomFloor:
     """The shared random floor: at every keyframe a permutation of all cells, the same for every
     policy that plays the episode. Number 0 is the seed's own floor, the others are drawn from its

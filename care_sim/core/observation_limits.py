@@ -26,7 +26,7 @@ from functools import cached_property
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import HIGHEST, MAX_DETECTIONS, MAX_TRACKS, Belief
 from care_sim.core.residual import explaining_tracks
 from care_sim.core.rig import Rig
@@ -81,6 +81,23 @@ class Limits:
         tracks = self._fitting(self._limited_tracks(tracks), detections)
         return Belief(self._limited_ego(ego), self.rig.budget, detections, tracks, ranges)
 
+    def kept_detections(self, detections: ImageDetections) -> Integers:
+        """(k,) the rows of `detections` that a belief shows, in its order: those that lie in the
+        picture, and no more than the table holds.
+        """
+        rows = detections.rows()
+        least, most = self._pictured
+        most = most[detections.cameras]
+        # Where nothing lies beyond the limits all are shown.
+        if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
+            return np.arange(len(rows))
+
+        # Looked at before clipping, which would leave of a box wholly outside a line on the edge.
+        left, top, right, bottom = rows[:, ImageDetections.BOX].T
+        width, height = most[:, ImageDetections.BOX][:, 2:].T
+        shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
+        return np.flatnonzero(shown)[:MAX_DETECTIONS]
+
     def _limited_ego(self, ego: Ego) -> Ego:
         values = ego.speed, ego.yaw_rate, ego.acceleration
         if all(abs(value) <= most for value, most in zip(values, _EGO, strict=True)):
@@ -104,14 +121,11 @@ class Limits:
         if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
             return detections
 
-        # Looked at before clipping, which would leave of a box wholly outside a line on the edge.
         rows = rows.copy()
-        left, top, right, bottom = rows[:, ImageDetections.BOX].T
-        width, height = most[:, ImageDetections.BOX][:, 2:].T
-        shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
         yaw_change = ImageDetections.YAW_CHANGE
         rows[:, yaw_change] = _without_turns(rows[:, yaw_change])
-        return ImageDetections.from_rows(np.clip(rows, least, most)[shown][:MAX_DETECTIONS])
+        kept = self.kept_detections(detections)
+        return ImageDetections.from_rows(np.clip(rows, least, most)[kept])
 
     def _limited_tracks(self, tracks: Tracks) -> Tracks:
         rows = tracks.rows()

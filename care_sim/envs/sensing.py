@@ -125,7 +125,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """Start an episode over a loop and a floor; its first observation."""
         self._running = loop
         self._over = False
-        self._floor = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
+        self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
+        self._floor = self._floors.next()
         return self.observed()
 
     def observed(self) -> Observed:
@@ -142,9 +143,22 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         # A copy, since the caller may write into an action once it is taken.
         self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
+        fired = self._fired(scores)
         # Drawn at every keyframe, used or not: all policies then meet the same floor.
-        floor = self._floor.next()
-        return fired_cells(scores, self.rig.budget, floor if self.conditions.floor else None)
+        self._floor = self._floors.next()
+        return fired
+
+    def would_fire(self, action: Action) -> Cells:
+        """The cells, ascending, that an action would fire at the coming keyframe, which it leaves
+        the coming one.
+
+        Raises InvalidInput for an action of the wrong shape or with values that are not finite.
+        """
+        return self._fired(checked_scores(action, self.rig.grid.shape))
+
+    def _fired(self, scores: Action) -> Cells:
+        floor = self._floor if self.conditions.floor else None
+        return fired_cells(scores, self.rig.budget, floor)
 
     def _fired_as_info(self, fired: Cells) -> Cells | list[int]:
         """The fired cells as `info` holds them, a copy.

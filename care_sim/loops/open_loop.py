@@ -125,9 +125,17 @@ class OpenLoop:
     def true_objects(self, tracks: Tracks) -> Integers:
         """(n,) the numbers of the objects behind tracks, NO_OBJECT for a track without one.
 
-        Truth: for the training alone.
+        Truth: for training and scoring alone.
         """
         return self._track_objects.behind(tracks)
+
+    def true_detected_objects(self) -> Integers:
+        """(n,) the numbers of the objects behind the camera detections of the belief, NO_OBJECT for
+        a false box.
+
+        Truth: for the scoring alone.
+        """
+        return self._arrived.objects[self._limits.kept_detections(self._arrived.detections)]
 
     def full_scan(self) -> Scan:
         """What every cell would return now, before noise and dropout. Truth: for the privileged
@@ -139,12 +147,12 @@ class OpenLoop:
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
-        arrived = self._camera.detect(
+        self._arrived = self._camera.detect(
             shot.seen, shot.sensor.yaw, self._distances(shot), shot.time_s
         )
         ego = self._odometry.reading(shot.ego)
         tracks = self._memory.tracks(shot.sensor)
-        self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)
+        self.belief = self._limits.belief(ego, self._arrived.detections, tracks, ranges)
 
     def _distances(self, shot: Shot) -> Floats:
         """(n,) metres to every object of the film, 0 for those that are not annotated now: else

@@ -1,5 +1,5 @@
-"""How to read the tables of a study: of episodes of the closed loop, and of the protocol of the
-open loop.
+"""How to read the tables of a study: of episodes of the closed loop, of the protocol of the open
+loop, and of its mechanism.
 """
 
 from care_sim.reports.contrasts import GATE_M, GATE_POINTS
@@ -69,4 +69,13 @@ _PROTOCOL_COVERAGE = (
 )
 PROTOCOL_CAPTION = " ".join(
     [_PROTOCOL_READING, _PROTOCOL_MEASURES, _PROTOCOL_WEIGHTS, _PROTOCOL_COVERAGE]
+)
+MECHANISM_CAPTION = (
+    "On the shared belief one policy drives, and every other is asked at each keyframe what it "
+    "would fire there; what happens to an event later is of separate plays. First sightings are "
+    "objects that newly enter the 50 m around the car; they are caught where they are detected at "
+    "their first keyframe. U and M: wedges of unexplained and explained camera boxes. What the "
+    "paper reports was measured on nuScenes with its own detectors, or on its vehicle. The reasons "
+    "for a miss are explained in care_sim.evaluation.miss_reasons: every miss has one, and they "
+    "add up to the misses."
 )

@@ -7,11 +7,17 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
-from care_sim.reports.captions import DIFFERENCES_CAPTION, EPISODES_CAPTION, PROTOCOL_CAPTION
+from care_sim.reports.captions import (
+    DIFFERENCES_CAPTION,
+    EPISODES_CAPTION,
+    MECHANISM_CAPTION,
+    PROTOCOL_CAPTION,
+)
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
+from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.table import Table
@@ -22,7 +28,7 @@ from care_sim.reports.tables.paper_statements import statements
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.paper import NO_COLLISION
-from care_sim.study.results_formats import EPISODES, PLAYS, ResultsFormat
+from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
 from care_sim.study.rows.schema import COUNT, Column, Schema
 from care_sim.study.run_config import Row
@@ -125,6 +131,16 @@ _ALL = (
         PROTOCOL_FIGURES,
         PROTOCOL_CAPTION,
         PLAYS,
+    ),
+    Study(
+        "mechanism",
+        "The mechanism of first sightings",
+        mechanism_tables,
+        _no_figures,
+        mechanism_closing,
+        (),
+        MECHANISM_CAPTION,
+        MECHANISM,
     ),
 )
 # Files of results carry these names, so that none may change.

@@ -1,5 +1,5 @@
-"""The two kinds of results: episodes of the closed loop and plays of the open loop, how each is
-played and how it is kept.
+"""The kinds of results: episodes of the closed loop, plays of the open loop, and plays of it whose
+rays are accounted for; how each is played and how it is kept.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,6 +9,14 @@ from typing import Any
 
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
+from care_sim.study.mechanism_play import (
+    ACCOUNT_COLUMNS,
+    BELIEF_MARKS,
+    BELIEF_SUMS,
+    DIFFERING,
+    RECEIVED,
+    play_mechanism,
+)
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
 from care_sim.study.rows.reading import with_added_columns, with_tags
 from care_sim.study.rows.schema import (
@@ -82,18 +90,25 @@ _EPISODES = Schema(
     },
     _BY_WRITER,
 )
+_COUNTS = Column("lists of whole numbers", least=0)
+_ANY_PLAY = {
+    name: CONDITION_COLUMNS.get(name, TEXT)
+    for name in (*PLAY_FIELDS, "film_hash")
+    if name not in _BY_WRITER
+} | {
+    "budget": SHARE,
+    "keyframes": COUNT,
+    "floor_seed": COUNT,
+    "ttfds": _COUNTS,
+}
+"""What every row of the open loop has."""
+_OF_SOME_PLAYS = {
+    "recording": as_optional(TEXT),
+    "camera_detections": as_optional(TEXT),
+    "presence": as_optional(TEXT),
+}
 _PLAYS = Schema(
-    {
-        name: CONDITION_COLUMNS.get(name, TEXT)
-        for name in (*PLAY_FIELDS, "film_hash")
-        if name not in _BY_WRITER
-    }
-    | {
-        "budget": SHARE,
-        "keyframes": COUNT,
-        "floor_seed": COUNT,
-        "ttfds": Column("lists of whole numbers", least=0),
-    }
+    _ANY_PLAY
     | dict.fromkeys(SUMS, TALLY)
     | {
         "tracks": SUM,
@@ -102,14 +117,17 @@ _PLAYS = Schema(
         "differing_keyframes": as_optional(COUNT),
         "differing_cells": as_optional(COUNT),
     },
-    _BY_WRITER
-    | {
-        "recording": as_optional(TEXT),
-        "camera_detections": as_optional(TEXT),
-        "presence": as_optional(TEXT),
-        "emerging": as_optional(COUNT),
-    },
+    _BY_WRITER | _OF_SOME_PLAYS | {"emerging": as_optional(COUNT)},
     SUMS,
+)
+_MECHANISM = Schema(
+    _ANY_PLAY
+    | dict.fromkeys(ACCOUNT_COLUMNS, _COUNTS)
+    | {"driver": TEXT, "misses": Column("lists of texts")}
+    # The full scan is not asked on the shared belief; what is of that belief, the driver's row has.
+    | dict.fromkeys((*DIFFERING, *BELIEF_SUMS), as_optional(COUNT))
+    | dict.fromkeys((RECEIVED, *BELIEF_MARKS), as_optional(_COUNTS)),
+    _BY_WRITER | _OF_SOME_PLAYS,
 )
 EPISODES = ResultsFormat(
     unit="episodes",
@@ -129,8 +147,18 @@ PLAYS = ResultsFormat(
     listed=listed_plays,
     further_files=lambda rows: {"events.parquet": event_columns(rows)},
 )
-RESULTS_FORMATS = (EPISODES, PLAYS)
-_PARAMETERS = frozenset({*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence"})
+MECHANISM = ResultsFormat(
+    unit="accounted plays",
+    play_batch=play_mechanism,
+    kept_rows=with_tags,
+    file="mechanism.parquet",
+    schema=_MECHANISM,
+    listed=listed_plays,
+)
+RESULTS_FORMATS = (EPISODES, PLAYS, MECHANISM)
+_PARAMETERS = frozenset(
+    {*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence", "driver"}
+)
 
 
 def results_format_in(folder: Path) -> ResultsFormat:

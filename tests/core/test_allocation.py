@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.actions import fired_cells, scores_of
-from care_sim.core.allocation import allocate, budget_cells
+from care_sim.core.allocation import allocate, budget_cells, taken_by_stage
 from care_sim.core.types import Demand
 
 CELLS = 40
@@ -149,6 +149,18 @@ def test_a_floor_of_another_form_is_refused(floor):
 def test_without_floor_the_rest_is_unspent():
     assert allocate(Demand([[1]], [[[2]]]), 10, 0.5).tolist() == [1, 2]
     assert allocate(Demand(), 10, 0.3).tolist() == []
+
+
+@given(demands, budgets, fractions)
+def test_what_the_stages_take_is_what_each_adds_by_the_letter(demand, budget, rho):
+    taken = []
+    in_turns(demand.exploitation, round((1 - rho) * budget), taken)
+    expected = [[*taken]]
+    for layer in demand.layers:
+        before = len(taken)
+        in_turns(layer, budget, taken)
+        expected.append(taken[before:])
+    assert [took.tolist() for took in taken_by_stage(demand, budget, rho)] == expected
 
 
 @given(demands, budgets, fractions, floors)

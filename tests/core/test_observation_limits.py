@@ -251,6 +251,12 @@ def test_a_box_is_cut_at_the_edges_of_its_own_picture_and_one_outside_is_left_ou
     seen = told(detections=boxes, limits=Limits(TWO_SIZES)).detections
     assert seen.boxes.tolist() == [[0, 0, 320, 180], [0, 0, 400, 200], [10, 20, 30, 40]]
     assert (seen.ages[2], seen.yaw_changes[2]) == pytest.approx((MAX_AGE_S, 0.25))
+    assert Limits(TWO_SIZES).kept_detections(detections_of(*boxes)).tolist() == [0, 1, 5]
+
+
+def test_of_too_many_boxes_the_first_are_kept():
+    boxes = detections_of(*(detection() for _ in range(MAX_DETECTIONS + 5)))
+    assert LIMITS.kept_detections(boxes).tolist() == [*range(MAX_DETECTIONS)]
 
 
 def test_a_car_may_go_backwards():

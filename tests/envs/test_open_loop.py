@@ -312,3 +312,35 @@ def test_a_misspelt_argument_of_a_recording_is_told_the_nearest():
 def test_a_film_without_cameras_is_refused_in_one_line():
     with pytest.raises(InvalidInput, match="cameras must be at least one, got none"):
         FilmEnv(Film("bare", (), 1.8, 0.5, ()))
+
+
+@pytest.mark.parametrize("floor", [True, False])
+def test_what_an_action_would_fire_is_what_it_fires_and_asking_changes_nothing(replay, floor):
+    with replay(floor=floor) as env, replay(floor=floor) as unasked:
+        env.reset(seed=3)
+        unasked.reset(seed=3)
+        rng = np.random.default_rng(0)
+        for _ in range(3):
+            asked, action = rng.random((2, 32, 512), np.float32) - np.float32(0.95)
+            asked_cells = env.unwrapped.would_fire(asked)
+            expected = env.unwrapped.would_fire(action)
+            assert not np.array_equal(asked_cells, expected)
+            fired = env.step(action)[-1]["fired"]
+            assert np.array_equal(fired, expected)
+            assert np.array_equal(unasked.step(action)[-1]["fired"], fired)
+
+
+def test_the_floor_that_is_asked_for_is_another_at_every_keyframe(replay):
+    with replay() as env:
+        env.reset(seed=0)
+        first = env.unwrapped.would_fire(NOTHING)
+        assert np.array_equal(env.unwrapped.would_fire(NOTHING), first)
+        assert np.array_equal(env.step(NOTHING)[-1]["fired"], first)
+        assert not np.array_equal(env.unwrapped.would_fire(NOTHING), first)
+
+
+def test_what_is_no_action_would_fire_nothing(replay):
+    with replay() as env:
+        env.reset(seed=0)
+        with pytest.raises(InvalidInput, match="action"):
+            env.unwrapped.would_fire(np.zeros((2, 2), np.float32))

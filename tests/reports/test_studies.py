@@ -35,7 +35,7 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
     with pytest.raises(
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
-        "known: ablate, crowding, faults, paper, protocol, sweep",
+        "known: ablate, crowding, faults, mechanism, paper, protocol, sweep",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -93,8 +93,8 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
 
 
 def test_no_study_is_left_out_above():
-    """The protocol has plays for episodes, and its own test."""
-    assert {*EPISODES, "protocol"} == set(STUDIES)
+    """The protocol and its mechanism have plays for episodes, and their own tests."""
+    assert {*EPISODES, "protocol", "mechanism"} == set(STUDIES)
 
 
 def test_only_the_papers_study_quotes_the_paper_on_collisions():

@@ -18,6 +18,7 @@ from care_sim import cli
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS
 from care_sim.envs import IDS
+from care_sim.study.results_formats import RESULTS_FORMATS
 from care_sim.viewer.recording.entities import ENTITIES
 from tests.helpers.forked import LEARNING, LIBRARIES, Forked
 from tests.helpers.places import ROOT
@@ -195,14 +196,23 @@ def test_the_citation_names_this_version():
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "results").rglob("*s.parquet")), ids=name_of)
+@pytest.mark.parametrize("file", sorted((ROOT / "results").rglob("*.parquet")), ids=name_of)
 def test_every_column_of_the_results_is_explained(file):
-    """By its name in the page, but for the conditions, which have a page of their own."""
+    assert not unexplained(read_schema(file).names)
+
+
+@pytest.mark.parametrize("kind", RESULTS_FORMATS, ids=lambda kind: kind.file)
+def test_every_column_that_is_read_is_explained(kind):
+    assert not unexplained({*kind.schema.needed, *kind.schema.further})
+
+
+def unexplained(names):
+    """Those that the page does not name, but for the conditions, which have a page of their own."""
     rows = re.findall(r"^\| (.*?) \|", (ROOT / "docs" / "columns.md").read_text(), re.M)
     told = set(re.findall(r"`([\w/ .-]+)`", " ".join(rows)))
     unknown = {
         name
-        for name in read_schema(file).names
+        for name in names
         if not {name, re.sub(r"\..*", ".NAME", name)} & told and name not in DEFAULTS
     }
-    assert not {name for name in unknown if not STRATUM_SUM.fullmatch(name)}
+    return {name for name in unknown if not STRATUM_SUM.fullmatch(name)}

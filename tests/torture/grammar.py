@@ -151,6 +151,7 @@ LONG = (
     "faults",
     "crowding",
     "protocol",
+    "mechanism",
     "bench",
     "parity",
     "certify",

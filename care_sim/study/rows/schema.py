@@ -46,6 +46,7 @@ _KINDS: dict[str, Callable[[pa.DataType], bool]] = {
     "whole numbers": pa.types.is_integer,
     "numbers": _is_number,
     "lists of whole numbers": lambda kind: _is_list_of(pa.types.is_integer, kind),
+    "lists of texts": lambda kind: _is_list_of(_is_text, kind),
     _ANY: _is_parameter,
 }
 _WRITTEN = {"text": pa.string(), "true or false": pa.bool_(), "whole numbers": pa.int64()}

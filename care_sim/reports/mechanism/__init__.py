@@ -1,0 +1,1 @@
+"""Tables of the mechanism: the shared belief, and the account of the rays."""
