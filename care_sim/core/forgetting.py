@@ -3,6 +3,7 @@
 The hulls of harmless tracks shrink and are served after the full ones.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,3 +102,16 @@ class Forgetting:
         # The angle of a short arc is its length over its range, which must not be 0.
         angle = self.rules.position_sigma_m / np.maximum(ranges, 1e-9)
         return np.ceil(angle / self._rig.grid.column_width)
+
+
+def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells]) -> int:
+    """How many cells of the full `hulls` none of the sets of `exploitation` asks for.
+
+    A cell that another hull holds on to is not released. The paper gives such a number (Sec. 5.4)
+    and does not define it.
+    """
+    return len(np.setdiff1d(_joined(hulls), _joined(exploitation)))
+
+
+def _joined(sets: Sequence[Cells]) -> Cells:
+    return np.concatenate([np.empty(0, np.int64), *sets])

@@ -108,6 +108,7 @@ _PLAYS = Schema(
         "camera_detections": as_optional(TEXT),
         "presence": as_optional(TEXT),
         "emerging": as_optional(COUNT),
+        "released": as_optional(SUM),
     },
     SUMS,
 )
