@@ -1,6 +1,7 @@
 """Figures of the study of the order of cells: what every policy detects under every order."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -27,101 +28,107 @@ street at the tightest, and at the one from which the reserves converge in the p
 """
 _NOT_DETECTED = 0.0
 """Where a median stands that is not detected, in metres."""
+_BAND = 0.7
+"""Share of the way from one order to the next that the markers of an order take."""
+
+_Tags = Mapping[str, tuple[str, ...]]
+
+
+class _Panel(NamedTuple):
+    """The heights of every policy that was played, one per order, None where it was not; and that
+    of the full scan.
+    """
+
+    title: str
+    heights: Mapping[str, Sequence[float | None]]
+    full: float | None
 
 
 def order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
-    """Median first detection in metres by order, one panel per place."""
+    """Median first detection in metres by order, one panel per place that was played."""
     study = OrderCells(rows)
-    drawn = styles((policy, tags) for policy, tags in study.tags.items() if policy != FULL)
-    figure, panels = _panels(len(_PLACES), "first detection, median (m)")
-    for axes, place in zip(panels, _PLACES, strict=True):
-        _draw(axes, study.orders, _detections(study, place, [*drawn]), drawn, study.tags)
-        full = _detections(study, place, [FULL])[FULL]
-        _ceiling(axes, next((value for value in full if value is not None), None))
-        axes.set_title(f"{place}", loc="left", fontsize=10)
+    panels = [panel for place in _PLACES if (panel := _at(study, place)).heights]
+    if not panels:
+        return {}
+    figure = _figure(panels, study.orders, study.tags, "first detection, median (m)")
     seeds = len({row["seed"] for row in rows})
-    _name(figure, panels[0], f"order of the cells inside a set, {seeds} seeds", study.tags)
+    _head(figure, f"{seeds} seeds (at 0: not detected)")
     return {ORDER_FIGURE: figure}
 
 
 def open_order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     """First-sighting recall in % by order, one panel per budget."""
     study = OrderPlays(rows)
-    drawn = styles(study.tags.items())
-    orders = tuple(study.by_order)
-    if not drawn:
+    panels = [_under(study, budget) for budget in study.budgets]
+    if not panels:
         return {}
-    figure, panels = _panels(len(study.budgets), "first-sighting recall (%)")
-    for axes, budget in zip(panels, study.budgets, strict=True):
-        heights = {
-            policy: [study.level(FIRST_SIGHTING, order, policy, budget) for order in orders]
-            for policy in drawn
-        }
-        _draw(axes, orders, heights, drawn, study.tags)
-        _ceiling(axes, study.level(FIRST_SIGHTING, orders[0], FULL, 1.0))
-        axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
-    _name(figure, panels[0], f"{study.label}: {study.scenes} scenes", study.tags)
+    figure = _figure(panels, tuple(study.by_order), study.tags, "first-sighting recall (%)")
+    _head(figure, f"{study.label}, {study.scenes} scenes")
     return {OPEN_ORDER_FIGURE: figure}
 
 
-def _detections(
-    study: OrderCells, place: Place, policies: Sequence[str]
-) -> dict[str, list[float | None]]:
-    return {
+def _at(study: OrderCells, place: Place) -> _Panel:
+    heights = {
         policy: [_median(study, order, place, policy) for order in study.orders]
-        for policy in policies
+        for policy in study.tags
     }
+    played = {policy: own for policy, own in heights.items() if set(own) != {None}}
+    full = played.pop(FULL, [None])[0]
+    return _Panel(f"{place}", played, full)
 
 
 def _median(study: OrderCells, order: str, place: Place, policy: str) -> float | None:
-    """None where the cell was not played."""
     cell = study.cell(order, USUAL_VARIANT.key(place, policy))
     if cell is None:
         return None
     return _NOT_DETECTED if cell.detection.median is None else cell.detection.median
 
 
-def _panels(count: int, label: str) -> tuple[Figure, Sequence[Axes]]:
-    figure = Figure(figsize=(2.4 + 2.2 * count, 3.8), layout="constrained")
-    panels = figure.subplots(1, count, squeeze=False, sharey=True)[0]
-    panels[0].set_ylabel(label)
-    return figure, panels
+def _under(study: OrderPlays, budget: float) -> _Panel:
+    heights = {
+        policy: [study.level(FIRST_SIGHTING, order, policy, budget) for order in study.by_order]
+        for policy in study.tags
+    }
+    full = study.level(FIRST_SIGHTING, next(iter(study.by_order)), FULL, 1.0)
+    return _Panel(f"budget {percent(budget)}", heights, full)
 
 
-def _draw(
-    axes: Axes,
-    orders: Sequence[str],
-    heights: Mapping[str, Sequence[float | None]],
-    drawn: Mapping[str, Style],
-    tags: Mapping[str, tuple[str, ...]],
-) -> None:
+def _figure(panels: Sequence[_Panel], orders: Sequence[str], tags: _Tags, label: str) -> Figure:
+    figure = Figure(figsize=(2.4 + 2.2 * len(panels), 3.8), layout="constrained")
+    drawn = styles((policy, own) for policy, own in tags.items() if policy != FULL)
+    row = figure.subplots(1, len(panels), squeeze=False, sharey=True)[0]
+    for axes, panel in zip(row, panels, strict=True):
+        _draw(axes, panel, drawn, tags)
+        axes.set_xticks(range(len(orders)), orders, rotation=45, ha="right")
+        axes.tick_params(labelsize=8)
+        bare_axes(axes, "0.93")
+    row[0].set_ylabel(label)
+    # All panels share their heights, and the markers of all decide them.
+    row[0].set_ylim(bottom=0)
+    figure.supxlabel("\n".join(tag_notes(tags.values())), fontsize=9)
+    figure.legend(
+        *row[0].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
+    )
+    return figure
+
+
+def _draw(axes: Axes, panel: _Panel, drawn: Mapping[str, Style], tags: _Tags) -> None:
     """Markers side by side at every order: orders have no sequence, so that no line joins them."""
-    width = 0.7 / max(len(drawn), 1)
+    width = _BAND / len(drawn)
     for number, (policy, look) in enumerate(drawn.items()):
         shift = width * (number - (len(drawn) - 1) / 2)
-        known = {
-            place + shift: height
-            for place, height in enumerate(heights[policy])
-            if height is not None
-        }
-        axes.plot(
-            list(known),
-            list(known.values()),
-            look.marker,
-            color=look.colour,
-            markersize=6,
-            label=marked(policy, tags[policy]),
-        )
-    axes.set_xticks(range(len(orders)), orders, rotation=45, ha="right")
-    axes.set_ylim(bottom=0)
-    axes.tick_params(labelsize=8)
-    bare_axes(axes, "0.93")
-
-
-def _ceiling(axes: Axes, height: float | None) -> None:
-    if height is not None:
+        heights = enumerate(panel.heights.get(policy, ()))
+        known = {place + shift: height for place, height in heights if height is not None}
+        # Matplotlib finds no room for a curve that has no point and is not clipped.
+        if known:
+            (markers,) = axes.plot(
+                list(known), list(known.values()), look.marker, color=look.colour, markersize=6
+            )
+            markers.set(clip_on=False, label=marked(policy, tags[policy]))
+    axes.set_title(panel.title, loc="left", fontsize=10)
+    if panel.full is not None:
         axes.axhline(
-            height,
+            panel.full,
             color=FULL_STYLE.colour,
             linestyle=FULL_STYLE.line,
             linewidth=1.2,
@@ -129,10 +136,5 @@ def _ceiling(axes: Axes, height: float | None) -> None:
         )
 
 
-def _name(figure: Figure, axes: Axes, title: str, tags: Mapping[str, tuple[str, ...]]) -> None:
-    figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-    if notes := tag_notes(tags.values()):
-        figure.supxlabel("\n".join(notes), fontsize=9)
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
-    )
+def _head(figure: Figure, text: str) -> None:
+    figure.suptitle(f"order of the cells inside a set: {text}", x=0.01, ha="left", fontsize=10)

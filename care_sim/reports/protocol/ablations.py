@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from care_sim.base.errors import percent
+from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.formatting import interval
 from care_sim.reports.protocol.cells import PlayCells
@@ -44,9 +45,9 @@ _COLUMNS = (
 )
 _LEVELS = tuple(name for name in _COLUMNS if name != "difference")
 _READING = (
-    "Differences in points of recall, of the scenes that both have. Below 20 m: overall recall in "
-    "the paper's near field. Released: cells of the forecasts' full hulls that exploitation does "
-    "not ask for, mean over keyframes."
+    "Differences in points of recall, with intervals over scenes, none of fewer than "
+    f"{FEWEST_PAIRS}. Below 20 m: overall recall in the paper's near field. Released: cells of the "
+    "forecasts' full hulls that exploitation does not ask for, mean over keyframes."
 )
 
 
@@ -70,9 +71,8 @@ class _AblationPlays:
         self.cells = PlayCells(rows)
         self.source = rows[0]["source"]
         self.budgets = sorted({row["budget"] for row in rows if row["policy"] != FULL})
-        self.joined = [
-            name for name in {row["policy"]: 0 for row in rows} if name not in OPEN_POLICIES
-        ]
+        played = dict.fromkeys(row["policy"] for row in rows)
+        self.joined = [policy for policy in played if policy not in OPEN_POLICIES]
 
     def table(self, ablation: Ablation) -> Table:
         """All blocks of an ablation, and the paper's sentences on it."""
@@ -144,12 +144,12 @@ class _Block:
         theirs = usual if first else level.for_others().key(self.place, self.base)
         entries = []
         for _, ratio, within in _MEASURES:
-            entries.append(written(ratio, self.cells.level(ratio, ours, within)) if first else "")
+            value = self.cells.level(ratio, ours, within) if first else None
             # The usual level is not compared with itself.
-            same = ours == theirs
-            entries.append(
-                "" if same else interval(self.cells.difference(ratio, ours, theirs, within))
-            )
+            change = None
+            if ours != theirs:
+                change = self.cells.difference(ratio, ours, theirs, within)
+            entries += [written(ratio, value), interval(change)]
         released = self.cells.mean("released", ours) if first else None
         name = f"{level.label} (usual)" if ours == usual else level.label
         return (name, *entries, rounded(released))

@@ -15,12 +15,12 @@ class PlayCells:
     """What the plays of every cell found, of all objects or `within` one stratum."""
 
     def __init__(self, rows: Sequence[Row]):
-        self.settings = {plays.setting: plays for plays in plays_by_setting(rows)}
+        self._plays = {plays.setting: plays for plays in plays_by_setting(rows)}
 
     def tallies(self, key: Key, within: str = "") -> Tallies:
         """The mean tally over floor seeds of every scene; none of a cell that was not played."""
         setting, policy, budget = key
-        plays = self.settings.get(setting)
+        plays = self._plays.get(setting)
         return plays.tallies(policy, budget, within) if plays else {}
 
     def level(self, ratio: Ratio, key: Key, within: str = "") -> float | None:
@@ -36,7 +36,7 @@ class PlayCells:
     def mean(self, column: str, key: Key) -> float | None:
         """A column of the plays; None where not all of them tell it."""
         setting, policy, budget = key
-        plays = self.settings.get(setting)
+        plays = self._plays.get(setting)
         rows = plays.rows(policy, budget) if plays else ()
         told = [row[column] for row in rows if row.get(column) is not None]
         return float(np.mean(told)) if told and len(told) == len(rows) else None

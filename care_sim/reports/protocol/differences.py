@@ -200,9 +200,7 @@ class SceneThird:
 
 
 def difference_between(ratio: Ratio, ours: Tallies, theirs: Tallies) -> MeasuredDifference | None:
-    """`ours` less `theirs`, whatever plays they are of; without an interval of fewer than five
-    scenes, None without a shared one.
-    """
+    """`ours` less `theirs`, paired by scene; None without a shared one."""
     found = scene_contrast(ratio, ours, theirs)
     if found is None:
         return None

@@ -5,13 +5,14 @@ paper's statements, order by order.
 from collections.abc import Iterator, Sequence
 
 from care_sim.base.errors import percent
+from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.order_verdicts import Verdict, Verdicts, on_mirrored_order, verdict_tables
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.differences import MeasuredDifference, difference_between
 from care_sim.reports.protocol.formatting import claim_in_short, verdict, written
-from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, on_intervals, played
+from care_sim.reports.protocol.notes import played
 from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
@@ -20,6 +21,7 @@ from care_sim.study.run_config import FULL, Row
 
 _RATIOS = (FIRST_SIGHTING, OVERALL)
 _NAMES = ("policy", "budget")
+_INTERVALS = f"In points, with intervals over scenes, none of fewer than {FEWEST_PAIRS}."
 
 
 class OrderPlays:
@@ -35,6 +37,11 @@ class OrderPlays:
         self.label = first.setting.label
         self.scenes = len(first.scenes)
         self.played = played(first)
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The orders that the usual one is compared with."""
+        return tuple(order for order in self.by_order if order != BASE_ORDER)
 
     def level(self, ratio: Ratio, order: str, policy: str, budget: float) -> float | None:
         """A recall in %."""
@@ -58,20 +65,19 @@ def order_tables(rows: Sequence[Row]) -> list[Table]:
     if not study.tags:
         return []
     notes = (study.played, *tag_notes(study.tags.values()))
-    columns = (*_NAMES, *study.by_order)
     return [
         Table(
             f"{study.label}: recall by order of cells, %",
-            columns,
+            (*_NAMES, *study.by_order),
             tuple(_levels(study)),
             notes,
             whole=_NAMES,
         ),
         Table(
             f"{study.label}: recall by order of cells, minus {BASE_ORDER}",
-            columns,
+            (*_NAMES, *study.others),
             tuple(_changes(study)),
-            (UNITS_OF_DIFFERENCES, *on_intervals(_all_changes(study)), *notes),
+            (_INTERVALS, *notes),
             whole=_NAMES,
         ),
         *verdict_tables(f"{study.label}: the paper's statements by order of cells", verdicts(rows)),
@@ -120,15 +126,8 @@ def _changes(study: OrderPlays) -> Iterator[tuple[str, ...]]:
     for ratio in _RATIOS:
         yield (ratio.name,)
         for policy, budget, names in _cells(study):
-            changes = (study.change(ratio, order, policy, budget) for order in study.by_order)
+            changes = (study.change(ratio, order, policy, budget) for order in study.others)
             yield (*names, *map(interval, changes))
-
-
-def _all_changes(study: OrderPlays) -> Iterator[MeasuredDifference | None]:
-    for ratio in _RATIOS:
-        for policy, budget, _ in _cells(study):
-            for order in study.by_order:
-                yield study.change(ratio, order, policy, budget)
 
 
 def _cells(study: OrderPlays) -> Iterator[tuple[str, float, tuple[str, str]]]:

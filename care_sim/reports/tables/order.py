@@ -34,6 +34,11 @@ class OrderCells:
         }
 
     @property
+    def others(self) -> tuple[str, ...]:
+        """The orders that the usual one is compared with."""
+        return tuple(order for order in self.orders if order != BASE_ORDER)
+
+    @property
     def keys(self) -> list[Key]:
         """Of all cells, settings together and by budget."""
         return list(dict.fromkeys(key for cells in self._cells.values() for key in cells))
@@ -54,19 +59,18 @@ def order_tables(rows: Sequence[Row]) -> list[Table]:
     """
     study = OrderCells(rows)
     notes = (_FULL, *tag_notes(study.tags.values()))
-    columns = (*_NAMES, *study.orders)
     return [
         *verdict_tables("The paper's statements by order of cells", verdicts(rows)),
         Table(
             "First detection by order of cells, median, m",
-            columns,
+            (*_NAMES, *study.orders),
             tuple(_levels(study)),
             notes,
             whole=_NAMES,
         ),
         Table(
             f"First detection by order of cells, minus {BASE_ORDER}, m",
-            columns,
+            (*_NAMES, *study.others),
             tuple(_changes(study)),
             notes,
             whole=_NAMES,
@@ -100,7 +104,7 @@ def _levels(study: OrderCells) -> Iterator[tuple[str, ...]]:
 def _changes(study: OrderCells) -> Iterator[tuple[str, ...]]:
     budgeted = [key for key in study.keys if key[1] != FULL]
     for key, names in _named(study, budgeted):
-        changes = [study.change(order, key) for order in study.orders] if key else []
+        changes = [study.change(order, key) for order in study.others] if key else []
         yield (*names, *map(interval, changes))
 
 

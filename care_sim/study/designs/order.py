@@ -47,9 +47,8 @@ def rows_by_order(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """The rows of every order that was played, with the full scans, as if no order had been asked
     for: the rows of the paper's study once for each.
     """
-    # The full scan alone stands under the usual order.
-    played = {row["cell_order"] for row in rows if row["policy"] != FULL} or {BASE_ORDER}
-    return {
+    played = {row["cell_order"] for row in rows if row["policy"] != FULL}
+    by_order = {
         order: [
             row | {"cell_order": AS_DEMANDED}
             for row in rows
@@ -58,3 +57,5 @@ def rows_by_order(rows: Sequence[Row]) -> dict[str, list[Row]]:
         for order in ORDERS
         if order in played
     }
+    # Rows of no order, as of the full scan alone, stand under the usual one.
+    return by_order or {BASE_ORDER: [*rows]}

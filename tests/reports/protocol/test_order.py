@@ -34,15 +34,17 @@ def test_recalls_stand_by_order_with_the_full_scan_beside():
 
 def test_differences_are_those_to_the_usual_order_scene_by_scene():
     table = tables()["recall by order of cells, minus rows-down"]
+    assert table.columns == ("policy", "budget", "rows-up")
     line = table.rows[1]
-    assert line == ("history", "3%", "+0.0 [0.0,0.0]", "+10.0 [10.0,10.0]")
-    assert isinstance(line[3], Bold)
+    assert line == ("history", "3%", "+10.0 [10.0,10.0]")
+    assert isinstance(line[2], Bold)
 
 
 def test_the_papers_statements_are_judged_under_every_order():
     table = tables()["the paper's statements by order of cells"]
     (line,) = (row for row in table.rows if row[0] == CLAIM)
-    assert line == (CLAIM, "met", "not met") or line == (CLAIM, "met", "undecided")
+    # A difference of exactly nothing bears no sign out.
+    assert line == (CLAIM, "met", "undecided")
     assert isinstance(line[2], Bold)
     assert all("3%" not in row[0] for row in table.rows)
     measured = tables()["the paper's statements by order of cells, what was measured"]
