@@ -104,14 +104,19 @@ class Forgetting:
         return np.ceil(angle / self._rig.grid.column_width)
 
 
-def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells]) -> int:
-    """How many cells of the full `hulls` none of the sets of `exploitation` asks for.
+def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells], size: int) -> int:
+    """How many cells of the full `hulls` none of the sets of `exploitation` asks for, in a grid of
+    so many cells.
 
     A cell that another hull holds on to is not released. The paper gives such a number (Sec. 5.4)
     and does not define it.
     """
-    return len(np.setdiff1d(_joined(hulls), _joined(exploitation)))
+    released = np.zeros(size, np.bool_)
+    released[_joined(hulls)] = True
+    released[_joined(exploitation)] = False
+    return int(np.count_nonzero(released))
 
 
 def _joined(sets: Sequence[Cells]) -> Cells:
-    return np.concatenate([np.empty(0, np.int64), *sets])
+    # A set without cells may be of any type.
+    return np.concatenate([np.empty(0, np.int64), *sets], dtype=np.int64, casting="unsafe")

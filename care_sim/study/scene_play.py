@@ -172,7 +172,9 @@ def _released(policy: Policy, belief: Belief) -> int | None:
     """The cells released at the keyframe that was just played; None where no sets were demanded."""
     if policy.demanded is None:
         return None
-    return released_cells(policy.rig.hulls(belief.tracks.boxes), policy.demanded.exploitation)
+    rig = policy.rig
+    hulls = rig.hulls(belief.tracks.boxes)
+    return released_cells(hulls, policy.demanded.exploitation, rig.grid.size)
 
 
 def without_events(row: Row) -> Row:

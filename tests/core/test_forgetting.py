@@ -139,4 +139,4 @@ def test_a_track_needs_two_frames_before_it_can_be_forgotten(tracks_at):
 )
 def test_released_is_what_no_set_asks_for(hulls, demanded, released):
     cells = [np.array(hull) for hull in hulls]
-    assert released_cells(cells, [np.array(own) for own in demanded]) == released
+    assert released_cells(cells, [np.array(own) for own in demanded], 10) == released

@@ -107,6 +107,11 @@ def test_no_study_is_left_out_above():
     assert {*EPISODES, *plays} == set(STUDIES)
 
 
+def test_the_study_of_orders_closes_with_what_hangs_on_the_numbering():
+    rows = [row(config, 9.0) for config in order.order_study([0])]
+    assert "under rows-down and under rows-up" in STUDIES["order"].closing(rows)[-1]
+
+
 def test_only_the_papers_study_quotes_the_paper_on_collisions():
     assert "Paper" in STUDIES["paper"].closing(STUDY)[0]
     assert "Paper" not in STUDIES["sweep"].closing(STUDY)[0]
