@@ -76,7 +76,15 @@ COMMANDS = {
     "ablate": CommandEntry(
         "ablate",
         "Ablate",
-        "Vary one thing at a time as the paper's ablations do, one table per thing varied.",
+        "Vary one thing at a time as the paper's ablations do, one table per thing varied; "
+        "with --source in the open loop, on every fourth scene.",
+    ),
+    "order": CommandEntry(
+        "order",
+        "Order",
+        "Play the paper's closed-loop study under every order of the cells inside a set, 279 "
+        "configurations per seed, or with --source the first-sighting protocol, and list what the "
+        "paper says order by order.",
     ),
     "faults": CommandEntry(
         "faults",
@@ -150,7 +158,7 @@ COMMANDS = {
     ),
 }
 
-_STUDIES = ("reproduce", "sweep", "ablate", "faults", "crowding", "protocol", "mechanism")
+_STUDIES = ("reproduce", "sweep", "ablate", "order", "faults", "crowding", "protocol", "mechanism")
 _AGENTS = ("train ppo", "train sac", "train recurrent-ppo")
 _KEPT = {
     **dict.fromkeys(_STUDIES, "; what is finished is kept, the same command goes on from there"),

@@ -6,7 +6,7 @@ from pathlib import Path
 from care_sim.base.bounds import bounded
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.play_options import PlayOptions
-from care_sim.commands.shared.selection import in_turn, playable
+from care_sim.commands.shared.selection import check_values, in_turn, playable
 from care_sim.commands.shared.study_command import StudyCommand
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.play_config import play_grid
@@ -55,9 +55,7 @@ class Protocol(StudyCommand, PlayOptions):
 
     def __call__(self) -> int:
         """Run it."""
-        for axis in ("policies", "budgets"):
-            if not getattr(self, axis):
-                raise InvalidInput(f"--{axis} needs at least one value")
+        check_values(self, "policies", "budgets")
         source = self.scene_source()
         common = self.common() | {"presence": self.presence}
         scenes = chosen_scenes(source.scenes(), self.scenes)

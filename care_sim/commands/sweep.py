@@ -9,7 +9,7 @@ import tyro
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.episode_studies import EpisodeStudy
 from care_sim.commands.shared.options import DEFAULT_OPTIONS, Options, seeds_of
-from care_sim.commands.shared.selection import expanded, in_turn, playable
+from care_sim.commands.shared.selection import check_values, expanded, in_turn, playable
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import grid
 
@@ -36,9 +36,7 @@ class Sweep(EpisodeStudy):
 
     def __call__(self) -> int:
         """Run it."""
-        for axis in ("scenarios", "policies", "budgets", "seeds"):
-            if not getattr(self, axis):
-                raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
+        check_values(self, "scenarios", "policies", "budgets", "seeds")
         scenarios = expanded(self.scenarios, SCENARIOS)
         common = self.conditions.arguments()
         # A policy that cannot be made for one seed and budget is left out, and the others play.

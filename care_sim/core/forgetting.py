@@ -3,6 +3,7 @@
 The hulls of harmless tracks shrink and are served after the full ones.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,3 +102,21 @@ class Forgetting:
         # The angle of a short arc is its length over its range, which must not be 0.
         angle = self.rules.position_sigma_m / np.maximum(ranges, 1e-9)
         return np.ceil(angle / self._rig.grid.column_width)
+
+
+def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells], size: int) -> int:
+    """How many cells of the full `hulls` none of the sets of `exploitation` asks for, in a grid of
+    so many cells.
+
+    A cell that another hull holds on to is not released. The paper gives such a number (Sec. 5.4)
+    and does not define it.
+    """
+    released = np.zeros(size, np.bool_)
+    released[_joined(hulls)] = True
+    released[_joined(exploitation)] = False
+    return int(np.count_nonzero(released))
+
+
+def _joined(sets: Sequence[Cells]) -> Cells:
+    # A set without cells may be of any type.
+    return np.concatenate([np.empty(0, np.int64), *sets], dtype=np.int64, casting="unsafe")

@@ -16,21 +16,30 @@ from care_sim.reports.captions import (
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
+from care_sim.reports.figures.order import (
+    OPEN_ORDER_FIGURE,
+    ORDER_FIGURE,
+    open_order_figures,
+    order_figures,
+)
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
+from care_sim.reports.protocol import ablations as open_ablations
+from care_sim.reports.protocol import order as open_order
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
+from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
-from care_sim.study.rows.schema import COUNT, Column, Schema
+from care_sim.study.rows.schema import COUNT, TEXT, Column, Schema
 from care_sim.study.run_config import Row
 
 
@@ -77,6 +86,13 @@ def _paper_closing(rows: Sequence[Row]) -> list[str]:
     return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
 
 
+def _order_closing(rows: Sequence[Row]) -> list[str]:
+    return [collisions(rows), *order_closing(rows)]
+
+
+_ORDER_COLUMNS = {"cell_order": TEXT}
+
+
 _ALL = (
     Study(
         "sweep",
@@ -121,6 +137,36 @@ _ALL = (
         _sweep_closing,
         FAULT_FIGURES,
         DIFFERENCES_CAPTION,
+    ),
+    Study(
+        "order",
+        "Order of cells in the closed loop",
+        order_tables,
+        order_figures,
+        _order_closing,
+        (ORDER_FIGURE,),
+        columns=_ORDER_COLUMNS,
+    ),
+    Study(
+        "order-open-loop",
+        "Order of cells in the open loop",
+        open_order.order_tables,
+        open_order_figures,
+        open_order.order_closing,
+        (OPEN_ORDER_FIGURE,),
+        PROTOCOL_CAPTION,
+        PLAYS,
+        _ORDER_COLUMNS,
+    ),
+    Study(
+        "ablate-open-loop",
+        "Ablations of the open loop",
+        open_ablations.ablation_tables,
+        _no_figures,
+        open_ablations.ablation_closing,
+        (),
+        PROTOCOL_CAPTION,
+        PLAYS,
     ),
     Study(
         "protocol",

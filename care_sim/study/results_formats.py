@@ -117,7 +117,7 @@ _PLAYS = Schema(
         "differing_keyframes": as_optional(COUNT),
         "differing_cells": as_optional(COUNT),
     },
-    _BY_WRITER | _OF_SOME_PLAYS | {"emerging": as_optional(COUNT)},
+    _BY_WRITER | _OF_SOME_PLAYS | {"emerging": as_optional(COUNT), "released": as_optional(SUM)},
     SUMS,
 )
 _MECHANISM = Schema(

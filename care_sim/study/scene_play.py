@@ -10,6 +10,8 @@ import numpy as np
 
 import care_sim
 from care_sim.base.portable_hash import portable_bytes
+from care_sim.core.belief import Belief
+from care_sim.core.forgetting import released_cells
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained
 from care_sim.evaluation.allocation_differences import AllocationDifference, allocation_difference
@@ -17,6 +19,7 @@ from care_sim.evaluation.recall import SceneScore, Tally
 from care_sim.evaluation.strata import strata
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoopKeyframe
+from care_sim.policies.base import Policy
 from care_sim.study.episode_play import peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig
 from care_sim.study.run_config import FULL, REFERENCE, Row
@@ -51,14 +54,16 @@ def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
 class PlayRecord:
     """What happened in a play.
 
-    `tracks` and `explained` are means per keyframe: tracks held, and camera detections that a
-    forecast explains. `wall_s` is in seconds.
+    `tracks`, `explained` and `released` are means per keyframe: tracks held, camera detections that
+    a forecast explains, and cells of the full hulls that exploitation does not ask for; `released`
+    is None of a policy that demands no sets. `wall_s` is in seconds.
     """
 
     score: SceneScore
     keyframes: list[OpenLoopKeyframe]
     tracks: float
     explained: float
+    released: float | None
     wall_s: float
 
     @property
@@ -88,9 +93,9 @@ class ScenePlayer:
         same film was played, and `episode_hash`, over what was fired and detected; the fields of
         `Tally`, those of every stratum as `KIND/STRATUM/FIELD`, `ttfds` and `sightings` of the
         events; `emerging`, by how many events the two presences differ
-        (`care_sim.evaluation.sightings`); `tracks` and `explained`; `differing_keyframes` and
-        `differing_cells` against the reference; `keyframes`, `peak_rss_mb`, and `wall_s` with the
-        share of the film's that falls to one of so many plays.
+        (`care_sim.evaluation.sightings`); `tracks`, `explained` and `released`;
+        `differing_keyframes` and `differing_cells` against the reference; `keyframes`,
+        `peak_rss_mb`, and `wall_s` with the share of the film's that falls to one of so many plays.
         """
         record = self._record(config)
         score = record.score
@@ -108,6 +113,7 @@ class ScenePlayer:
             "emerging": len(score.sightings.emerging),
             "tracks": record.tracks,
             "explained": record.explained,
+            "released": record.released,
             **self._difference(config, record),
             "wall_s": record.wall_s + self._film_s / sharers,
             "peak_rss_mb": peak_rss_mb(),
@@ -141,6 +147,7 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
         policy.reset()
         loop = env.loop
         counts = []
+        released = []
         while not loop.over:
             belief = loop.belief
             # Before the step: what the policy knew when it chose its cells.
@@ -151,10 +158,23 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
                 )
             )
             observation, *_ = env.step(policy(observation))
+            if (count := _released(policy, belief)) is not None:
+                released.append(count)
         score = env.score
         keyframes = env.keyframes
     tracks, explanations = np.mean(counts, axis=0).tolist()
-    return PlayRecord(score, keyframes, tracks, explanations, time.perf_counter() - started)
+    mean_released = float(np.mean(released)) if released else None
+    wall_s = time.perf_counter() - started
+    return PlayRecord(score, keyframes, tracks, explanations, mean_released, wall_s)
+
+
+def _released(policy: Policy, belief: Belief) -> int | None:
+    """The cells released at the keyframe that was just played; None where no sets were demanded."""
+    if policy.demanded is None:
+        return None
+    rig = policy.rig
+    hulls = rig.hulls(belief.tracks.boxes)
+    return released_cells(hulls, policy.demanded.exploitation, rig.grid.size)
 
 
 def without_events(row: Row) -> Row:

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from care_sim.core.forgetting import Forgetting, ForgettingRules
+from care_sim.core.forgetting import Forgetting, ForgettingRules, released_cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
 
@@ -122,3 +122,21 @@ def test_no_tracks_no_margins(tracks_at):
 def test_a_track_needs_two_frames_before_it_can_be_forgotten(tracks_at):
     margins, low = forgetting().advance(tracks_at(("pedestrian", 45, 0, 0, 0), hits=1), Ego(8.0))
     assert (margins.tolist(), low.tolist()) == ([2], [False])
+
+
+@pytest.mark.parametrize(
+    ("hulls", "demanded", "released"),
+    [
+        ([], [], 0),
+        ([[1, 2, 3], [7, 8]], [[1, 2, 3], [7, 8]], 0),
+        ([[1, 2, 3], [7, 8]], [[7, 8], [2]], 2),
+        # What another hull holds on to is not released, and nothing is released twice.
+        ([[1, 2, 3], [3, 4]], [[2], [3, 4]], 1),
+        ([[1, 2], [2, 3]], [], 3),
+        # Sets may ask for more than the hulls.
+        ([[1, 2]], [[1, 2, 9]], 0),
+    ],
+)
+def test_released_is_what_no_set_asks_for(hulls, demanded, released):
+    cells = [np.array(hull) for hull in hulls]
+    assert released_cells(cells, [np.array(own) for own in demanded], 10) == released

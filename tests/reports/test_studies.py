@@ -10,7 +10,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
-from care_sim.study.designs import ablations, crowding, faults, paper
+from care_sim.study.designs import ablations, crowding, faults, order, paper
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
@@ -35,12 +35,20 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
     with pytest.raises(
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
-        "known: ablate, crowding, faults, mechanism, paper, protocol, sweep",
+        "known: ablate, ablate-open-loop, crowding, faults, mechanism, order, order-open-loop, "
+        "paper, protocol, sweep",
     ):
         study_of(tmp_path / "episodes.parquet")
 
 
-EPISODES = {"sweep": STUDY, "paper": STUDY, "crowding": CROWD, "ablate": STUDY, "faults": STUDY}
+EPISODES = {
+    "sweep": STUDY,
+    "paper": STUDY,
+    "crowding": CROWD,
+    "ablate": STUDY,
+    "faults": STUDY,
+    "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
+}
 
 
 @pytest.mark.parametrize(("name", "rows"), EPISODES.items())
@@ -78,6 +86,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
     played = {
         "ablate": ablations.ablation_study(range(2)),
         "faults": faults.fault_study(range(2)),
+        "order": order.order_study(range(2)),
         "crowding": crowding.crowding_study(range(2)),
         "paper": paper.paper_study(range(2)),
     }
@@ -93,8 +102,14 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
 
 
 def test_no_study_is_left_out_above():
-    """The protocol and its mechanism have plays for episodes, and their own tests."""
-    assert {*EPISODES, "protocol", "mechanism"} == set(STUDIES)
+    """Studies of the open loop have plays for episodes, and their own tests."""
+    plays = {"protocol", "mechanism", "order-open-loop", "ablate-open-loop"}
+    assert {*EPISODES, *plays} == set(STUDIES)
+
+
+def test_the_study_of_orders_closes_with_what_hangs_on_the_numbering():
+    rows = [row(config, 9.0) for config in order.order_study([0])]
+    assert "under rows-down and under rows-up" in STUDIES["order"].closing(rows)[-1]
 
 
 def test_only_the_papers_study_quotes_the_paper_on_collisions():

@@ -148,6 +148,7 @@ TINY = {
 LONG = (
     "reproduce",
     "ablate",
+    "order",
     "faults",
     "crowding",
     "protocol",

@@ -15,11 +15,9 @@ _DEFAULT_CONDITIONS = Conditions()
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlayOptions:
-    """Options that all plays share."""
+class SourceOptions:
+    """Which of a source's scenes there are, and what their camera saw."""
 
-    source: str = "streets"
-    """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
     split: str | None = None
     """For streets: evaluation (150 scenes) or calibration (20). For nuScenes: val, all, or one of
     splits.json.
@@ -28,6 +26,23 @@ class PlayOptions:
     """For nuScenes: the version, where the folder holds several."""
     camera_detections: Path | None = None
     """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
+
+    def source_named(self, text: str) -> Source:
+        """The source that a text and the options name. Raises InvalidInput where there is none."""
+        return source_of(
+            text,
+            split=self.split,
+            version=self.version,
+            camera_detections=self.camera_detections,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlayOptions(SourceOptions):
+    """Options that all plays share."""
+
+    source: str = "streets"
+    """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
     detector: str = "returns"
     """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
     package.
@@ -42,12 +57,7 @@ class PlayOptions:
 
     def scene_source(self) -> Source:
         """The source that the options name. Raises InvalidInput where there is none."""
-        return source_of(
-            self.source,
-            split=self.split,
-            version=self.version,
-            camera_detections=self.camera_detections,
-        )
+        return self.source_named(self.source)
 
     def common(self) -> dict[str, Any]:
         """Conditions and parameters that all plays share, as fields of

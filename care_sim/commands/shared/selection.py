@@ -18,6 +18,13 @@ def expanded(names: Sequence[str], known: Collection[str]) -> list[str]:
     )
 
 
+def check_values(command: object, *axes: str) -> None:
+    """Raise InvalidInput where an option of the command that takes several values has none."""
+    for axis in axes:
+        if not getattr(command, axis):
+            raise InvalidInput(f"--{axis.replace('_', '-')} needs at least one value")
+
+
 def makeable(
     policies: Iterable[str], make: Callable[[str], object]
 ) -> tuple[list[str], dict[str, str]]:

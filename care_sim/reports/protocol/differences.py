@@ -193,11 +193,14 @@ class SceneThird:
         # The thirds are those of CARE at this budget for both policies, so that each scene is
         # compared with itself.
         if self.which != DENSE_LESS_SPARSE:
-            return _among(self.ratio, {name: ours[name] for name in groups[self.which]}, theirs)
+            return difference_between(
+                self.ratio, {name: ours[name] for name in groups[self.which]}, theirs
+            )
         return _dense_less_sparse(self.ratio, ours, theirs, groups)
 
 
-def _among(ratio: Ratio, ours: Tallies, theirs: Tallies) -> MeasuredDifference | None:
+def difference_between(ratio: Ratio, ours: Tallies, theirs: Tallies) -> MeasuredDifference | None:
+    """`ours` less `theirs`, paired by scene; None without a shared one."""
     found = scene_contrast(ratio, ours, theirs)
     if found is None:
         return None
@@ -215,7 +218,7 @@ def _dense_less_sparse(
     # The two thirds are measured only to ask whether each has scenes enough for an interval of its
     # own. Where one has not, that of the gap says nothing.
     thirds = [
-        _among(ratio, {name: ours[name] for name in groups[which]}, theirs)
+        difference_between(ratio, {name: ours[name] for name in groups[which]}, theirs)
         for which in ("dense", "sparse")
     ]
     enough = all(third and third.interval for third in thirds)

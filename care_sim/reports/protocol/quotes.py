@@ -57,6 +57,21 @@ GUARD = (
     "while releasing 24 cells per keyframe. At 20% even the default pays 3.1 points [-4.7,-1.5], "
     "so forgetting is a tool for the tightest budgets."
 )
+RESERVE = (
+    "The reserve fraction needs no tuning: first-sighting recall moves by at most one point across "
+    "the swept fractions, since the exploitation cap protects tracked objects and unused reserve "
+    "returns to the floor."
+)
+KNOBS = (
+    "The forgetting knobs are insensitive on first sightings: the guard scale, the localization "
+    "margin, and the four decay schedules stay within the subset noise, because at urban speeds "
+    "the guard of Eq. (3) already covers most nearby objects."
+)
+MARGIN = (
+    "Halving or doubling the angular margin keeps the paired gap between 3.3 and 6.3 points, and "
+    "raising the 2D confidence threshold from 0.25 to 0.5 costs one point at the tightest budget "
+    "and nothing above; all three sweeps leave the policy ordering unchanged and are descriptive."
+)
 LEARNED = (
     "The learned scorer matches CARE on first-sighting recall but loses 0.6 to 2.4 points of "
     "overall recall at every budget (Table 1)."

@@ -36,9 +36,13 @@ class Statement:
     measured: str
     agrees: bool
 
+    @property
+    def verdict(self) -> str:
+        """Whether they agree, in a word."""
+        return "agrees" if self.agrees else "DIFFERS"
+
     def __str__(self) -> str:
-        verdict = "agrees" if self.agrees else "DIFFERS"
-        return f"{verdict}: {self.text}. Paper: {self.paper}. Here: {self.measured}."
+        return f"{self.verdict}: {self.text}. Paper: {self.paper}. Here: {self.measured}."
 
 
 def statements(rows: Sequence[Row]) -> list[Statement]:

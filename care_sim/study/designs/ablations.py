@@ -1,13 +1,19 @@
-"""The paper's ablations (Sec. 5.4) in the closed loop: one thing is varied at a time."""
+"""The paper's ablations (Sec. 5.4), in the closed and in the open loop: one thing is varied at a
+time.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS
 from care_sim.core.forgetting import ForgettingRules
+from care_sim.sources.scenes import Scene, Source
 from care_sim.study.designs.variants import USUAL_VARIANT, Place, Variant
 from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.play_config import PlayConfig
+from care_sim.study.run_config import FULL
 
 ABLATION_PLACES = (
     Place("dartout", 0.03),
@@ -20,6 +26,7 @@ tightest and below: with more the reserve holds every wedge whole, and nothing t
 could show.
 """
 _REFERENCES = ("history", "all-camera")
+_USUAL_ORDERS = (AS_DEMANDED, "rows-down")
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,10 @@ class Ablation:
     def varies_conditions(self) -> bool:
         """Whether any policy feels what is varied."""
         return any(level.changes for level in self.levels)
+
+    def beside(self, also: Sequence[str]) -> list[str]:
+        """The references, and of further policies those that feel what is varied."""
+        return [*self.references, *(also if self.varies_conditions else ())]
 
 
 def _conditions(name: str, values: Iterable[Any]) -> tuple[Variant, ...]:
@@ -55,61 +66,109 @@ def _rules(name: str, values: Iterable[float]) -> tuple[Variant, ...]:
     )
 
 
-ABLATIONS = (
-    Ablation(
-        "reserve fraction rho",
-        "care",
-        _conditions("reserve_fraction", (0.15, 0.3, 0.5)),
-        _REFERENCES,
-    ),
-    Ablation(
-        "angular margin of hulls and wedges, columns and rows",
-        "care",
-        tuple(_margins(*margins) for margins in ((1, 1), (2, 1), (4, 2))),
-        _REFERENCES,
-        ("Halved, the margin keeps its one row: there is no half of one.",),
-    ),
-    Ablation(
-        "least confidence of the camera",
-        "care",
-        _conditions("camera_confidence", (0.25, 0.5)),
-        _REFERENCES,
-    ),
-    Ablation(
-        "age of the camera's detections, keyframes",
-        "care",
-        _conditions("camera_latency", (0, 1)),
-        _REFERENCES,
-    ),
-    Ablation("seed of the shared floor", "care", _conditions("floor_seed", (0, 1, 2)), _REFERENCES),
-    Ablation(
-        "order of the reserve",
-        "care",
-        (
-            Variant("unexplained alone"),
-            Variant("care-priority: then explained", policy="care-priority"),
-            Variant("care-sbf: so too, with forgetting", policy="care-sbf"),
-        ),
-    ),
-    Ablation(
-        "scale k_safe of the guard, 0: unguarded",
-        "care-sbf",
-        _rules("k_safe", (0, 0.25, 0.5, 1, 1.5, 2)),
-        ("care",),
-    ),
-    Ablation(
-        "localisation margin sigma_pos, m",
-        "care-sbf",
-        _rules("position_sigma_m", (0, 0.2, 0.4, 0.8)),
-        ("care",),
-    ),
-    Ablation(
-        "margin forgotten a keyframe, columns",
-        "care-sbf",
-        _rules("decay_per_keyframe", (0.25, 0.5, 1, 2)),
-        ("care",),
+RESERVE_FRACTION = Ablation(
+    "reserve fraction rho", "care", _conditions("reserve_fraction", (0.15, 0.3, 0.5)), _REFERENCES
+)
+MARGINS = Ablation(
+    "angular margin of hulls and wedges, columns and rows",
+    "care",
+    tuple(_margins(*margins) for margins in ((1, 1), (2, 1), (4, 2))),
+    _REFERENCES,
+    ("Halved, the margin keeps its one row: there is no half of one.",),
+)
+CONFIDENCE = Ablation(
+    "least confidence of the camera",
+    "care",
+    _conditions("camera_confidence", (0.25, 0.5)),
+    _REFERENCES,
+)
+LATENCY = Ablation(
+    "age of the camera's detections, keyframes",
+    "care",
+    _conditions("camera_latency", (0, 1)),
+    _REFERENCES,
+)
+FLOOR_SEED = Ablation(
+    "seed of the shared floor", "care", _conditions("floor_seed", (0, 1, 2)), _REFERENCES
+)
+RESERVE_ORDER = Ablation(
+    "order of the reserve",
+    "care",
+    (
+        Variant("unexplained alone"),
+        Variant("care-priority: then explained", policy="care-priority"),
+        Variant("care-sbf: so too, with forgetting", policy="care-sbf"),
     ),
 )
+GUARD = Ablation(
+    "scale k_safe of the guard, 0: unguarded",
+    "care-sbf",
+    _rules("k_safe", (0, 0.25, 0.5, 1, 1.5, 2)),
+    ("care",),
+)
+SIGMA = Ablation(
+    "localisation margin sigma_pos, m",
+    "care-sbf",
+    _rules("position_sigma_m", (0, 0.2, 0.4, 0.8)),
+    ("care",),
+)
+DECAY = Ablation(
+    "margin forgotten a keyframe, columns",
+    "care-sbf",
+    _rules("decay_per_keyframe", (0.25, 0.5, 1, 2)),
+    ("care",),
+)
+STATIC = Ablation(
+    "speed tau_static below which a track stands still, m/s",
+    "care-sbf",
+    _rules("static_mps", (0, 0.25, 0.5, 1, 2)),
+    ("care",),
+)
+CELL_ORDER = Ablation(
+    "order of the cells inside a set",
+    "care",
+    (
+        # The order in which the paper's policies list their sets.
+        Variant("rows-down"),
+        *(Variant(name, {"cell_order": name}) for name in CELL_ORDERS if name not in _USUAL_ORDERS),
+    ),
+    _REFERENCES,
+)
+ABLATIONS = (
+    RESERVE_FRACTION,
+    MARGINS,
+    CONFIDENCE,
+    LATENCY,
+    FLOOR_SEED,
+    RESERVE_ORDER,
+    GUARD,
+    SIGMA,
+    DECAY,
+)
+"""Those of the closed loop."""
+OPEN_ABLATIONS = (
+    RESERVE_FRACTION,
+    MARGINS,
+    CONFIDENCE,
+    LATENCY,
+    RESERVE_ORDER,
+    GUARD,
+    SIGMA,
+    DECAY,
+    STATIC,
+    CELL_ORDER,
+)
+"""Those of the open loop, with one floor as in the paper."""
+OPEN_POLICIES = frozenset(
+    [
+        FULL,
+        *(name for ablation in OPEN_ABLATIONS for name in (ablation.policy, *ablation.references)),
+        *(level.policy for ablation in OPEN_ABLATIONS for level in ablation.levels if level.policy),
+    ]
+)
+"""The policies that the study plays by itself."""
+_EVERY = 4
+"""The paper's ablations take every fourth scene (Sec. 5.4)."""
 
 
 def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
@@ -124,9 +183,27 @@ def ablation_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[Episo
     # The policy itself at every level; the others under the conditions of the level, whose
     # parameters they do not have.
     for place, ablation in product(ABLATION_PLACES, ABLATIONS):
-        beside = [*ablation.references, *(also if ablation.varies_conditions else ())]
         for level in ablation.levels:
             made += level.configurations(place, [ablation.policy], seeds)
-            made += level.for_others().configurations(place, beside, seeds)
+            made += level.for_others().configurations(place, ablation.beside(also), seeds)
     # The usual level comes in every ablation and is played once.
+    return list(dict.fromkeys(made))
+
+
+def every_fourth(scenes: Sequence[Scene]) -> list[Scene]:
+    """The scenes of the paper's ablations: the first, and every fourth from there."""
+    return [*scenes[::_EVERY]]
+
+
+def ablation_plays(
+    source: Source, scenes: Sequence[Scene], budgets: Sequence[float], also: Sequence[str] = ()
+) -> list[PlayConfig]:
+    """Every ablation of the open loop at every budget, and the full scan; `also` are further
+    policies that feel the conditions.
+    """
+    made = USUAL_VARIANT.plays(source, scenes, budgets, [FULL])
+    for ablation in OPEN_ABLATIONS:
+        for level in ablation.levels:
+            made += level.plays(source, scenes, budgets, [ablation.policy])
+            made += level.for_others().plays(source, scenes, budgets, ablation.beside(also))
     return list(dict.fromkeys(made))

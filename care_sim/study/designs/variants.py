@@ -5,7 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from care_sim.base.errors import percent
+from care_sim.perception.detectors import PROXY
+from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.play_config import PlayConfig, play_grid
 from care_sim.study.rows.reading import Key, key_of
 from care_sim.study.run_config import Row
 
@@ -16,14 +19,29 @@ class Place(NamedTuple):
     scenario: str
     budget: float
 
+    def row(self) -> Row:
+        """As columns of an episode."""
+        return {"scenario": self.scenario, "budget": self.budget}
+
     def __str__(self) -> str:
         return f"{self.scenario}, {percent(self.budget)}"
 
 
+class FilmPlace(NamedTuple):
+    """A kind of source and a budget: where every level is played in the open loop."""
+
+    source: str
+    budget: float
+
+    def row(self) -> Row:
+        """As columns of a play."""
+        return {"source": self.source, "detector": PROXY, "budget": self.budget}
+
+
 @dataclass(frozen=True)
 class Variant:
-    """One value of what is varied: fields of `EpisodeConfig` that depart from the usual ones, or
-    parameters of the policy.
+    """One value of what is varied: conditions that depart from the usual ones, or parameters of the
+    policy.
 
     Where the level is another policy, `policy` plays instead of the study's own.
     """
@@ -37,26 +55,27 @@ class Variant:
         self, place: Place, policies: Iterable[str], seeds: Sequence[int]
     ) -> list[EpisodeConfig]:
         """The episodes of this level; `full` runs once for all that it does not feel."""
-        given = {**self.changes, "policy_parameters": tuple(self.parameters.items())}
-        return grid(
-            [place.scenario],
-            [self.policy or policy for policy in policies],
-            [place.budget],
-            seeds,
-            **given,
-        )
+        played = [self.policy or policy for policy in policies]
+        return grid([place.scenario], played, [place.budget], seeds, **self._given())
+
+    def plays(
+        self,
+        source: Source,
+        scenes: Sequence[Scene],
+        budgets: Sequence[float],
+        policies: Iterable[str],
+    ) -> list[PlayConfig]:
+        """The plays of this level in the open loop, with the first floor; `full` once likewise."""
+        played = [self.policy or policy for policy in policies]
+        return play_grid(source, scenes, played, budgets, **self._given())
 
     def for_others(self) -> "Variant":
         """The same conditions for policies that lack the parameters."""
         return Variant(self.label, self.changes)
 
-    def key(self, place: Place, policy: str) -> Key:
-        """Where `care_sim.reports.cells` keeps the rows of a policy at this level."""
-        row: Row = {
-            "scenario": place.scenario,
-            "policy": self.policy or policy,
-            "budget": place.budget,
-        }
+    def key(self, place: Place | FilmPlace, policy: str) -> Key:
+        """The cell of the rows of a policy at this level."""
+        row = place.row() | {"policy": self.policy or policy}
         # The key of a row that has just these values: the same way in which rows get theirs.
         key = key_of(
             row
@@ -65,6 +84,9 @@ class Variant:
         )
         # The full scan was run once for all levels that it does not feel.
         return (key[0].for_full(), "full", 1.0) if policy == "full" else key
+
+    def _given(self) -> dict[str, Any]:
+        return {**self.changes, "policy_parameters": tuple(self.parameters.items())}
 
 
 USUAL_VARIANT = Variant("usual")

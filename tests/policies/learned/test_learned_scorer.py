@@ -11,9 +11,11 @@ from hypothesis.extra.numpy import arrays
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS, CellInputs
 from care_sim.policies.learned.learned_scorer import CellNetwork, LearnedScorer, highest
 from care_sim.policies.learned.weights import Card, load_weights, save_weights, shipped_weights
@@ -72,6 +74,10 @@ def test_the_reserve_and_no_more_goes_to_the_highest_scores_and_the_rest_is_hist
             cells.tolist() for cells in hulls
         ]
         assert len(np.unique(reserve)) == len(reserve) == 819 - round(0.7 * 819)
+        # The one set of the reserve fits in whole, so that the order of its cells changes nothing.
+        backwards = Demand(asked.exploitation, [[reserve[::-1]]])
+        fired, other = (set(allocate(demand, 819, 0.3).tolist()) for demand in (asked, backwards))
+        assert fired == other
 
 
 def test_the_shipped_weights_look_where_the_camera_sees_someone_new(encounter, environment):

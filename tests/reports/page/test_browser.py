@@ -15,7 +15,7 @@ from PIL import Image, ImageColor
 from care_sim.reports.figures.styles import styles
 from care_sim.reports.page.build import write_page
 from care_sim.reports.page.replay import packed
-from care_sim.study.designs import ablations, faults
+from care_sim.study.designs import ablations, faults, order
 from care_sim.study.episode_config import PLAIN_FIELDS, grid
 from care_sim.study.episode_play import run_episode
 from care_sim.study.rows.parquet import write_rows
@@ -302,12 +302,14 @@ def test_everything_is_open_in_print(opened, played):
 
 FAULTY = [row(config, 9.0) for config in faults.fault_study([0]) if config.scenario == "dartout"]
 ABLATED = [row(config, 9.0) for config in ablations.ablation_study([0])[:12]]
+ORDERED = [row(config, 9.0) for config in order.order_study([0])[:12]]
 PLAYED = made_plays.study({"history": (4, 2), "care": (8, 4), "rows": (5, 3), "full": (9, 5)})
 STUDIES = {
     "paper": (STUDY + rows("care", [9.0, None], budget=0.1), "Collisions: 0 in 22 episodes", 1),
     "crowding": (CROWD, "standing vehicles", 1),
     "faults": (FAULTY, "Where the order of policies changes", 6),
     "ablate": (ABLATED, "Collisions: 0 in 12 episodes", 0),
+    "order": (ORDERED, "First detection by order of cells", 0),
     "protocol": (PLAYED, "There are none to watch", 3),
 }
 

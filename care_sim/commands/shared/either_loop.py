@@ -1,0 +1,41 @@
+"""What is common to the commands that play a study of the closed loop, and another of the open loop
+where a source of scenes is named.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from care_sim.base.errors import InvalidInput
+from care_sim.commands.shared.episode_studies import FixedStudy
+from care_sim.commands.shared.play_options import SourceOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class EitherLoopStudy(FixedStudy, SourceOptions):
+    """A study of the closed loop, or with `source` of the open one."""
+
+    source: str | None = None
+    """Play the open loop instead, on streets, argoverse2:FOLDER or nuscenes:FOLDER."""
+    scenes: tuple[str, ...] = ()
+    """With --source. One number: that many scenes, from the first. Otherwise names of scenes.
+    Without this option, all scenes of the study."""
+    out: Path | None = None
+    """Folder of the results; an interrupted study goes on there. Without this option runs/ and the
+    name of the command, with --source the kind of source behind it, as in runs/ablate-streets."""
+
+    def folder(self, command: str) -> Path:
+        """Where the results go."""
+        kind = [self.source.partition(":")[0]] if self.source else []
+        return self.out or Path("runs", "-".join([command, *kind]))
+
+    def check_loop(self, closed: Collection[str], opened: Collection[str]) -> None:
+        """Raise InvalidInput for an option of the other loop: those named `closed` have no meaning
+        in the open one, those of the source and those named `opened` none in the closed one.
+        """
+        of_scenes = {"scenes", *(field.name for field in fields(SourceOptions)), *opened}
+        foreign, word = (closed, "with") if self.source else (of_scenes, "without")
+        for field in fields(self):
+            if field.name in foreign and getattr(self, field.name) != field.default:
+                option = field.name.replace("_", "-")
+                raise InvalidInput(f"--{option} has no meaning {word} --source")
