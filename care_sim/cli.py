@@ -77,7 +77,7 @@ COMMANDS = {
         "ablate",
         "Ablate",
         "Vary one thing at a time as the paper's ablations do, one table per thing varied; "
-        "with --source in the open loop, on every fourth scene.",
+        "with --source in the open loop, on a quarter of the scenes.",
     ),
     "order": CommandEntry(
         "order",

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from care_sim.commands.shared.either_loop import EitherLoopStudy
 from care_sim.commands.shared.selection import check_values, playable
 from care_sim.sources.scenes import chosen_scenes
-from care_sim.study.designs.ablations import ablation_plays, ablation_study, every_fourth
+from care_sim.study.designs.ablations import ablation_plays, ablation_study, quarter_of
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ablate(EitherLoopStudy):
     """Vary one thing at a time as the paper's ablations do, one table per thing varied; with
-    --source in the open loop, on every fourth scene.
+    --source in the open loop, on a quarter of the scenes.
     """
 
     budgets: tuple[float, ...] = (0.1, 0.2, 0.35)
@@ -27,9 +27,11 @@ class Ablate(EitherLoopStudy):
     def _play_scenes(self, named: str) -> int:
         check_values(self, "budgets")
         source = self.source_named(named)
-        scenes = chosen_scenes(every_fourth(source.scenes()), self.scenes)
+        scenes = chosen_scenes(quarter_of(source.scenes()), self.scenes)
+        # No pattern by itself: it feels none of what is varied.
         also, left_out = playable(
-            self.also, lambda name: ablation_plays(source, scenes[:1], self.budgets[:1], [name])
+            self.also or (),
+            lambda name: ablation_plays(source, scenes[:1], self.budgets[:1], [name]),
         )
         configs = ablation_plays(source, scenes, self.budgets, also)
         return self.play_study("ablate-open-loop", configs, self.folder("ablate"), left_out)

@@ -26,6 +26,7 @@ class Order(EitherLoopStudy):
         "all-camera",
         "care",
         "care-sbf",
+        "care-sightlines",
         "learned-scorer",
         "full",
     )

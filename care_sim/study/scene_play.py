@@ -56,7 +56,7 @@ class PlayRecord:
 
     `tracks`, `explained` and `released` are means per keyframe: tracks held, camera detections that
     a forecast explains, and cells of the full hulls that exploitation does not ask for; `released`
-    is None of a policy that demands no sets. `wall_s` is in seconds.
+    is None of a policy that exploits no set. `wall_s` is in seconds.
     """
 
     score: SceneScore
@@ -169,8 +169,8 @@ def play_through_film(config: PlayConfig, film: Film) -> PlayRecord:
 
 
 def _released(policy: Policy, belief: Belief) -> int | None:
-    """The cells released at the keyframe that was just played; None where no sets were demanded."""
-    if policy.demanded is None:
+    """The cells released at the keyframe that was just played; None where nothing is exploited."""
+    if policy.demanded is None or not len(policy.demanded.exploitation):
         return None
     rig = policy.rig
     hulls = rig.hulls(belief.tracks.boxes)

@@ -8,7 +8,7 @@ from care_sim.study.designs.ablations import (
     OPEN_ABLATIONS,
     ablation_plays,
     ablation_study,
-    every_fourth,
+    quarter_of,
 )
 from care_sim.study.designs.variants import USUAL_VARIANT, FilmPlace
 from care_sim.study.rows.reading import key_of
@@ -45,16 +45,20 @@ def test_further_policies_are_played_where_conditions_vary_and_the_full_scan_onc
         for config in several
         if config.policy == "random"
     }
-    # The usual ones, two of rho, two margins, one confidence, one latency, five orders of cells.
-    assert len(conditions) == 1 + 2 + 2 + 1 + 1 + 5
+    # The usual ones, two of rho, two margins, one confidence, one latency, six orders of cells:
+    # rows-down by its name is that of a policy which lists its sets otherwise.
+    assert len(conditions) == 1 + 2 + 2 + 1 + 1 + 6
     assert sum(config.policy == "full" for config in several) == 1
 
 
-def test_the_quarter_of_the_scenes_is_the_papers():
-    scenes = STREETS.scenes()
-    quarter = every_fourth(scenes)
+def test_the_quarter_of_the_streets_holds_every_layout():
+    """38 scenes, as many as the paper's. Every fourth street would be straight."""
+    quarter = quarter_of(STREETS.scenes())
     assert len(quarter) == 38
-    assert [scene.seed for scene in quarter[:3]] == [0, 4, 8]
+    assert [scene.seed for scene in quarter[:5]] == [0, 5, 10, 15, 16]
+    layouts = Counter(scene.name.split("-", 2)[2] for scene in quarter)
+    assert len(layouts) == 4
+    assert min(layouts.values()) >= 9
 
 
 def test_the_closed_loop_has_the_ablations_that_it_had():

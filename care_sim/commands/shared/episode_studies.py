@@ -10,6 +10,8 @@ from care_sim.commands.shared.study_command import StudyCommand
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig, grid, of_seeds
 
+CONTROLS = ("fan",)
+"""The best pattern without a camera in these scenes."""
 _Configurations = Callable[[Sequence[int], Sequence[str]], Sequence[EpisodeConfig]]
 """The episodes of a study, from the seeds and the further policies."""
 
@@ -26,14 +28,15 @@ class EpisodeStudy(StudyCommand):
 class FixedStudy(EpisodeStudy):
     """A study whose episodes are fixed, except for the seeds and for further policies."""
 
-    also: tuple[str, ...] = ("fan",)
-    """Further policies, installed ones too, that are played and shown beside those of the study;
-    `fan` is the best pattern without a camera in these scenes."""
+    also: tuple[str, ...] | None = None
+    """Further policies, installed ones too, that are played and shown beside those of the study.
+    Without this option, in the closed loop, the control `fan`; with no name after it, none."""
 
     def play(self, study: str, configurations: _Configurations, out: Path) -> int:
         """Play the configurations of the seeds, with the further policies."""
         # Which of them can be played is tried on one task in every scenario.
         seeds = seeds_of(self.seeds)
-        also, left_out = playable(self.also, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
+        named = CONTROLS if self.also is None else self.also
+        also, left_out = playable(named, lambda name: grid(SCENARIOS, [name], [0.1], [0]))
         configs = of_seeds(configurations(seeds[:1], also), seeds)
         return self.play_study(study, configs, out, left_out)

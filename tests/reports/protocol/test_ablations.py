@@ -67,7 +67,7 @@ def titled(rows, part):
 
 def test_every_ablation_has_its_table_with_all_levels_at_every_budget(rows):
     tables = ablation_tables(rows)
-    assert len(tables) == len(OPEN_ABLATIONS) == 10
+    assert len(tables) == len(OPEN_ABLATIONS) == 11
     for table, ablation in zip(tables, OPEN_ABLATIONS, strict=True):
         for budget in ("10%", "20%"):
             lines = block(table, f"{budget}, minus the usual level")
