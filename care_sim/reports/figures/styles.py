@@ -32,11 +32,16 @@ _KNOWN = {
     "learned-scorer": ("#117733", "p"),
     "ppo": ("#AA4499", "h"),
     "ppo-dartout": ("#661100", "*"),
+    "care-sightlines": ("#000000", "d"),
+    "care-spread": ("#6699CC", "H"),
+    "rows": ("#CC6677", "8"),
+    "place": ("#44AA99", "d"),
+    "fan": ("#BBAA33", "H"),
 }
 """From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind."""
-_SPARE = ("#6699CC", "#44AA99", "#CC6677", "#88CCEE", "#DDCC77")
+_SPARE = ("#88CCEE", "#DDCC77", "#EE8866", "#AAAA00", "#77AADD")
 _GREYS = ("0.3", "0.45", "0.6")
-_MARKERS = ("d", "H", "8", "1", "2")
+_MARKERS = ("H", "8", "d", "s", "^")
 FULL_STYLE = Style("0.35", "_", "--")
 
 
@@ -68,7 +73,7 @@ def bare_axes(axes: Axes, grid: str, lines: Literal["both", "y"] = "y") -> None:
 
 def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:
     """A style for every policy, given with its tags. Policies that no car can have are grey and
-    dashed.
+    dashed, controls dotted.
     """
     # Policies of others get what is left, in their order; so the same study has the same colours.
     spare = cycle(_SPARE)
@@ -80,7 +85,6 @@ def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:
             # Grey and dashed, so that nobody takes them for contenders.
             made[policy] = Style(next(greys), next(markers), "--")
         else:
-            made[policy] = (
-                Style(*_KNOWN[policy]) if policy in _KNOWN else Style(next(spare), next(markers))
-            )
+            colour, marker = _KNOWN.get(policy) or (next(spare), next(markers))
+            made[policy] = Style(colour, marker, ":" if "control" in tags else "-")
     return made

@@ -77,7 +77,8 @@ def sweep_contrast_tables(setting: Setting, cells: Sequence[Cell], groups: Group
     tags = {cell.policy: cell.tags for cell in cells} | (
         {FULL: ()} if full_of(groups, setting) else {}
     )
-    learned = [policy for policy in tags if "learned" in tags[policy]]
+    # A map that serves as a control is held against the others in the table of controls.
+    learned = [name for name in tags if "learned" in tags[name] and "control" not in tags[name]]
     named = [policy for policy in (REFERENCE, *learned) if policy in tags and len(tags) > 1]
     return [_contrast_table(setting, policy, cells, groups, tags) for policy in named]
 
