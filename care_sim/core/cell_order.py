@@ -3,7 +3,7 @@
 Algorithm 1 of the paper takes cells "in ascending index" inside a set and does not say how cells
 are numbered. So the order is a part of the demand here: a set is a list of cells, taken in its
 order. The paper's policies list theirs by the index of `care_sim.core.grid`, row by row from the
-top; these functions list the sets of any policy in another order.
+top; these functions list the hulls and wedges of any policy in another order.
 """
 
 import math

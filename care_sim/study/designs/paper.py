@@ -34,7 +34,8 @@ def paper_study(
     played = partial(grid, seeds=seeds, cell_order=cell_order)
     return [
         # The full scan has one budget: 4 x 4 + 1, then 4 x 3 + 1, then 4 + 1. History asks no
-        # camera, so that latency is played without it.
+        # camera, so that latency is played without it. Further policies are played under all
+        # conditions, patterns too, so that they stand beside the others in every table.
         *played(["dense"], policies, (0.03, 0.05, 0.10, 0.20)),
         *played(["dartout"], policies, (0.03, 0.05, 0.10)),
         *played(["cutin"], policies, (0.10,)),

@@ -52,7 +52,7 @@ from care_sim.sensors.recorded_lidar import RecordedLidar
 from care_sim.world.world import World
 from tests.helpers.places import ROOT
 
-LIST = [drawn(number) for number in range(CERTIFIED_EPISODES)]
+LIST = [drawn(number) for number in range(1000)]
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def alone(episode, source=""):
     return trail
 
 
-def test_the_episodes_hold_every_pair_that_can_meet():
+def test_a_thousand_episodes_hold_every_pair_that_can_meet():
     met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
     assert {(e, p) for e, p, _, _ in met} == set(
         product({*CLOSED, STREET, REPLAY}, CERTIFIED_POLICIES)
@@ -134,9 +134,7 @@ def test_recordings_and_privileged_policies_play_in_vectors_too(source):
 
 def test_batches_hold_every_episode_once_and_a_street_together():
     made = episode_batches(LIST)
-    assert sorted(episode.number for batch in made for episode in batch) == list(
-        range(CERTIFIED_EPISODES)
-    )
+    assert sorted(episode.number for batch in made for episode in batch) == list(range(1000))
     streets = [{e.seed for e in batch} for batch in made if batch[0].environment == STREET]
     assert all(len(seeds) == 1 for seeds in streets)
     assert len(streets) == len(design.STREETS)
@@ -148,7 +146,7 @@ def test_an_episode_that_fails_is_told_and_leaves_the_others(source, monkeypatch
     found = attempt([replace(good, mode="sync"), replace(broken, mode="sync")], source)
     assert found[good.number] == alone(good)
     assert "nobody" in found[bad.number]
-    verdict = verdict_of(found | {0: found[bad.number]}, [found[good.number]] * CERTIFIED_EPISODES)
+    verdict = verdict_of(found | {0: found[bad.number]}, [found[good.number]] * 1000)
     assert verdict.differing[bad.number] == ("not played", None)
     assert verdict.hash is None
 
@@ -163,9 +161,9 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     monkeypatch.setattr(playing, "find_spec", lambda name: None if name == module else name)
     able, (line,) = playable_here(LIST)
     missing = len(LIST) - len(able)
-    assert line.startswith(f"{missing} of 2,000 not played: ")
+    assert line.startswith(f"{missing} of 1,000 not played: ")
     assert f"extra '{extra}'" in line
-    trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(CERTIFIED_EPISODES)]
+    trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(1000)]
     monkeypatch.setattr(
         run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers}
     )
@@ -174,7 +172,7 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     told = capsys.readouterr()
     assert told.err.splitlines() == [f"care-sim: {line}"]
     left = published.combined([trails[episode.number] for episode in able])
-    assert told.out == f"{len(able)} of 2,000 episodes: {left}, as published\n"
+    assert told.out == f"{len(able)} of 1,000 episodes: {left}, as published\n"
     lacking = next(one.number for one in LIST if one not in able)
     for config in (CertifyConfig(episode=lacking), CertifyConfig(every=True, write=True)):
         with pytest.raises(MissingExtra, match=f"extra '{extra}'"):

@@ -339,7 +339,7 @@ def test_text_from_outside_is_text(opened, tmp_path):
 
 class OneSeed(ThreadPoolExecutor):
     """Plays every cell of a study on its first seed, and shows that episode for each of its seeds:
-    how long the stories are does not depend on the seed, and to play all 245 takes 40 s.
+    how long the stories are does not depend on the seed, and to play all 305 takes 40 s.
     """
 
     def __init__(self):
@@ -359,7 +359,7 @@ def test_the_page_of_the_papers_study_is_small_and_quick(opened, tmp_path):
     played = OneSeed()
     made = write_page(ROOT / "results" / "closed-loop-5", path, 400, 1, lambda _workers: played)
     assert len(played.first) == 49
-    assert made.watchable == len(made.rows) == 245
+    assert made.watchable == len(made.rows) == 305
     assert path.stat().st_size < MOST_BYTES
     assert any(opened(path, READY).evaluate("performance.now()") < MOST_MS for _ in range(3))
 
