@@ -103,7 +103,9 @@ def _resampled_ratio(
     seed: int,
 ) -> Interval:
     """The interval of a ratio of sums, or of a difference of two; remembered as that of a mean."""
-    groups = [(np.array(numerators), np.array(denominators)) for numerators, denominators in columns]
+    groups = [
+        (np.array(numerators), np.array(denominators)) for numerators, denominators in columns
+    ]
     value = float(_difference_of_ratios(groups, [np.arange(len(each)) for each, _ in groups]))
 
     # Where all scenes of a group have one ratio, every resample of it has that ratio, too.
