@@ -42,7 +42,9 @@ def rivals(plays: SettingPlays) -> list[str]:
 
 
 def control_at(plays: SettingPlays, ratio: Ratio, budget: float) -> str | None:
-    """The control with the highest level of the measure at a budget; None where none is known."""
+    """The control with the highest level of the measure at a budget, over the scenes that all
+    controls have there; None where none is known.
+    """
     found = {
         policy: tallies for policy in controls(plays) if (tallies := plays.tallies(policy, budget))
     }

@@ -5,6 +5,7 @@ import pytest
 from care_sim.evaluation.sightings import RANGE_M
 from care_sim.evaluation.strata import ENTRIES
 from care_sim.reports.protocol.entries import ENTRY_NOTE
+from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import read_results
 from care_sim.study.results_formats import PLAYS
@@ -110,6 +111,17 @@ def test_where_a_row_lacks_entries_nothing_is_told_by_entry(number):
     assert NAME not in shown
     kinds = [line[0] for line in shown["overall recall by stratum"].rows if len(line) == 1]
     assert kinds == ["range", "azimuth", "class"]
+
+
+def test_a_borrowed_full_scan_without_entries_has_none_to_tell():
+    late = study({"care": (6, 5)}, camera_latency=1)
+    full = [
+        {name: value for name, value in row.items() if not name.startswith("entry/")}
+        for row in study({"full": (8, 8)})
+    ]
+    (borrowing,) = plays_by_setting([*late, *full])
+    assert borrowing.full
+    assert [*borrowing.strata()] == ["range", "azimuth", "class"]
 
 
 def test_rows_of_before_there_were_entries_are_read_and_have_no_such_table(tmp_path):
