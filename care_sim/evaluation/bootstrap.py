@@ -78,47 +78,74 @@ def ratio_of_sums(
     With `ours - theirs` as numerators and the events as denominators it is the difference of two
     policies in which every event weighs alike, paired by scene. With a second group, `less`, its
     ratio is taken off; scenes are then drawn within each group. Groups whose scenes all have one
-    ratio give the value for both ends. Raises InvalidInput for sums that are empty, of unequal
-    length or not finite, for a denominator that is not positive, and for one scene beside a second
-    group.
+    ratio give the value for both ends. A denominator may be 0 where another of its group is not;
+    resamples that sum to 0 have no ratio and are ignored. Raises InvalidInput for sums that are
+    empty, of unequal length or not finite, for denominators that are negative or all 0, and for one
+    scene beside a second group.
     """
     # A ratio of sums, not a mean of ratios: every event weighs alike, whether its scene has many or
     # few. A scene is drawn as a whole, with its numerator and its denominator, since what happens
     # within one is not independent.
     groups = [_sums(*sums) for sums in ([group] if less is None else [group, less])]
-    value = _difference_of_ratios(groups, [np.arange(len(numerators)) for numerators, _ in groups])
+    return _resampled_ratio(
+        tuple((tuple(a.tolist()), tuple(b.tolist())) for a, b in groups),
+        confidence,
+        resamples,
+        seed,
+    )
+
+
+@lru_cache(maxsize=10_000)
+def _resampled_ratio(
+    columns: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...],
+    confidence: float,
+    resamples: int,
+    seed: int,
+) -> Interval:
+    """The interval of a ratio of sums, or of a difference of two; remembered as that of a mean."""
+    groups = [
+        (np.array(numerators), np.array(denominators)) for numerators, denominators in columns
+    ]
+    value = float(_difference_of_ratios(groups, [np.arange(len(each)) for each, _ in groups]))
 
     # Where all scenes of a group have one ratio, every resample of it has that ratio, too.
-    ratios = [numerators / denominators for numerators, denominators in groups]
-    if all(_are_equal(each, like=each) for each in ratios):
-        return Interval(float(value), float(value), float(value))
+    if all(_have_one_ratio(*group) for group in groups):
+        return Interval(value, value, value)
     if any(len(numerators) < 2 for numerators, _ in groups):
         raise InvalidInput("a group of scenes to be drawn from must have at least two")
 
-    # SciPy draws rows, and both columns of the drawn scenes follow from them.
-    result = stats.bootstrap(
-        [np.arange(len(numerators)) for numerators, _ in groups],
-        lambda *drawn, axis=-1: _difference_of_ratios(groups, drawn, axis),
-        n_resamples=resamples,
-        confidence_level=confidence,
-        method="percentile",
-        vectorized=True,
-        rng=np.random.default_rng(seed),
-    )
-    low, high = result.confidence_interval
-    return Interval(float(value), float(low), float(high))
+    # Rows are drawn, and both columns of the drawn scenes follow from them. SciPy's bootstrap draws
+    # the same, but knows no interval where a single resample has no ratio.
+    rng = np.random.default_rng(seed)
+    drawn = [rng.integers(0, len(each), (resamples, len(each))) for each, _ in groups]
+    outside = (1 - confidence) / 2
+    low, high = np.nanquantile(_difference_of_ratios(groups, drawn), [outside, 1 - outside])
+    return Interval(value, float(low), float(high))
 
 
 def _difference_of_ratios(
-    groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Integers], axis: int = -1
+    groups: Sequence[tuple[Floats, Floats]], drawn: Sequence[Integers]
 ) -> Floats:
-    """Ratio of the drawn scenes of the first group, less that of the second where there is one."""
-    # Scenes lie along `axis`; SciPy draws many resamples at once along the other.
+    """(...) ratio of the drawn scenes of the first group, less that of the second where there is
+    one, from rows (..., n) of each; nan where one of them has a denominator of 0.
+    """
     first, *second = (
-        numerators[rows].sum(axis) / denominators[rows].sum(axis)
+        _ratio(numerators[rows].sum(axis=-1), denominators[rows].sum(axis=-1))
         for (numerators, denominators), rows in zip(groups, drawn, strict=True)
     )
     return np.asarray(first - sum(second))
+
+
+def _ratio(numerators: Floats, denominators: Floats) -> Floats:
+    nothing = np.full(np.shape(denominators), np.nan)
+    np.divide(numerators, denominators, out=nothing, where=np.greater(denominators, 0))
+    return nothing
+
+
+def _have_one_ratio(numerators: Floats, denominators: Floats) -> bool:
+    """Whether every scene has the ratio of the sums, or holds nothing of either."""
+    expected = numerators.sum() / denominators.sum() * denominators
+    return _are_equal(numerators - expected, like=numerators)
 
 
 def _are_equal(values: Floats, like: Floats) -> bool:
@@ -131,10 +158,8 @@ def _sums(numerators: ArrayLike, denominators: ArrayLike) -> tuple[Floats, Float
     a = np.atleast_1d(np.asarray(numerators, float))
     b = np.atleast_1d(np.asarray(denominators, float))
     _check_pairs(a, b)
-    if np.any(b <= 0):
-        raise InvalidInput(
-            "the denominators of a ratio must be positive: leave out scenes without an event"
-        )
+    if np.any(b < 0) or not b.any():
+        raise InvalidInput("the denominators of a ratio must be 0 or more, and one above 0")
     return a, b
 
 

@@ -79,7 +79,7 @@ class SceneContrast:
 
 @dataclass(frozen=True)
 class SceneShare:
-    """What one policy found in % of what another found, over `scenes` in which the other found
+    """What one policy found in % of what another found; in so many `scenes` the other found
     anything.
     """
 
@@ -96,6 +96,12 @@ def averaged(seeds: Sequence[Tallies]) -> dict[str, Tally]:
     # samples they would make an interval look surer than it is.
     scenes = sorted(set.intersection(*(set(seed) for seed in seeds))) if seeds else []
     return {scene: _mean(scene, [seed[scene] for seed in seeds]) for scene in scenes}
+
+
+def among(tallies: Tallies, scenes: Collection[str]) -> Tallies:
+    """The tallies of some of the scenes, in their own order."""
+    kept = set(scenes)
+    return {scene: tally for scene, tally in tallies.items() if scene in kept}
 
 
 def ratio_level(ratio: Ratio, tallies: Tallies) -> RatioLevel:
@@ -130,13 +136,14 @@ def scene_share(ratio: Ratio, ours: Tallies, whole: Tallies, *, seed: int = 0) -
     It is a quotient of two recalls of the same objects. What ours found need not be among what the
     whole did, so that it can exceed 100. Raises InvalidInput as `scene_contrast` does.
     """
-    # A scene in which the whole found nothing has no share, as one without an event has no recall.
-    pairs = [pair for pair in _pairs(ratio, ours, whole) if ratio.numerator(pair[1])]
-    if not pairs:
+    a, b, _ = _columns(ratio, _pairs(ratio, ours, whole))
+    # What ours found where the whole found nothing counts too: both recalls are of all scenes. But
+    # how sure the share is depends on the scenes that make its denominator.
+    rich = int(np.count_nonzero(b))
+    if not rich:
         return None
     # A scene is drawn with what both found in it: the two are paired within the resamples too.
-    a, b, _ = _columns(ratio, pairs)
-    return SceneShare(ratio_of_sums((100 * a, b), seed=seed), len(pairs))
+    return SceneShare(ratio_of_sums((100 * a, b), seed=seed), rich)
 
 
 def contrast_gap(
@@ -159,7 +166,7 @@ def contrast_gap(
             f"groups of scenes to be compared must share none, got {shared[0]} in both"
         )
     groups = [
-        _columns(ratio, _pairs(ratio, _among(ours, some), _among(theirs, some)))
+        _columns(ratio, _pairs(ratio, among(ours, some), among(theirs, some)))
         for some in (first, second)
     ]
     if min(len(group.T) for group in groups) < 2:
@@ -168,10 +175,6 @@ def contrast_gap(
     # groups are resampled apart.
     (a, b, weights), (c, d, others) = groups
     return ratio_of_sums((a - b, weights), less=(c - d, others), seed=seed)
-
-
-def _among(tallies: Tallies, scenes: Collection[str]) -> Tallies:
-    return {scene: tally for scene, tally in tallies.items() if scene in set(scenes)}
 
 
 def _pairs(ratio: Ratio, ours: Tallies, theirs: Tallies) -> list[tuple[Tally, Tally]]:

@@ -1,12 +1,12 @@
 """Strata of events and object frames (paper, Sec. 3), and thirds of scenes (Sec. 5.2).
 
 The paper stratifies by range and azimuth. Class and `entry` are ours. `entry` is how an object came
-within the range R that is scored, told by where the film first shows it, that is where a return or
-a pixel first does:
+within the range R that is scored, told by where the film first shows it. On a street that is where
+a return or a camera pixel first does, in a recording where its box first holds a recorded point:
 
-- `emergence`: nearer than `RING_M`, out from behind a body;
-- `ring`: from `RING_M` to R, so that it may have come over the ring unseen;
-- `beyond`: farther off than R, so that it was in sight before it was scored;
+- `emergence`: nearer than R less `RING_WIDTH_M`, taken for out from behind a body;
+- `ring`: from there to R, taken for over the edge of the range;
+- `beyond`: farther off than R, so that it was shown before it was scored;
 - `at start`: it is no event, for it was present at scene start (`care_sim.evaluation.sightings`).
 
 Entries are of objects: all object frames of an object lie in the stratum of its entry.
@@ -27,10 +27,9 @@ of the 50 m.
 FRONT, REAR = np.pi / 4, 3 * np.pi / 4
 """Bounds of the sectors, radians off straight ahead to either side: a quarter of the turn ahead,
 one behind and one on each side, whatever the mounting of the cameras."""
-RING_M = 45.0
-"""Where the ring of R = 50 m begins, in metres. At 10 m/s an object closes by 5 m in a keyframe of
-0.5 s, and on 12 generated streets 90% of those that come over the ring close no faster. Most that
-are first shown nearer than this were within R at the keyframe before, too, and hidden.
+RING_WIDTH_M = 5.0
+"""How far within R the ring begins, in metres: an object that closes at 10 m/s covers 5 m in a
+keyframe of 0.5 s.
 """
 ENTRY = "entry"
 ENTRIES = EMERGENCE, RING, BEYOND, AT_START = ("emergence", "ring", "beyond", "at start")
@@ -69,7 +68,7 @@ def _entries(sightings: Sightings) -> dict[str, Mask]:
     # Who has an event has come in; all others were present at scene start.
     came = np.isin(frames.objects, frames.objects[sightings.events])
     beyond = first > sightings.range_m
-    near = ~beyond & (first < RING_M)
+    near = first < sightings.range_m - RING_WIDTH_M
     masks = (came & near, came & ~near & ~beyond, came & beyond, ~came)
     return dict(zip(ENTRIES, masks, strict=True))
 

@@ -18,6 +18,7 @@ from care_sim.study.mechanism_play import (
     play_mechanism,
 )
 from care_sim.study.play_config import PLAY_FIELDS, listed_plays
+from care_sim.study.play_events import event_columns, without_events
 from care_sim.study.rows.reading import with_added_columns, with_tags
 from care_sim.study.rows.schema import (
     CONDITION_COLUMNS,
@@ -36,7 +37,7 @@ from care_sim.study.rows.schema import (
 )
 from care_sim.study.run_config import Row
 from care_sim.study.runner import PlayBatch
-from care_sim.study.scene_play import SUMS, event_columns, play_scene, without_events
+from care_sim.study.scene_play import SUMS, play_scene
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ import hashlib
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, astuple, dataclass, fields
-from typing import Any
 
 import numpy as np
 
@@ -22,22 +21,10 @@ from care_sim.loops.open_loop import OpenLoopKeyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_play import peak_rss_mb, result_or_reason
 from care_sim.study.play_config import PlayConfig
+from care_sim.study.play_events import event_sightings
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
 SUMS = tuple(field.name for field in fields(Tally))
-_EVENT_COLUMNS = ("keyframe", "object", "class", "range_m", "azimuth", "chances")
-"""What is known of an event before any policy plays."""
-_NAMES = (
-    "source",
-    "scene",
-    "policy",
-    "budget",
-    "detector",
-    "floor_seed",
-    "camera_latency",
-    "digest",
-)
-"""Columns by which an event finds its play."""
 
 
 def play_scene(batch: Sequence[PlayConfig]) -> list[Row | str]:
@@ -109,7 +96,7 @@ class ScenePlayer:
             **asdict(score.tally()),
             **_strata(score),
             "ttfds": tuple(score.delays.tolist()),
-            "sightings": _sightings(score),
+            "sightings": event_sightings(score),
             "emerging": len(score.sightings.emerging),
             "tracks": record.tracks,
             "explained": record.explained,
@@ -177,29 +164,6 @@ def _released(policy: Policy, belief: Belief) -> int | None:
     return released_cells(hulls, policy.demanded.exploitation, rig.grid.size)
 
 
-def without_events(row: Row) -> Row:
-    """The row without what only its events need."""
-    return {name: value for name, value in row.items() if name != "sightings"}
-
-
-def event_columns(rows: Sequence[Row]) -> dict[str, Any]:
-    """The events of all plays as columns of one table: the names of the play, what was seen where,
-    and when it was found.
-    """
-    # One entry per event. The names of a play repeat over its events.
-    counts = [len(row["ttfds"]) for row in rows]
-    names = {
-        name: np.repeat(np.array([row[name] for row in rows], dtype=object), counts)
-        for name in _NAMES
-    }
-    seen = {
-        name: [value for row in rows for value in row["sightings"][name]] for name in _EVENT_COLUMNS
-    }
-    # A TTFD of 0 keyframes is a detection at first sight.
-    delays = np.array([delay for row in rows for delay in row["ttfds"]], dtype=np.int64)
-    return {**names, **seen, "detected": delays == 0, "ttfd": delays}
-
-
 def film_hash(film: Film) -> str:
     """A hash over what a film shows and who is hidden at its start, measured numbers rounded
     (`care_sim.base.portable_hash`).
@@ -243,17 +207,6 @@ def _strata(score: SceneScore) -> Row:
         for kind, masks in strata(score.sightings).items()
         for label, mask in masks.items()
         for name, value in asdict(score.tally(mask)).items()
-    }
-
-
-def _sightings(score: SceneScore) -> dict[str, list[Any]]:
-    """What is known of the events, as columns; metres and radians to three decimals."""
-    # Three decimals are millimetres and milliradians, finer than any sensor here.
-    rows = score.event_rows()
-    columns = {name: [row[name] for row in rows] for name in _EVENT_COLUMNS}
-    return {
-        name: [round(v, 3) if isinstance(v, float) else v for v in column]
-        for name, column in columns.items()
     }
 
 

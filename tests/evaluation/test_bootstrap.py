@@ -61,6 +61,16 @@ def test_two_ratios_have_a_distribution_known_by_hand():
     assert ratio_of_sums(([1.0, 0.0], [1.0, 3.0]), confidence=0.4) == (0.25, 0.25, 0.25)
 
 
+def test_a_resample_without_a_denominator_is_ignored():
+    """Scenes 2/1 and 1/0: drawn twice the first 2, one of each 3, and the second twice nothing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ratio_of_sums(([2.0, 1.0], [1.0, 0.0])) == (3.0, 2.0, 3.0)
+        gap = ratio_of_sums(([2.0, 1.0], [1.0, 0.0]), less=([1.0, 1.0], [1.0, 1.0]))
+    assert gap == (2.0, 1.0, 2.0)
+    assert ratio_of_sums(([1.0, 0.0, 2.0], [2.0, 0.0, 4.0])) == (0.5, 0.5, 0.5)
+
+
 def test_a_ratio_of_equal_denominators_is_the_paired_difference():
     a = np.random.default_rng(6).normal(size=40)
     assert ratio_of_sums((a * 3.0, np.full(40, 3.0))) == pytest.approx(
@@ -106,7 +116,9 @@ def test_equal_ratios_are_certain_and_silent_and_draws_are_seeded():
         (([], []), None),
         (([1.0], [1.0, 2.0]), None),
         (([np.nan], [1.0]), None),
-        (([1.0, 1.0], [1.0, 0.0]), None),
+        (([1.0, 1.0], [0.0, 0.0]), None),
+        (([1.0, 1.0], [3.0, -1.0]), None),
+        (([1.0, 2.0], [1.0, 1.0]), ([1.0, 2.0], [0.0, 0.0])),
         (([1.0, 2.0], [1.0, 1.0]), ([1.0], [1.0])),
     ],
 )

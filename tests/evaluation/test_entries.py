@@ -64,9 +64,12 @@ def test_what_nothing_shows_yet_is_not_seen_beyond(
     assert [entry_of(scene) for scene in made] == [by_rule, by_sight]
 
 
-def test_beyond_is_beyond_the_range_that_is_scored(keyframes):
-    seen = keyframes(None, 30, 15)
-    assert entry_of(Sightings.of("near", seen, range_m=20.0)) == BEYOND
+@pytest.mark.parametrize(
+    ("first", "entry"), [(14, EMERGENCE), (14.99, EMERGENCE), (15, RING), (16, RING), (21, BEYOND)]
+)
+def test_entries_are_told_by_the_range_that_is_scored(keyframes, first, entry):
+    seen = keyframes(None, first, 13)
+    assert entry_of(Sightings.of("near", seen, range_m=20.0)) == entry
     assert entry_of(Sightings.of("far", seen)) == EMERGENCE
 
 

@@ -168,15 +168,20 @@ def test_the_gap_between_thirds_is_the_difference_of_their_contrasts():
         contrast_gap(FIRST_SIGHTING, ours, theirs, dense, ["scene 2", "scene 3"])
 
 
-def test_a_share_is_of_all_that_the_whole_found_and_scenes_without_any_of_it_are_left_out():
-    """3 of 5 and 1 of 1; in the third scene the whole found nothing, the last has no event."""
+def test_a_share_is_of_all_scenes_also_of_those_in_which_the_whole_found_nothing():
+    """3 of 5, 1 of 1 and 2 beside nothing; the last scene has no event."""
     ours = tallies((10, 3), (2, 1), (8, 2), (0, 0))
     whole = tallies((10, 5), (2, 1), (8, 0), (0, 0))
     found = scene_share(FIRST_SIGHTING, ours, whole)
-    assert found.scenes == 2
-    assert found.interval.mean == pytest.approx(100 * 4 / 6)
-    assert (found.interval.low, found.interval.high) == pytest.approx((60.0, 100.0))
+    assert found.interval.mean == pytest.approx(100 * 6 / 6)
     assert scene_share(OVERALL, ours, whole).interval == pytest.approx(found.interval)
+
+
+def test_a_share_rests_on_the_scenes_in_which_the_whole_found_anything():
+    found = scene_share(
+        FIRST_SIGHTING, tallies((9, 1), (9, 1), (9, 0)), tallies((9, 4), (9, 0), (9, 0))
+    )
+    assert (found.scenes, found.interval.mean) == (1, 50.0)
 
 
 def test_a_share_of_nothing_is_none():
@@ -195,16 +200,13 @@ def test_a_share_is_paired_and_does_not_know_how_much_a_scene_holds():
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=12))
-def test_a_share_is_the_quotient_of_the_levels_where_the_whole_found_something(found):
+def test_a_share_is_the_quotient_of_the_levels(found):
     ours, whole = (tallies(*[(9, pair[n]) for pair in found]) for n in (0, 1))
-    rich = [scene for scene, tally in whole.items() if tally.sighted]
     share = scene_share(FIRST_SIGHTING, ours, whole)
-    assert (share is None) == (not rich)
+    a, b = (ratio_level(FIRST_SIGHTING, each).by_event for each in (ours, whole))
+    assert (share is None) == (b == 0)
     if share:
-        a, b = (
-            ratio_level(FIRST_SIGHTING, {scene: each[scene] for scene in rich}).by_event
-            for each in (ours, whole)
-        )
+        assert share.scenes == sum(tally.sighted > 0 for tally in whole.values())
         assert share.interval.mean == pytest.approx(100 * a / b)
         assert share.interval.low <= share.interval.mean + 1e-9
         assert share.interval.mean <= share.interval.high + 1e-9

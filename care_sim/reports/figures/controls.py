@@ -1,50 +1,42 @@
 """The figure of what every policy has over the best control, in points of recall by budget."""
 
+from collections.abc import Sequence
 from textwrap import wrap
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
-from care_sim.evaluation.scene_contrasts import Ratio
 from care_sim.reports.controls import BEST_CONTROL
 from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, bare_axes, styles
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.reports.protocol.controls import (
-    CONTROL_RATIOS,
-    RULE,
-    named_controls,
-    over_control,
-    rivals,
-)
+from care_sim.reports.protocol.controls import RULE, OverControl, named_controls
 from care_sim.reports.protocol.rows import SettingPlays
 
 _NOTE_WIDTH = 110
 """Letters of a note in one line below the panels."""
 
 
-def control_figure(plays: SettingPlays) -> Figure:
-    """First-sighting and overall recall of every other policy less the best control's, in points,
-    with bars over the intervals.
+def control_figure(plays: SettingPlays, measures: Sequence[OverControl]) -> Figure:
+    """A panel a measure (of which there must be one): every other policy less the best control, in
+    points, with bars over the intervals.
     """
     figure = Figure(figsize=(8.4, 4.0), layout="constrained")
-    panels = figure.subplots(1, len(CONTROL_RATIOS))
-    for axes, ratio in zip(panels, CONTROL_RATIOS, strict=True):
+    panels = figure.subplots(1, len(measures), squeeze=False)[0]
+    for axes, measure in zip(panels, measures, strict=True):
         axes.axhline(0.0, color="0.35", linewidth=1.2, linestyle="--", label=BEST_CONTROL)
-        _draw_differences(axes, plays, ratio)
+        _draw_differences(axes, plays, measure)
         axes.set_xscale("log")
         axes.set_xticks(plays.budgets, [percent(budget) for budget in plays.budgets])
         axes.minorticks_off()
-        axes.set_title(ratio.name, loc="left", fontsize=10)
+        axes.set_title(measure.ratio.name, loc="left", fontsize=10)
         bare_axes(axes, "0.93")
     panels[0].set_ylabel(f"points over the {BEST_CONTROL}")
-    figure.suptitle(
-        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
-    )
+    figure.suptitle(plays.title, x=0.01, ha="left", fontsize=10)
     notes = [
         "budget (share of cells fired); bars: 95% intervals",
-        *wrap(f"{named_controls(plays)} {RULE}", _NOTE_WIDTH),
-        *tag_notes(plays.tags[policy] for policy in rivals(plays)),
+        *wrap(f"{named_controls(plays, measures)} {RULE}", _NOTE_WIDTH),
+        *tag_notes(plays.tags[policy] for policy in measures[0].differences),
     ]
     figure.supxlabel("\n".join(notes), fontsize=9)
     figure.legend(
@@ -53,16 +45,16 @@ def control_figure(plays: SettingPlays) -> Figure:
     return figure
 
 
-def _draw_differences(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
+def _draw_differences(axes: Axes, plays: SettingPlays, measure: OverControl) -> None:
     # The styles of all policies, so that each looks as it does in the other figures.
     drawn = styles(plays.tags.items())
-    for number, policy in enumerate(rivals(plays)):
+    for number, (policy, differences) in enumerate(measure.differences.items()):
         look = drawn[policy]
-        shift = OPEN_LOOP_DODGE.factor(number, len(rivals(plays)))
+        shift = OPEN_LOOP_DODGE.factor(number, len(measure.differences))
         known = {
             budget * shift: difference
-            for budget in plays.budgets
-            if (difference := over_control(plays, ratio, policy, budget))
+            for budget, difference in zip(plays.budgets, differences, strict=True)
+            if difference
         }
         means = [difference.mean for difference in known.values()]
         (line,) = axes.plot(list(known), means, look.line, color=look.colour, linewidth=1.4)

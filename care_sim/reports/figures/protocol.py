@@ -12,7 +12,7 @@ from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.controls import control_figure
 from care_sim.reports.figures.styles import FULL_STYLE, OPEN_LOOP_DODGE, Style, bare_axes, styles
 from care_sim.reports.formatting import MARKS, marked, tag_notes
-from care_sim.reports.protocol.controls import rivals
+from care_sim.reports.protocol.controls import over_controls
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.rows.settings import SOURCES
@@ -38,8 +38,8 @@ def protocol_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         # A single budget makes no curve.
         if len(plays.budgets) > 1:
             figures[f"levels-{plays.setting.slug}"] = levels_figure(plays)
-        if rivals(plays):
-            figures[f"controls-{plays.setting.slug}"] = control_figure(plays)
+        if measures := over_controls(plays):
+            figures[f"controls-{plays.setting.slug}"] = control_figure(plays, measures)
     return figures
 
 
@@ -131,9 +131,7 @@ def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
 
 def _name_markers(figure: Figure, axes: Axes, plays: SettingPlays) -> None:
     """The title, the markers by policy, what the full scan reaches, and what the grey line is."""
-    figure.suptitle(
-        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
-    )
+    figure.suptitle(plays.title, x=0.01, ha="left", fontsize=10)
     ceiling = recalls(plays, FULL, 1.0) if plays.full else None
     reached = (
         f"; full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall"
@@ -168,9 +166,7 @@ def levels_figure(plays: SettingPlays) -> Figure:
         axes.minorticks_off()
         axes.set_ylabel(f"{ratio.name} (%)")
         bare_axes(axes, "0.93")
-    figure.suptitle(
-        f"{plays.setting.label}: {len(plays.scenes)} scenes", x=0.01, ha="left", fontsize=10
-    )
+    figure.suptitle(plays.title, x=0.01, ha="left", fontsize=10)
     apart = [APART] if len(plays.tags) > 1 else []
     notes = ["budget (share of cells fired)", *apart, *tag_notes(plays.tags.values())]
     figure.supxlabel("\n".join(notes), fontsize=9)

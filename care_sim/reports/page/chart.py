@@ -19,7 +19,7 @@ PANEL_WIDTH = 200
 """Width of a panel in pixels; the browser sets as many side by side as there is room for."""
 _FAINT = 0.12
 """Opacity of what is not chosen in the legend."""
-_DASHES = {"-": [1, 0], "--": [5, 3]}
+_DASHES = {"-": [1, 0], "--": [5, 3], ":": [2, 2]}
 
 
 @dataclass(frozen=True)

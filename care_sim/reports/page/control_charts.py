@@ -5,8 +5,7 @@ from typing import Any
 
 import altair as alt
 
-from care_sim.base.errors import counted, percent
-from care_sim.evaluation.scene_contrasts import Ratio
+from care_sim.base.errors import percent
 from care_sim.reports.controls import BEST_CONTROL
 from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, styles
 from care_sim.reports.formatting import interval, marked, tag_notes
@@ -18,32 +17,27 @@ from care_sim.reports.page.chart import (
     faceted,
     specification,
 )
-from care_sim.reports.protocol.controls import (
-    CONTROL_RATIOS,
-    RULE,
-    control_at,
-    named_controls,
-    over_control,
-    rivals,
-)
+from care_sim.reports.protocol.controls import RULE, OverControl, named_controls
 from care_sim.reports.protocol.rows import SettingPlays
 
 
-def control_chart(plays: SettingPlays) -> Chart:
-    """First-sighting and overall recall of every other policy less the best control's."""
-    tags = {policy: plays.tags[policy] for policy in rivals(plays)}
+def control_chart(plays: SettingPlays, measures: Sequence[OverControl]) -> Chart:
+    """A panel a measure (of which there must be one): every other policy less the best control."""
+    tags = {policy: plays.tags[policy] for policy in measures[0].differences}
     # The styles of all policies, so that each looks as it does in the other charts.
     drawn = styles(plays.tags.items())
     encoding = Encoding.of_styles({marked(policy, tags[policy]): drawn[policy] for policy in tags})
-    values = [value for ratio in CONTROL_RATIOS for value in _points(plays, ratio)]
+    values = [value for measure in measures for value in _points(plays, measure)]
     chart = faceted(
-        _panel(encoding, plays.budgets), values, [ratio.name for ratio in CONTROL_RATIOS]
+        _panel(encoding, plays.budgets), values, [measure.ratio.name for measure in measures]
     ).resolve_scale(y="independent")
     return Chart(
-        f"{plays.setting.label}: {counted(len(plays.scenes), 'scene')}: "
-        f"each policy over the {BEST_CONTROL}",
+        f"{plays.title}: each policy over the {BEST_CONTROL}",
         f"Points of recall over the {BEST_CONTROL} by budget, a curve a policy.",
-        (f"{named_controls(plays)} {RULE} Bars: 95% intervals.", *tag_notes(tags.values())),
+        (
+            f"{named_controls(plays, measures)} {RULE} Bars: 95% intervals.",
+            *tag_notes(tags.values()),
+        ),
         specification(chart.add_params(encoding.chosen)),
     )
 
@@ -63,22 +57,23 @@ def _panel(encoding: Encoding, budgets: Sequence[float]) -> Any:
     ).properties(width=PANEL_WIDTH + 140, height=260)
 
 
-def _points(plays: SettingPlays, ratio: Ratio) -> list[dict[str, Any]]:
+def _points(plays: SettingPlays, measure: OverControl) -> list[dict[str, Any]]:
     """What every other policy has over the control at every budget, moved apart."""
     values = []
-    for number, policy in enumerate(rivals(plays)):
-        for budget in plays.budgets:
-            difference = over_control(plays, ratio, policy, budget)
+    for number, (policy, differences) in enumerate(measure.differences.items()):
+        shift = OPEN_LOOP_DODGE.factor(number, len(measure.differences))
+        at_budgets = zip(plays.budgets, measure.controls, differences, strict=True)
+        for budget, control, difference in at_budgets:
             if difference is None:
                 continue
             ends = difference.interval
             values.append(
                 {
-                    "panel": ratio.name,
+                    "panel": measure.ratio.name,
                     "policy": marked(policy, plays.tags[policy]),
                     "budget": percent(budget),
-                    "control": control_at(plays, budget),
-                    "place": budget * OPEN_LOOP_DODGE.factor(number, len(rivals(plays))),
+                    "control": control,
+                    "place": budget * shift,
                     "value": difference.mean,
                     "low": ends.low if ends else None,
                     "high": ends.high if ends else None,

@@ -7,7 +7,7 @@ from typing import Any
 
 import altair as alt
 
-from care_sim.base.errors import counted, percent
+from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.protocol import APART, Point, frontier, recalls
 from care_sim.reports.figures.styles import OPEN_LOOP_DODGE
@@ -22,7 +22,7 @@ from care_sim.reports.page.chart import (
     specification,
 )
 from care_sim.reports.page.control_charts import control_chart
-from care_sim.reports.protocol.controls import rivals
+from care_sim.reports.protocol.controls import over_controls
 from care_sim.reports.protocol.formatting import share_with_ends
 from care_sim.reports.protocol.paper import published_level
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
@@ -42,8 +42,8 @@ def protocol_charts(rows: Sequence[Row]) -> list[Chart]:
             charts.append(_pareto(plays))
         if len(plays.budgets) > 1:
             charts.append(_levels(plays))
-        if rivals(plays):
-            charts.append(control_chart(plays))
+        if measures := over_controls(plays):
+            charts.append(control_chart(plays, measures))
     return charts
 
 
@@ -74,7 +74,7 @@ def _pareto(plays: SettingPlays) -> Chart:
         "per policy."
     )
     return Chart(
-        f"{_title(plays)}: first sightings against all", description, notes, specification(chart)
+        f"{plays.title}: first sightings against all", description, notes, specification(chart)
     )
 
 
@@ -162,7 +162,7 @@ def _levels(plays: SettingPlays) -> Chart:
         "First-sighting and overall recall in percent against the budget, a curve a policy."
     )
     return Chart(
-        f"{_title(plays)}: recall against the budget",
+        f"{plays.title}: recall against the budget",
         description,
         notes,
         specification(chart.add_params(encoding.chosen)),
@@ -233,7 +233,3 @@ def _curves(plays: SettingPlays, ratio: Ratio) -> _Values:
 
 def _panel(budget: float) -> str:
     return f"budget {percent(budget)}"
-
-
-def _title(plays: SettingPlays) -> str:
-    return f"{plays.setting.label}: {counted(len(plays.scenes), 'scene')}"

@@ -2,7 +2,6 @@
 scenes are few.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,19 +17,13 @@ from care_sim.evaluation.scene_contrasts import (
     Ratio,
     SceneContrast,
     Tallies,
-    contrast_gap,
     scene_contrast,
 )
-from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.reports.protocol.rows import HISTORY, SettingPlays
 from care_sim.study.run_config import REFERENCE
 
 RATIOS = (FIRST_SIGHTING, OVERALL, TTFD)
 HEADINGS = {FIRST_SIGHTING: "First sightings", OVERALL: "Overall recall", TTFD: "Censored TTFD"}
-RANKINGS = {"tracks": "Tracked objects", "explained": "Explained detections"}
-"""What the columns count by which scenes are ranked, per keyframe."""
-FEWEST_SCENES = 9
-"""Three in each third: a smaller third would speak of one or two scenes, not of crowded ones."""
-DENSE_LESS_SPARSE = "dense minus sparse"
 OVER_EVENTS = "°"
 """Stands behind a difference whose interval comes from events."""
 
@@ -161,42 +154,12 @@ class PolicyPair:
         return scene_contrast(self.ratio, ours, theirs)
 
 
-@dataclass(frozen=True)
-class SceneThird:
-    """CARE less all-camera in a third of the scenes (paper, Sec. 5.2), or in the dense third less
-    the sparse.
-
-    `ranked_by` is the column of CARE's plays by which scenes are ranked.
-    """
-
-    which: str
-    ranked_by: str
-    ratio: Ratio
-    policies = (REFERENCE, "all-camera")
-
-    @property
-    def heading(self) -> str:
-        """The measure, and what scenes are ranked by."""
-        return f"{HEADINGS[self.ratio]}, by {self.ranked_by}"
-
-    @property
-    def label(self) -> str:
-        """The third."""
-        return self.which if self.which == DENSE_LESS_SPARSE else f"{self.which} third"
-
-    def measured(self, plays: SettingPlays, budget: float) -> MeasuredDifference | None:
-        """None with fewer than three scenes per third."""
-        groups = plays.thirds(self.ranked_by, budget)
-        if sum(map(len, groups.values())) < FEWEST_SCENES:
-            return None
-        ours, theirs = (plays.tallies(policy, budget) for policy in self.policies)
-        # The thirds are those of CARE at this budget for both policies, so that each scene is
-        # compared with itself.
-        if self.which != DENSE_LESS_SPARSE:
-            return difference_between(
-                self.ratio, {name: ours[name] for name in groups[self.which]}, theirs
-            )
-        return _dense_less_sparse(self.ratio, ours, theirs, groups)
+def reference_pairs(
+    plays: SettingPlays, ratio: Ratio = FIRST_SIGHTING, within: str = ""
+) -> list[PolicyPair]:
+    """CARE less history and less all-camera, where played."""
+    bases = (HISTORY, "all-camera")
+    return [PolicyPair(REFERENCE, base, ratio, within) for base in bases if base in plays.others]
 
 
 def difference_between(ratio: Ratio, ours: Tallies, theirs: Tallies) -> MeasuredDifference | None:
@@ -207,22 +170,6 @@ def difference_between(ratio: Ratio, ours: Tallies, theirs: Tallies) -> Measured
     return MeasuredDifference(
         ratio, found.by_event.mean, found.by_event if found.scenes >= FEWEST_PAIRS else None
     )
-
-
-def _dense_less_sparse(
-    ratio: Ratio, ours: Tallies, theirs: Tallies, groups: Mapping[str, Sequence[str]]
-) -> MeasuredDifference | None:
-    interval = contrast_gap(ratio, ours, theirs, groups["dense"], groups["sparse"])
-    if interval is None:
-        return None
-    # The two thirds are measured only to ask whether each has scenes enough for an interval of its
-    # own. Where one has not, that of the gap says nothing.
-    thirds = [
-        difference_between(ratio, {name: ours[name] for name in groups[which]}, theirs)
-        for which in ("dense", "sparse")
-    ]
-    enough = all(third and third.interval for third in thirds)
-    return MeasuredDifference(ratio, interval.mean, interval if enough else None)
 
 
 def _by_events(pair: PolicyPair, plays: SettingPlays, budget: float) -> Interval | None:

@@ -26,9 +26,9 @@ NO_INTERVAL = (
 )
 
 _OF_FULL = (
-    "Of full: recall in % of the full scan's, with its interval, of the scenes in which the full "
-    "scan finds anything and both were played. Scenes are resampled with what both found in them; "
-    f"no interval of fewer than {FEWEST_PAIRS}."
+    "Of full: recall in % of the full scan's, with its interval, over the scenes that both have. "
+    "Scenes are resampled with what both found in them; no interval where the full scan finds "
+    f"anything in fewer than {FEWEST_PAIRS}."
 )
 
 

@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from care_sim.base.errors import InvalidInput
+from care_sim.base.errors import InvalidInput, counted
 from care_sim.core.arrays import Floats
 from care_sim.evaluation.allocation_differences import AllocationDifference
 from care_sim.evaluation.recall import Tally
@@ -50,6 +50,12 @@ class SettingPlays:
         for row in budgeted:
             self._groups.setdefault((policy_of(row), row["budget"]), []).append(row)
         self._tallies: dict[tuple[str, float, str], Tallies] = {}
+        self._strata = _strata_of([*rows, *self.full])
+
+    @property
+    def title(self) -> str:
+        """The setting and the number of its scenes."""
+        return f"{self.setting.label}: {counted(len(self.scenes), 'scene')}"
 
     @property
     def policies(self) -> tuple[str, ...]:
@@ -71,12 +77,9 @@ class SettingPlays:
 
     def seeds(self, policy: str, budget: float, within: str = "") -> list[Tallies]:
         """The tallies of every floor seed, of all or of one stratum ("range/below 20 m")."""
-        # Columns of a stratum are named KIND/STRATUM/FIELD, those of all events by the field alone.
-        prefix = f"{within}/" if within else ""
         seeds: dict[int, dict[str, Tally]] = {}
         for row in self.rows(policy, budget):
-            tally = Tally(*(row[f"{prefix}{column}"] for column in _COLUMNS))
-            seeds.setdefault(row["floor_seed"], {})[row["scene"]] = tally
+            seeds.setdefault(row["floor_seed"], {})[row["scene"]] = _tally(row, within)
         return list(seeds.values())
 
     def tallies(self, policy: str, budget: float, within: str = "") -> Tallies:
@@ -135,11 +138,12 @@ class SettingPlays:
         return AllocationDifference(*(int(sum(row[column] for row in known)) for column in columns))
 
     def strata(self) -> dict[str, list[str]]:
-        """The labels of the strata by kind, as the rows name them."""
-        kinds: dict[str, list[str]] = {}
-        for kind, label in _strata_of(next(iter(self.scenes.values()))):
-            kinds.setdefault(kind, []).append(label)
-        return kinds
+        """The labels of the strata by kind, of the kinds that all rows have."""
+        return self._strata
+
+    def counted(self, ratio: Ratio, within: str = "") -> float:
+        """How many events or object frames a measure is of, in all scenes."""
+        return sum(ratio.denominator(_tally(row, within)) for row in self.scenes.values())
 
 
 def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
@@ -185,6 +189,21 @@ def _check_films(rows: Sequence[Row]) -> None:
             )
 
 
-def _strata_of(row: Row) -> list[tuple[str, str]]:
-    names = [name.split("/") for name in row if name.endswith("/events")]
-    return [(kind, label) for kind, label, _ in names]
+def _tally(row: Row, within: str) -> Tally:
+    # Columns of a stratum are named KIND/STRATUM/FIELD, those of all events by the field alone.
+    prefix = f"{within}/" if within else ""
+    return Tally(*(row[f"{prefix}{column}"] for column in _COLUMNS))
+
+
+def _strata_of(rows: Sequence[Row]) -> dict[str, list[str]]:
+    kinds: dict[str, list[str]] = {}
+    for name in rows[0]:
+        if name.endswith("/events"):
+            kind, label, _ = name.split("/")
+            kinds.setdefault(kind, []).append(label)
+    # Rows of older versions lack kinds.
+    return {
+        kind: labels
+        for kind, labels in kinds.items()
+        if all(f"{kind}/{label}/events" in row for row in rows for label in labels)
+    }

@@ -5,11 +5,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.reports.formatting import ends
-from care_sim.reports.protocol.differences import Comparison, MeasuredDifference, SceneThird
+from care_sim.reports.protocol.differences import Comparison, MeasuredDifference
 from care_sim.reports.protocol.formatting import MET, NOT_MET, UNDECIDED, judged, verdict
 from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, on_intervals, papers
 from care_sim.reports.protocol.paper import PAPER_BUDGETS, Claims, claims_about
 from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.reports.protocol.thirds import SceneThird
 from care_sim.reports.table import Table
 
 _Measured = Mapping[Comparison, Mapping[float, MeasuredDifference | None]]

@@ -9,13 +9,7 @@ from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.evaluation.strata import ENTRY, SCENE_THIRDS
 from care_sim.reports.formatting import interval, marked, tag_notes
-from care_sim.reports.protocol.differences import (
-    DENSE_LESS_SPARSE,
-    FEWEST_SCENES,
-    RANKINGS,
-    PolicyPair,
-    SceneThird,
-)
+from care_sim.reports.protocol.differences import reference_pairs
 from care_sim.reports.protocol.entries import ENTRY_NOTE
 from care_sim.reports.protocol.formatting import PAPER, claims_of_paper, rounded, written
 from care_sim.reports.protocol.notes import UNITS_OF_DIFFERENCES, papers
@@ -24,12 +18,16 @@ from care_sim.reports.protocol.paper import (
     PUBLISHED_ALLOCATIONS,
     claims_about,
 )
-from care_sim.reports.protocol.rows import HISTORY, SettingPlays
+from care_sim.reports.protocol.rows import SettingPlays
+from care_sim.reports.protocol.thirds import (
+    DENSE_LESS_SPARSE,
+    FEWEST_SCENES,
+    RANKINGS,
+    SceneThird,
+)
 from care_sim.reports.table import Table
 from care_sim.study.run_config import FULL, REFERENCE
 
-_BASES = (HISTORY, "all-camera")
-"""The policies with which strata compare CARE."""
 _RANKED = (
     "Scenes are ranked at each budget by CARE's plays there, means over keyframes and floor seeds. "
     f"No interval of fewer than {FEWEST_PAIRS} scenes."
@@ -45,17 +43,18 @@ _DIFFERING = (
 
 
 def strata_tables(plays: SettingPlays) -> list[Table]:
-    """Recall by range, azimuth, class and entry: the level of every policy and of the full scan,
-    and CARE less the others in `_BASES`.
+    """Recall by range, azimuth and class, overall recall by entry, too: the level of every policy
+    and of the full scan, and CARE less history and less all-camera.
     """
     if not plays.policies:
         return []
     columns = (
         *(marked(policy, tags) for policy, tags in plays.tags.items()),
         *((FULL,) if plays.full else ()),
-        *(pair.label for pair in _pairs(plays)),
+        *(pair.label for pair in reference_pairs(plays)),
     )
     notes = (*_on_strata(plays), *tag_notes(plays.tags.values()))
+    entries = (ENTRY_NOTE,) if ENTRY in plays.strata() else ()
     # The tables of thirds would follow. A note in the last table before them says why they are
     # missing.
     without = (_NO_THIRDS,) if REFERENCE in plays.policies and not _has_thirds(plays) else ()
@@ -69,15 +68,9 @@ def strata_tables(plays: SettingPlays) -> list[Table]:
         )
         for ratio, counted, more in (
             (FIRST_SIGHTING, "events", ()),
-            (OVERALL, "object frames", without),
+            (OVERALL, "object frames", (*entries, *without)),
         )
     ]
-
-
-def _pairs(
-    plays: SettingPlays, ratio: Ratio = FIRST_SIGHTING, within: str = ""
-) -> list[PolicyPair]:
-    return [PolicyPair(REFERENCE, base, ratio, within) for base in _BASES if base in plays.others]
 
 
 def _on_strata(plays: SettingPlays) -> tuple[str, ...]:
@@ -85,27 +78,22 @@ def _on_strata(plays: SettingPlays) -> tuple[str, ...]:
         "Intervals over scenes that have anything in the stratum, none of fewer than "
         f"{FEWEST_PAIRS}."
     )
-    entries = (ENTRY_NOTE,) if ENTRY in plays.strata() else ()
     return (
         "Levels in %. A stratum with nothing to find has no line.",
-        *((intervals,) if _pairs(plays) else ()),
-        *entries,
+        *((intervals,) if reference_pairs(plays) else ()),
     )
 
 
 def _strata_lines(plays: SettingPlays, ratio: Ratio) -> Iterator[tuple[str, ...]]:
     for kind, labels in plays.strata().items():
+        # First sightings by entry have a table of their own.
+        if (ratio, kind) == (FIRST_SIGHTING, ENTRY):
+            continue
         yield (kind,)
         for within in (f"{kind}/{label}" for label in labels):
-            if count := _counted(plays, ratio, within):
+            if count := plays.counted(ratio, within):
                 for budget in plays.budgets:
                     yield _stratum_line(plays, ratio, within, budget, count)
-
-
-def _counted(plays: SettingPlays, ratio: Ratio, within: str) -> float:
-    # First sightings are counted in events, overall recall in object frames.
-    column = "events" if ratio is FIRST_SIGHTING else "frames"
-    return float(sum(row[f"{within}/{column}"] for row in plays.scenes.values()))
 
 
 def _stratum_line(
@@ -121,7 +109,7 @@ def _stratum_line(
         percent(budget),
         f"{count:,.0f}",
         *(written(ratio, value) for value in levels),
-        *(interval(pair.measured(plays, budget)) for pair in _pairs(plays, ratio, within)),
+        *(interval(pair.measured(plays, budget)) for pair in reference_pairs(plays, ratio, within)),
     )
 
 

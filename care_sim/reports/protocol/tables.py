@@ -1,6 +1,6 @@
 """Tables of the first-sighting protocol: those of levels, and all others in their order."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import (
@@ -8,7 +8,7 @@ from care_sim.evaluation.scene_contrasts import (
     OVERALL,
     TTFD,
     Ratio,
-    Tallies,
+    among,
     ratio_level,
 )
 from care_sim.reports.formatting import marked, tag_notes
@@ -121,15 +121,11 @@ def _level_lines(plays: SettingPlays, policy: str, budget: float) -> list[tuple[
     return [line, ("", PAPER, *level_of_paper(said), *("" for _ in _DETAILS))]
 
 
-def _over(ratio: Ratio, tallies: Tallies, scenes: Collection[str]) -> float | None:
-    return ratio_level(ratio, {scene: tallies[scene] for scene in scenes}).by_event
-
-
 def _deviation(plays: SettingPlays, ratio: Ratio, policy: str, budget: float) -> str:
     """The most by which one floor seed differs from the mean, of the scenes that all seeds have."""
     mean = plays.tallies(policy, budget)
     # On the scenes that every seed has, else a missing scene would pass for the spread of seeds.
-    seeds = [_over(ratio, seed, mean) for seed in plays.seeds(policy, budget)]
-    middle = _over(ratio, mean, mean)
+    seeds = [ratio_level(ratio, among(seed, mean)).by_event for seed in plays.seeds(policy, budget)]
+    middle = plays.level(ratio, policy, budget).by_event
     off = [abs(value - middle) for value in seeds if value is not None and middle is not None]
     return written(ratio, max(off)) if len(off) > 1 else ""

@@ -18,7 +18,8 @@ from care_sim.study.run_config import FULL
 
 _RULE = (
     f"The {BEST_CONTROL} is that with the farthest first detection at the budget, as a mean over "
-    f"its seeds, in which a missed actor counts as in differences. {IN_HINDSIGHT}"
+    "the seeds that all controls have there, in which a missed actor counts as in differences. "
+    f"{IN_HINDSIGHT}"
 )
 
 
@@ -35,13 +36,13 @@ def control_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> l
         return []
     budgets = sorted({cell.budget for cell in cells if cell.policy in controls})
     best = {budget: _best(setting, controls, budget, groups) for budget in budgets}
-    lines: list[tuple[str, ...]] = [(BEST_CONTROL, *best.values())]
+    lines: list[tuple[str, ...]] = [(BEST_CONTROL, *(each or "" for each in best.values()))]
     for policy in (*rivals, *((FULL,) if full else ())):
         found = (
             contrast(
                 DETECTION,
                 full if policy == FULL else groups.get((setting, policy, budget)),
-                groups[setting, control, budget],
+                groups[setting, control, budget] if control else None,
             )
             for budget, control in best.items()
         )
@@ -56,13 +57,17 @@ def control_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> l
     ]
 
 
-def _best(setting: Setting, controls: Sequence[str], budget: float, groups: Groups) -> str:
-    levels = {
-        control: float(np.mean([detection(row).value for row in groups[setting, control, budget]]))
+def _best(setting: Setting, controls: Sequence[str], budget: float, groups: Groups) -> str | None:
+    """The best control at a budget at which one was played; None where they share no seed."""
+    distances = {
+        control: {row["seed"]: detection(row).value for row in groups[setting, control, budget]}
         for control in controls
         if (setting, control, budget) in groups
     }
-    best = best_control(levels)
-    # A budget stands here because a control was played there.
-    assert best is not None
-    return best
+    # A control that lacks a seed with a late actor would win by that.
+    seeds = sorted(set.intersection(*map(set, distances.values())))
+    if not seeds:
+        return None
+    return best_control(
+        {control: float(np.mean([by[s] for s in seeds])) for control, by in distances.items()}
+    )

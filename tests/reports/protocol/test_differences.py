@@ -7,13 +7,9 @@ import pytest
 
 from care_sim.evaluation.bootstrap import Interval, paired_difference
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, TTFD
-from care_sim.reports.protocol.differences import (
-    DENSE_LESS_SPARSE,
-    MeasuredDifference,
-    PolicyPair,
-    SceneThird,
-)
+from care_sim.reports.protocol.differences import MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.rows import plays_by_setting
+from care_sim.reports.protocol.thirds import DENSE_LESS_SPARSE, SceneThird
 from tests.helpers.made_plays import found, play, study
 
 FIRST = PolicyPair("care", "history", FIRST_SIGHTING)

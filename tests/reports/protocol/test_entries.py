@@ -1,8 +1,11 @@
 """First sightings by entry: plain, and as a share of what the full scan finds."""
 
+import pytest
+
 from care_sim.evaluation.sightings import RANGE_M
-from care_sim.evaluation.strata import ENTRIES, RING_M
+from care_sim.evaluation.strata import ENTRIES
 from care_sim.reports.protocol.entries import ENTRY_NOTE
+from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.reports.protocol.tables import protocol_tables
 from care_sim.reports.report import read_results
 from care_sim.study.results_formats import PLAYS
@@ -40,7 +43,34 @@ def test_recall_and_its_share_of_the_full_scans_by_entry():
 
 def test_the_note_tells_every_entry_and_its_bounds():
     assert all(f"{entry}: " in ENTRY_NOTE for entry in ENTRIES)
-    assert f"{RING_M:.0f} to {RANGE_M:.0f} m" in ENTRY_NOTE
+    assert "nearer than 45 m" in ENTRY_NOTE
+    assert f"from 45 to {RANGE_M:.0f} m" in ENTRY_NOTE
+
+
+def test_without_a_full_scan_there_is_no_line_of_it():
+    names = [line[0] for line in tables(study({"care": (6, 5)}))[NAME].rows]
+    assert names == ["emergence, 42 events", "care", "ring, 42 events", "care",
+                     "beyond, 36 events", "care"]  # fmt: skip
+
+
+def test_an_entry_that_no_object_took_has_no_block():
+    """Two events a scene: the third entry has none."""
+    rows = [play(f"{n}", policy, [0, 6], [1, 1]) for n in range(6) for policy in ("care", "full")]
+    assert [line[0] for line in tables(rows)[NAME].rows if len(line) == 1] == [
+        "emergence, 6 events",
+        "ring, 6 events",
+    ]
+    assert NAME not in tables([play("a", "care", [], [])])
+
+
+def test_care_is_compared_with_history_and_all_camera_by_entry():
+    rows = study({"care": (6, 5), "history": (3, 5), "mine": (4, 5), "full": (8, 8)})
+    table = tables(rows)[NAME]
+    assert table.rows[5] == ("care minus history", *["+14.3 [14.3,14.3]"] * 3)
+    assert [line[0] for line in table.rows[:6]] == [
+        "emergence, 42 events", "care", "history", "mine", "full", "care minus history"
+    ]  # fmt: skip
+    assert "Differences in points." in table.notes
 
 
 def test_an_entry_of_which_the_full_scan_finds_nothing_has_no_share():
@@ -61,15 +91,37 @@ def test_an_entry_of_which_the_full_scan_finds_nothing_has_no_share():
     assert lines[ring + 1 : ring + 3] == (("care", "100.0"), ("full", "0.0"))
 
 
-def test_strata_list_entries_too_and_leave_out_those_with_nothing_to_find():
+def test_overall_recall_is_told_by_entry_too_and_first_sightings_are_not_told_twice():
     """Rows of real plays have the objects present at start as a stratum without an event."""
     start = {f"entry/at start/{name}": 0.0 for name in ("events", "sighted", "delay", "found")}
     shown = tables([row | start | {"entry/at start/frames": 4.0} for row in ROWS])
     first, overall = (shown[f"{name} recall by stratum"] for name in ("first-sighting", "overall"))
-    assert "at start" not in {line[0] for line in first.rows}
+    assert not {line[0] for line in first.rows} & {"entry", *ENTRIES}
     assert {line[2] for line in overall.rows if line[0] == "at start"} == {"24"}
-    assert ENTRY_NOTE in first.notes
+    assert ENTRY_NOTE not in first.notes
     assert ENTRY_NOTE in overall.notes
+
+
+@pytest.mark.parametrize("number", [0, 6, -1])
+def test_where_a_row_lacks_entries_nothing_is_told_by_entry(number):
+    """The first of all, one of another seed, and one of the full scan."""
+    old = {name: value for name, value in ROWS[number].items() if not name.startswith("entry/")}
+    rows = [old if row is ROWS[number] else row for row in ROWS]
+    shown = tables(rows)
+    assert NAME not in shown
+    kinds = [line[0] for line in shown["overall recall by stratum"].rows if len(line) == 1]
+    assert kinds == ["range", "azimuth", "class"]
+
+
+def test_a_borrowed_full_scan_without_entries_has_none_to_tell():
+    late = study({"care": (6, 5)}, camera_latency=1)
+    full = [
+        {name: value for name, value in row.items() if not name.startswith("entry/")}
+        for row in study({"full": (8, 8)})
+    ]
+    (borrowing,) = plays_by_setting([*late, *full])
+    assert borrowing.full
+    assert [*borrowing.strata()] == ["range", "azimuth", "class"]
 
 
 def test_rows_of_before_there_were_entries_are_read_and_have_no_such_table(tmp_path):
@@ -81,7 +133,7 @@ def test_rows_of_before_there_were_entries_are_read_and_have_no_such_table(tmp_p
     kept, protocol, _ = read_results(tmp_path)
     shown = {table.title.rpartition(": ")[2]: table for table in protocol.tables(kept)}
     assert NAME not in shown
-    strata = shown["first-sighting recall by stratum"]
+    strata = shown["overall recall by stratum"]
     assert [line[0] for line in strata.rows if len(line) == 1] == ["range", "azimuth", "class"]
     assert ENTRY_NOTE not in strata.notes
     now = tables()

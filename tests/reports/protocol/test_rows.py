@@ -5,7 +5,7 @@ import pytest
 
 from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.recall import Tally
-from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
+from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL
 from care_sim.reports.protocol.rows import plays_by_setting
 from care_sim.study.rows.reading import setting_of
 from care_sim.study.rows.settings import Setting
@@ -149,3 +149,16 @@ def test_a_share_needs_a_full_scan_that_finds_something():
     assert alone.share_of_full(FIRST_SIGHTING, "care", 0.1) is None
     (blind,) = plays_by_setting(study({"care": (6, 5), "full": (0, 0)}))
     assert blind.share_of_full(FIRST_SIGHTING, "care", 0.1) is None
+
+
+def test_a_setting_is_titled_by_the_number_of_its_scenes():
+    assert [
+        plays_by_setting(study({"care": (6, 5)}, scenes=scenes))[0].title.rpartition(": ")[2]
+        for scenes in (1, 2)
+    ] == ["1 scene", "2 scenes"]
+
+
+def test_events_and_object_frames_are_counted_once_a_scene():
+    (plays,) = plays_by_setting(study({"care": (6, 5), "full": (8, 8)}, scenes=2))
+    assert (plays.counted(FIRST_SIGHTING), plays.counted(OVERALL)) == (40, 400)
+    assert plays.counted(FIRST_SIGHTING, "entry/beyond") == 12

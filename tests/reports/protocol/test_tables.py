@@ -305,7 +305,6 @@ def test_strata_have_the_level_of_every_policy_and_contrasts():
         "range",
         "azimuth",
         "class",
-        "entry",
     ]
     side = next(line for line in table.rows if line[:2] == ("side", "10%"))
     assert dict(zip(table.columns, side, strict=True)) == {

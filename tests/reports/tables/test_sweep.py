@@ -201,6 +201,27 @@ def test_the_best_control_is_that_of_each_budget():
     assert lines["history"][0] == ""
 
 
+def test_controls_are_compared_on_the_seeds_that_all_of_them_have():
+    """`fan` lacks the seed with the late actor, and of the others `stride` sees all farther."""
+    fan = rows("random", [9.0] * 4, changes={"policy": "fan", **CONTROL})
+    stride = rows("random", [9.5] * 4 + [2.0], changes={"policy": "stride", **CONTROL})
+    (table,) = over_control([*STUDY, *fan, *stride])
+    assert table.rows[0] == ("best control", "stride")
+    (table,) = over_control([*STUDY, *fan, stride[-1]])
+    assert table.rows[0] == ("best control", "")
+    assert {line[1] for line in table.rows} == {""}
+
+
+def test_the_full_scan_of_the_same_worlds_stands_beside_controls_under_a_camera_fault():
+    """The full scan asks no camera and is played once, without the fault."""
+    blind = {"false_negative_rate": 0.5}
+    late = rows("random", [8.0] * 5, changes={"policy": "fan", **CONTROL}, **blind)
+    (table,) = over_control([*STUDY, *late])
+    assert table.title.startswith("dense, ")
+    assert [line[0] for line in table.rows] == ["best control", "full"]
+    assert table.rows[1][1].startswith("+9.1* [")
+
+
 def test_controls_alone_and_no_control_have_no_such_table():
     assert over_control(STUDY) == []
     assert over_control(CONTROLS[:10]) == []
