@@ -166,6 +166,16 @@ def test_ahead_are_the_lines_of_the_street_the_nearest_to_straight_ahead_first(l
     assert (np.diff(off) >= 0).all()
 
 
+def test_ahead_leaves_out_what_is_hidden(lines, belief_of):
+    """A wall at 10 m with a gap of two columns straight ahead."""
+    ranges = np.full(COLUMNS, 10.0)
+    middle = COLUMNS // 2
+    ranges[middle - 1 : middle + 1] = GRID.range_m
+    lines.update(belief_of(ranges=scan_of(ranges)))
+    shown = range(middle - 1 - EDGE_COLUMNS, middle + 1 + EDGE_COLUMNS)
+    assert sorted(lines.ahead() - ROW * COLUMNS) == [*shown]
+
+
 def test_with_a_short_reach_a_line_without_a_return_is_open(belief_of):
     rig = Rig(grid=AngularGrid(range_m=20.0))
     lines = SightLines(rig, ROW)
