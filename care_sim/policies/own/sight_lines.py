@@ -60,7 +60,7 @@ class SightLines:
     def update(self, belief: Belief) -> None:
         """Take in the last scan, and move what is remembered by what the car has driven since."""
         seen = belief.ranges[self._row]
-        self.ranges[seen > 0] = seen[seen > 0]
+        np.copyto(self.ranges, seen, where=seen > 0)
         driven = belief.ego.speed * self._keyframe_s
         turned = belief.ego.yaw_rate * self._keyframe_s
         self.ranges = _moved(self.ranges, self._azimuths, driven, turned, self._reach)
