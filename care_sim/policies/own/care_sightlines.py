@@ -87,11 +87,12 @@ class CareSightlines(Policy):
         unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else ([], [])
         rechecked = known if self._rechecks else []
         hulls = self.rig.hulls(belief.tracks.boxes)
+        few, more = self._hull_round, self._wedge_round
+        most = max(self._wedge_most, few + more)
         wedges, rechecked, hulls = self.rig.listed_groups(
-            [unexplained, rechecked, hulls], CORE_FIRST
+            [unexplained, rechecked, hulls], CORE_FIRST, most
         )
         self._lines.update(belief)
-        few, more = self._hull_round, self._wedge_round
         return Demand(
             layers=[
                 part(wedges, 0, more),

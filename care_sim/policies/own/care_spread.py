@@ -49,7 +49,8 @@ class CareSpread(Policy):
         """Layers: a round of wedges, a round of hulls, and both again."""
         unexplained, _ = camera_layers(belief, self.rig)
         hulls = self.rig.hulls(belief.tracks.boxes)
-        wedges, hulls = self.rig.listed_groups([unexplained, hulls], CORE_FIRST)
+        most = 2 * max(self._wedge_round, self._hull_round)
+        wedges, hulls = self.rig.listed_groups([unexplained, hulls], CORE_FIRST, most)
         return Demand(
             layers=[
                 part(wedges, 0, self._wedge_round),
