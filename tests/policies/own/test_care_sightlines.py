@@ -127,6 +127,16 @@ def test_a_wedge_gets_as_many_rounds_as_asked_for(environment, encounter):
     assert longest == 9
 
 
+def test_one_round_of_wedges_leaves_hulls_their_second(environment, encounter):
+    policy = care_sim.make_policy("care-sightlines", environment, wedge_rounds=1)
+    longest = np.zeros(2, int)
+    for observation in encounter:
+        layers = policy.demand(policy.rig.read(observation)).layers
+        found = [max(map(len, layers[number]), default=0) for number in (5, 7)]
+        longest = np.maximum(longest, found)
+    assert longest.tolist() == [0, 9]
+
+
 def test_the_last_layer_is_the_pattern_rows(environment, encounter):
     policy = care_sim.make_policy("care-sightlines", environment)
     policy(encounter[0])
