@@ -78,6 +78,13 @@ class AngularGrid:
         return GridSpacing(self.columns, self.rows, self.column_width, top, height)
 
     @cached_property
+    def elevations(self) -> Floats:
+        """(rows,) elevation of the rays of every row, radians, from the top."""
+        elevations = np.linspace(self.top, self.bottom, self.rows)
+        elevations.flags.writeable = False
+        return elevations
+
+    @cached_property
     def fan(self) -> tuple[Floats, Floats]:
         """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of
         every row (rows, 2).
@@ -85,9 +92,9 @@ class AngularGrid:
         # A column is a sector, and its ray runs through the middle. A row is a ring: its elevation
         # is that of the ray itself.
         azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
-        elevations = np.linspace(self.top, self.bottom, self.rows)
         across, down = (
-            np.stack([np.cos(angles), np.sin(angles)], axis=1) for angles in (azimuths, elevations)
+            np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            for angles in (azimuths, self.elevations)
         )
         across.flags.writeable = down.flags.writeable = False
         return across, down

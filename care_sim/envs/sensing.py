@@ -86,7 +86,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
 
     @property
     def min_returns(self) -> int:
-        """How many fired rays must hit an object for it to be detected."""
+        """How many fired rays must hit an object for the proxy to detect it; with another detector,
+        which does not know it, the default.
+        """
         return self.conditions.min_returns
 
     @property

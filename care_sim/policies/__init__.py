@@ -10,8 +10,9 @@ from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, shown
 from care_sim.base.plugins import Plugins
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.fan import Fan
+from care_sim.policies.controls.history_place import HistoryPlace
 from care_sim.policies.controls.history_rows import HistoryRows
-from care_sim.policies.controls.place import HistoryPlace, Place
+from care_sim.policies.controls.place import Place
 from care_sim.policies.controls.rows import Rows
 from care_sim.policies.controls.stride import Stride
 from care_sim.policies.controls.sweep import Sweep

@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.allocation import allocate
-from care_sim.core.cell_order import (
-    _COLUMN_STEP,
-    _ROW_STEP,
-    AS_DEMANDED,
-    CELL_ORDERS,
-    SetMargins,
-    reordered,
-)
+from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, reordered
+from care_sim.core.cell_order_kernels import COLUMN_STEP, ROW_STEP, SetMargins
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -54,6 +48,18 @@ def rectangles(draw):
 @given(st.lists(st.integers(0, GRID.size - 1), unique=True), st.sampled_from(ORDERS))
 def test_every_order_lists_the_cells_of_the_set(cells, order):
     assert np.sort(listed(np.array(cells, np.int64), order)).tolist() == sorted(cells)
+
+
+@given(
+    st.lists(rectangles(), max_size=4),
+    st.integers(0, 50) | st.integers(0, 2 * GRID.size),
+    st.sampled_from(ORDERS),
+)
+def test_the_first_few_cells_are_those_of_the_whole_order(where, most, order):
+    sets = [rectangle(*each) for each in where]
+    whole = reordered(sets, order, GRID.spacing, MARGINS)
+    first = reordered(sets, order, GRID.spacing, MARGINS, most)
+    assert [cells.tolist() for cells in first] == [cells[:most].tolist() for cells in whole]
 
 
 @given(rectangles())
@@ -219,7 +225,7 @@ def by_the_letter(cells, order, grid, margins):
     def key(cell):
         row, column = divmod(cell, grid.columns)
         place = (column - first) % grid.columns
-        number = (place * _COLUMN_STEP + (row - min(rows)) * _ROW_STEP) % 2**32
+        number = (place * COLUMN_STEP + (row - min(rows)) * ROW_STEP) % 2**32
         in_core = (
             side <= place < width - side
             and (min(rows) == 0 or row >= min(rows) + ends)

@@ -59,6 +59,13 @@ def footprint_holds_sensor(box):
     return abs(x) <= box[3] / 2 and abs(y) <= box[4] / 2
 
 
+def test_the_elevations_of_rows_are_those_of_their_rays():
+    upwards = GRID.directions[:: GRID.columns, 2]
+    assert np.allclose(GRID.elevations, np.arcsin(upwards))
+    assert np.rad2deg(GRID.elevations[[0, -1]]) == pytest.approx([10.67, -30.67])
+    assert not GRID.elevations.flags.writeable
+
+
 def test_the_default_grid_is_the_papers():
     assert GRID.shape == (32, 512)
     assert GRID.size == 16384

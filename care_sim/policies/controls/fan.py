@@ -8,7 +8,9 @@ from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 
 LOWEST_DEG = -10.7
-"""The fan reaches from the horizon down to where the road is 10 m away."""
+"""The fan reaches from the horizon down to here. The lowest row of the default grid above it, at
+-10.67 degrees, meets the road 9.8 m away from the default sensor, 1.84 m above it. It does not
+follow the rig's `sensor_height_m`."""
 
 
 class Fan(Policy):
@@ -25,7 +27,7 @@ class Fan(Policy):
     def __init__(self, rig: Rig):
         super().__init__(rig)
         grid = rig.grid
-        elevations = np.linspace(grid.top, grid.bottom, grid.rows)
+        elevations = grid.elevations
         is_low = (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
         ahead = np.argsort(np.abs(np.arange(grid.columns) + 0.5 - grid.columns / 2), kind="stable")
         parts = [np.flatnonzero(rows) * grid.columns + ahead[:, None] for rows in (is_low, ~is_low)]

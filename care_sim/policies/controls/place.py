@@ -35,24 +35,6 @@ class Place(Policy):
         return Demand(layers=[[self._pattern]])
 
 
-class HistoryPlace(Policy):
-    """The hulls of the history policy; the reserve goes to the map of `place`."""
-
-    name = "history-place"
-    tags = ("causal", "learned", "control")
-    source = "own: history, and a map that never changes"
-    keeps_order = True
-
-    def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
-        super().__init__(rig)
-        self._pattern = likeliest_cells(rig, path)
-
-    def demand(self, belief: Belief) -> Demand:
-        """Hulls, then the map."""
-        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
-        return Demand(hulls, [[self._pattern]])
-
-
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:
     """(N,) all cells, those with most first sightings first; of equals, as `rows` has them."""
     weights = load_weights(shipped_weights("place") if path is None else path)

@@ -11,8 +11,9 @@ from care_sim.policies.base import Policy
 from care_sim.policies.paper.history_uniform import GOLDEN
 
 RING_ELEVATION_DEG = -1.25
-"""Where the middle of a car 1.5 m high stands, 50 m away, for a sensor 1.84 m above the road:
-atan((0.75 - 1.84) / 50). What enters the range of scoring by driving enters it there."""
+"""Where the middle of a car 1.5 m high stands, 50 m away, for the default sensor, 1.84 m above the
+road: atan((0.75 - 1.84) / 50). What enters the range of scoring by driving enters it there. It does
+not follow the rig's `sensor_height_m`."""
 
 
 class Rows(Policy):
@@ -39,8 +40,7 @@ def nearest_rows(grid: AngularGrid, elevation_deg: float = RING_ELEVATION_DEG) -
     """(N,) all cells, row after row, the row nearest to an elevation first; every first few cells
     of a row lie evenly over it.
     """
-    elevations = np.rad2deg(np.linspace(grid.top, grid.bottom, grid.rows))
-    rows = np.argsort(np.abs(elevations - elevation_deg), kind="stable")
+    rows = np.argsort(np.abs(np.rad2deg(grid.elevations) - elevation_deg), kind="stable")
     columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
     cells: Cells = (rows[:, None] * grid.columns + columns).ravel()
     return cells

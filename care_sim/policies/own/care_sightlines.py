@@ -1,13 +1,11 @@
 """CARE in rounds, with a watch on open lines of sight for what the camera has not told yet."""
 
 from collections.abc import Mapping
-from itertools import islice
 from typing import ClassVar
 
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -22,8 +20,8 @@ from care_sim.policies.own.care_spread import (
 from care_sim.policies.own.sight_lines import SightLines
 
 WEDGE_ROUNDS = 4
-"""Rounds that an unexplained wedge gets at most."""
-_NONE: list[Cells] = []
+"""Rounds that an unexplained wedge gets at most. Chosen on the calibration's streets 1000 to 1007
+and on streets 2000 to 2007, none of which is scored."""
 
 
 class CareSightlines(Policy):
@@ -59,8 +57,14 @@ class CareSightlines(Policy):
         super().__init__(rig)
         check_whole("min_returns", min_returns, 1)
         check_whole("wedge_rounds", wedge_rounds, 1)
-        switches = {"camera": camera, "ahead": ahead, "explained": explained}
-        for name, value in (switches | {"sight_lines": sight_lines, "rows": rows}).items():
+        switches = {
+            "camera": camera,
+            "ahead": ahead,
+            "explained": explained,
+            "sight_lines": sight_lines,
+            "rows": rows,
+        }
+        for name, value in switches.items():
             check_flag(name, value)
         self._hull_round = HULL_CELLS_PER_RETURN * min_returns
         self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
@@ -69,26 +73,26 @@ class CareSightlines(Policy):
         self._looks_ahead = ahead
         self._rechecks = explained
         self._watches = sight_lines
-        self._rows = [nearest_rows(rig.grid)] if rows else []
+        pattern = nearest_rows(rig.grid)
+        self._row = int(pattern[0]) // rig.grid.columns
+        self._rows = [pattern] if rows else []
         self.reset()
 
     def reset(self) -> None:
         """Forget what was seen."""
-        row = int(nearest_rows(self.rig.grid)[0]) // self.rig.grid.columns
-        self._lines = SightLines(self.rig, row)
+        self._lines = SightLines(self.rig, self._row)
 
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
-        unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else (_NONE,) * 2
-        rechecked = known if self._rechecks else _NONE
+        unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else ([], [])
+        rechecked = known if self._rechecks else []
         hulls = self.rig.hulls(belief.tracks.boxes)
-        # All at once, which takes less time than one kind after the other.
-        listed = iter(self.rig.listed([*unexplained, *rechecked, *hulls], CORE_FIRST))
-        wedges = [*islice(listed, len(unexplained))]
-        rechecked = [*islice(listed, len(rechecked))]
-        hulls = [*listed]
-        self._lines.update(belief)
         few, more = self._hull_round, self._wedge_round
+        most = max(self._wedge_most, few + more)
+        wedges, rechecked, hulls = self.rig.listed_groups(
+            [unexplained, rechecked, hulls], CORE_FIRST, most
+        )
+        self._lines.update(belief)
         return Demand(
             layers=[
                 part(wedges, 0, more),

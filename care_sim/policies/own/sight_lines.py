@@ -35,40 +35,44 @@ class SightLines:
     What drives into the range enters it at the end of an open line of sight; what was hidden shows
     itself at an edge. A line along which nothing is remembered counts as open. `ranges` (A,) are
     metres as of the coming keyframe, the grid's reach where nothing is remembered.
+
+    A limit: a lost return looks like an open line. On a dead row (`lidar_dead_rows`) every line is
+    open for ever, and whoever watches it spends cells there for nothing.
     """
 
     ranges: Floats
 
     def __init__(self, rig: Rig, row: int):
-        self._rig = rig
         self._row = row
+        self._keyframe_s = rig.keyframe_s
         columns = rig.grid.columns
         middles = np.arange(columns, dtype=np.float64) + 0.5
         self._azimuths: Floats = np.asarray(middles * rig.grid.column_width - np.pi)
+        nearest_first = np.argsort(np.abs(self._azimuths), kind="stable")
+        self._sector = nearest_first[np.abs(self._azimuths[nearest_first]) <= AHEAD_RAD]
+        # Of a line without a return a scan says the reach in float32, which can be less than it.
+        self._reach = float(np.float32(rig.grid.range_m))
         # On a grid of shorter reach, a line without a return is open all the same.
-        self._open_m = min(OPEN_M, rig.grid.range_m / 2)
-        self.ranges = np.full(columns, rig.grid.range_m, np.float64)
+        self._open_m = min(OPEN_M, self._reach / 2)
+        self.ranges = np.full(columns, self._reach)
+        self._watched = _open_or_edge(self.ranges, self._open_m)
 
     def update(self, belief: Belief) -> None:
         """Take in the last scan, and move what is remembered by what the car has driven since."""
         seen = belief.ranges[self._row]
-        self.ranges[seen > 0] = seen[seen > 0]
-        driven = belief.ego.speed * self._rig.keyframe_s
-        turned = belief.ego.yaw_rate * self._rig.keyframe_s
-        self.ranges = _moved(self.ranges, self._azimuths, driven, turned, self._rig.grid.range_m)
+        np.copyto(self.ranges, seen, where=seen > 0)
+        driven = belief.ego.speed * self._keyframe_s
+        turned = belief.ego.yaw_rate * self._keyframe_s
+        self.ranges = _moved(self.ranges, self._azimuths, driven, turned, self._reach)
+        self._watched = _open_or_edge(self.ranges, self._open_m)
 
     def ahead(self) -> Cells:
         """What is worth a look within `AHEAD_RAD` of straight ahead, the nearest to it first."""
-        columns = np.flatnonzero(self._watched() & (np.abs(self._azimuths) <= AHEAD_RAD))
-        nearest_first = np.argsort(np.abs(self._azimuths[columns]), kind="stable")
-        return self._cells(columns[nearest_first])
+        return self._cells(self._sector[self._watched[self._sector]])
 
     def cells(self) -> Cells:
         """All that is worth a look in the row, ascending."""
-        return self._cells(np.flatnonzero(self._watched()))
-
-    def _watched(self) -> Mask:
-        return _open_or_edge(self.ranges, self._open_m)
+        return self._cells(np.flatnonzero(self._watched))
 
     def _cells(self, columns: Cells) -> Cells:
         cells: Cells = self._row * len(self.ranges) + columns

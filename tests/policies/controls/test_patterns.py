@@ -17,6 +17,7 @@ from care_sim.policies.controls.rows import Rows, nearest_rows
 from care_sim.policies.controls.stride import Stride
 from care_sim.policies.controls.sweep import Sweep
 from care_sim.policies.learned.weights import Card, save_weights
+from care_sim.policies.paper.history_uniform import uniform_pattern
 
 CONTROLS = ["rows", "fan", "stride", "sweep", "place", "history-rows", "history-place"]
 PATTERNS = [Rows, Fan, Stride, Sweep, Place]
@@ -102,6 +103,20 @@ def test_the_sweep_goes_on_where_it_stopped():
     assert second[0] == 3 + 4 * GRID.columns
     policy.reset()
     assert np.array_equal(chosen(policy), first)
+
+
+def test_the_sweep_fires_every_cell_once_in_a_turn():
+    """16 times 1000 cells and the first 384 of the 17th keyframe."""
+    policy = Sweep(Rig(budget=1000))
+    cells = np.concatenate([chosen(policy) for _ in range(17)])
+    assert sorted(cells[: GRID.size]) == [*range(GRID.size)]
+    assert np.array_equal(cells[GRID.size :], cells[: 17_000 - GRID.size])
+
+
+@pytest.mark.parametrize("budget", [100, 1638])
+def test_the_stride_is_the_even_pattern_of_the_budget_that_it_is_told(budget):
+    ((cells,),) = Stride(Rig(budget=819)).demand(BudgetAlone(budget)).layers
+    assert np.array_equal(cells, uniform_pattern(GRID, budget))
 
 
 def test_place_takes_the_highest_of_its_map(tmp_path):
