@@ -35,7 +35,7 @@ class TrainPlace:
         grid = AngularGrid()
         found: list[Cells] = []
         for number, seed in enumerate(CALIBRATION_SEEDS, 1):
-            told = f"street {number} of {len(CALIBRATION_SEEDS)}"
+            told = f"calibration street {number} of {len(CALIBRATION_SEEDS)}"
             print(told, end="\r", file=sys.stderr, flush=True)
             found += first_returns(street_film(seed))
         save_weights(self.out, {"sightings": sighting_map(found, grid)}, _card(grid, len(found)))

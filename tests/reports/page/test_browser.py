@@ -358,7 +358,7 @@ def test_the_page_of_the_papers_study_is_small_and_quick(opened, tmp_path):
     path = tmp_path / "report.html"
     played = OneSeed()
     made = write_page(ROOT / "results" / "closed-loop-5", path, 400, 1, lambda _workers: played)
-    assert len(played.first) == 49
+    assert len(played.first) == 61
     assert made.watchable == len(made.rows) == 305
     assert path.stat().st_size < MOST_BYTES
     assert any(opened(path, READY).evaluate("performance.now()") < MOST_MS for _ in range(3))
