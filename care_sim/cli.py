@@ -83,8 +83,8 @@ COMMANDS = {
         "order",
         "Order",
         "Play the paper's closed-loop study under every order of the cells inside a set, 279 "
-        "configurations per seed, or with --source the first-sighting protocol, and list what the "
-        "paper says order by order.",
+        "configurations per seed and those of --also, or with --source the first-sighting "
+        "protocol, and list what the paper says order by order.",
     ),
     "faults": CommandEntry(
         "faults",

@@ -6,7 +6,7 @@ from functools import cached_property
 from itertools import chain, islice
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import check_known
+from care_sim.base.checks import check_known, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.allocation import RESERVE_FRACTION, budget_cells, stages_of
 from care_sim.core.arrays import Floats, Integers
@@ -119,6 +119,8 @@ class Rig:
 
         Raises InvalidInput for another order, and for a cell that the grid does not have.
         """
+        if most is not None:
+            check_whole("most", most, 0)
         order = usual if self.cell_order == AS_DEMANDED else self.cell_order
         if order == AS_DEMANDED:
             return [cells[:most] for cells in sets]

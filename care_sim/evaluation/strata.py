@@ -4,8 +4,8 @@ The paper stratifies by range and azimuth. Class and `entry` are ours. `entry` i
 within the range R that is scored, told by where the film first shows it. On a street that is where
 a return or a camera pixel first does, in a recording where its box first holds a recorded point:
 
-- `emergence`: nearer than R less `RING_WIDTH_M`, taken for out from behind a body;
-- `ring`: from there to R, taken for over the edge of the range;
+- `emergence`: nearer than R less `RING_WIDTH_M`, presumably out from behind a body;
+- `ring`: from there to R, presumably over the edge of the range;
 - `beyond`: farther off than R, so that it was shown before it was scored;
 - `at start`: it is no event, for it was present at scene start (`care_sim.evaluation.sightings`).
 

@@ -18,8 +18,8 @@ from care_sim.study.run_config import FULL
 
 _RING_M = RANGE_M - RING_WIDTH_M
 _TOLD = {
-    EMERGENCE: f"nearer than {_RING_M:.0f} m, taken for out from behind a body",
-    RING: f"from {_RING_M:.0f} to {RANGE_M:.0f} m, taken for over the edge of the range",
+    EMERGENCE: f"nearer than {_RING_M:.0f} m, presumably out from behind a body",
+    RING: f"from {_RING_M:.0f} to {RANGE_M:.0f} m, presumably over the edge of the range",
     BEYOND: f"beyond {RANGE_M:.0f} m, before it was scored",
 }
 ENTRY_NOTE = (

@@ -148,6 +148,10 @@ IDEAS = Ablation(
         Variant("without cores first", {"cell_order": "rows-down"}),
     ),
     ("care-spread", "care"),
+    (
+        "The references keep their camera and all else; without cores first they too list their "
+        "sets row by row.",
+    ),
 )
 ABLATIONS = (
     RESERVE_FRACTION,
