@@ -59,7 +59,8 @@ class Cluster:
         )
 
     def wait(self):
-        until(self._file.exists)
+        # The file is there before anything is written into it.
+        until(lambda: self._file.exists() and self._file.read_text().endswith("}"))
         self.address = json.loads(self._file.read_text())["address"]
 
     def worker(self, *options, **environment):
