@@ -1,16 +1,16 @@
 """The command line `care-sim`: finds the command, runs it, and says in one line what went wrong."""
 
 import contextlib
-import importlib
 import io
 import os
 import shutil
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 from care_sim.base import interrupts
 from care_sim.base.errors import InvalidInput, MissingExtra, one_line, shortened, shown
+from care_sim.commands.entries import COMMANDS
 from care_sim.commands.shared.parsing import chosen_command
 
 _BAD_INPUT = 2
@@ -27,136 +27,6 @@ _LONGEST = 2000
 """Characters of a complaint, at the most."""
 _NARROWEST = 20
 """Columns of a terminal for which help is laid out, at the least."""
-
-
-class CommandEntry(NamedTuple):
-    """Where a command is, and what `care-sim --help` says of it."""
-
-    module: str
-    name: str
-    about: str
-
-    def loaded(self) -> Any:
-        """The dataclass of its options, whose call runs it; or a table of several by name.
-
-        Only the command that is asked for is imported: what plays, draws or learns takes seconds to
-        import, for which `care-sim --help` and a mistyped name need not wait.
-        """
-        return getattr(importlib.import_module(f"care_sim.commands.{self.module}"), self.name)
-
-
-COMMANDS = {
-    "reproduce": CommandEntry(
-        "reproduce",
-        "Reproduce",
-        "Play the paper's closed-loop study, 49 configurations per seed and those of --also, "
-        "and print it beside the paper's figures.",
-    ),
-    "run": CommandEntry(
-        "run",
-        "Run",
-        "Play one episode and print its timeline and outcome.",
-    ),
-    "compare": CommandEntry(
-        "compare",
-        "Compare",
-        "Play the same seed under several policies and print their outcomes side by side.",
-    ),
-    "view": CommandEntry(
-        "view",
-        "View",
-        "Open a recording of `run --record` or `compare --record` in the Rerun viewer (extra "
-        "'viewer').",
-    ),
-    "sweep": CommandEntry(
-        "sweep",
-        "Sweep",
-        "Play every combination of scenarios, policies, budgets, faults and seeds.",
-    ),
-    "ablate": CommandEntry(
-        "ablate",
-        "Ablate",
-        "Vary one thing at a time as the paper's ablations do, one table per thing varied; "
-        "with --source in the open loop, on a quarter of the scenes.",
-    ),
-    "order": CommandEntry(
-        "order",
-        "Order",
-        "Play the paper's closed-loop study under every order of the cells inside a set, 279 "
-        "configurations per seed and those of --also, or with --source the first-sighting "
-        "protocol, and list what the paper says order by order.",
-    ),
-    "faults": CommandEntry(
-        "faults",
-        "Faults",
-        "Let every fault grow and find where the order of the policies changes.",
-    ),
-    "crowding": CommandEntry(
-        "crowding",
-        "Crowding",
-        "Find where the all-camera reserve collapses as vehicles fill the dense street.",
-    ),
-    "protocol": CommandEntry(
-        "protocol",
-        "Protocol",
-        "Play the paper's first-sighting protocol: every policy over the same keyframes, on "
-        "streets or recordings.",
-    ),
-    "mechanism": CommandEntry(
-        "mechanism",
-        "Mechanism",
-        "Find why policies differ: on one shared belief, and ray by ray, on streets or recordings.",
-    ),
-    "report": CommandEntry(
-        "report",
-        "PrintReport",
-        "Print the tables of a folder of results and draw its figures again, or make one web "
-        "page of it all.",
-    ),
-    "export": CommandEntry(
-        "export",
-        "Export",
-        "Play a policy over nuScenes scenes and write its detections in the results form of the "
-        "official devkit.",
-    ),
-    "policies": CommandEntry(
-        "listings",
-        "Policies",
-        "List the policies with their tags, parameters and sources.",
-    ),
-    "detectors": CommandEntry(
-        "listings",
-        "Detectors",
-        "List the detectors of the open loop.",
-    ),
-    "scenarios": CommandEntry(
-        "listings",
-        "Scenarios",
-        "List the scenarios and their parameters.",
-    ),
-    "bench": CommandEntry(
-        "bench",
-        "Bench",
-        "Measure speed: keyframe, scans, steps and memory, beside other engines and environments.",
-    ),
-    "parity": CommandEntry(
-        "parity",
-        "Parity",
-        "Compare the engine `fast` with Bullet: rays of random scenes and of every keyframe, "
-        "pictures, whole episodes.",
-    ),
-    "certify": CommandEntry(
-        "certify",
-        "Certify",
-        "Play a published list of episodes and say whether they go as published, or where one "
-        "does not.",
-    ),
-    "train": CommandEntry(
-        "train",
-        "LEARNERS",
-        "Train a learned policy on an environment: `care-sim train --help` lists the learners.",
-    ),
-}
 
 _STUDIES = ("reproduce", "sweep", "ablate", "order", "faults", "crowding", "protocol", "mechanism")
 _AGENTS = ("train ppo", "train sac", "train recurrent-ppo")

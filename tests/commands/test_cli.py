@@ -9,7 +9,8 @@ from itertools import pairwise
 import pytest
 
 from care_sim.base.interrupts import SIGNALS
-from care_sim.cli import COMMANDS, main
+from care_sim.cli import main
+from care_sim.commands.entries import COMMANDS
 from care_sim.commands.reproduce import Reproduce
 from care_sim.commands.shared.options import Options
 from care_sim.policies import contenders

@@ -43,3 +43,18 @@ CROWD = [
     for policy, distance in (("all-camera", camera), ("care", 15.0), ("full", 15.0))
     for each in rows(policy, [distance] * 5, scenario_parameters=(("vehicles", vehicles),))
 ]
+
+
+def as_in_the_paper(config, distance):
+    """The row of an episode of the paper's study, first detected at this distance but in the
+    cut-in: nobody is hit, and history brakes with three seeds of five.
+    """
+    history = config.policy == "history"
+    return config.row() | {
+        "detection_distance_m": 20.0 if config.scenario == "cutin" else distance,
+        "undetected_to_m": None,
+        "braked": not history or config.seed < 3,
+        "min_distance_m": 4.0 if history else 5.7,
+        "clearance_m": 3.0,
+        "collision": False,
+    }

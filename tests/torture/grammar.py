@@ -166,7 +166,7 @@ LONG = (
 
 def commands():
     """Every command line that can begin, with the dataclass of its options."""
-    from care_sim.cli import COMMANDS
+    from care_sim.commands.entries import COMMANDS
 
     found = {(name,): command.loaded() for name, command in COMMANDS.items() if name != "train"}
     return found | {("train", name): kind for name, kind in COMMANDS["train"].loaded().items()}

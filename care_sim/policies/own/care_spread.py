@@ -14,7 +14,7 @@ from care_sim.policies.base import Policy
 
 CORE_FIRST = "core-spread"
 """The order of the cells in hulls and wedges (`care_sim.core.cell_order`), unless the rig has one:
-the rim is there for errors of the forecast and holds nothing without them."""
+the rim is there for errors of the forecast, without which the object lies in the core alone."""
 HULL_CELLS_PER_RETURN = 2
 """Cells that a hull gets in a round for every return that a detection needs."""
 WEDGE_CELLS_PER_RETURN = 3

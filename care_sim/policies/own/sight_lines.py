@@ -18,8 +18,8 @@ EDGE_M = 5.0
 """Two neighbouring columns lie on either side of an edge if their ranges differ by more: about the
 length of a car, behind which another thing has room."""
 EDGE_COLUMNS = 4
-"""Columns to either side of an edge that are watched: 2.8 degrees, 1.5 m at a range of 30 m, what a
-walker covers in a second and a car in a tenth."""
+"""Columns to either side of an edge that are watched: on the paper's grid 2.8 degrees, 1.5 m at a
+range of 30 m, what a walker covers in a second and a car in a tenth."""
 AHEAD_RAD = math.atan(13 / 50)
 """Half of the sector ahead: at the range of scoring, 50 m, a street of 26 m from house to house,
 with two lanes, parked cars and pavements. What the car drives towards enters the range there."""
@@ -36,8 +36,9 @@ class SightLines:
     itself at an edge. A line along which nothing is remembered counts as open. `ranges` (A,) are
     metres as of the coming keyframe, the grid's reach where nothing is remembered.
 
-    A limit: a lost return looks like an open line. On a dead row (`lidar_dead_rows`) every line is
-    open for ever, and whoever watches it spends cells there for nothing.
+    What is remembered moves by whole columns, so that slow turns are not followed until a column is
+    fired again. A lost return looks like an open line. On a dead row (`lidar_dead_rows`) every line
+    is open for ever, and whoever watches it spends cells there for nothing.
     """
 
     ranges: Floats
@@ -95,8 +96,10 @@ def _moved(ranges: Floats, azimuths: Floats, driven: float, turned: float, reach
             now = max(math.hypot(x, y), _NEAREST_M)
             middle = math.floor((math.atan2(y, x) - turned + np.pi) / column_width)
 
-            # From nearer, a surface covers more than the one column in which it was met; of two
-            # that come to lie behind each other the nearer one is seen.
+            # From nearer, a surface covers more than the one column in which it was met. It is
+            # rounded up, so that no gap opens in a wall: what comes nearer grows by a column on
+            # either side.
+            # Of two that come to lie behind each other the nearer one is seen.
             half = math.ceil((before / now - 1) / 2 - _LAST_BITS)
             for covered in range(middle - half, middle + half + 1):
                 place = covered % columns

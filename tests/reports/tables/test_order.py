@@ -5,6 +5,7 @@ import pytest
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.study.designs.order import ORDERS, order_study
+from tests.helpers.made_rows import as_in_the_paper
 
 TITLES = (
     "The paper's statements by order of cells",
@@ -25,19 +26,7 @@ def distance(config):
     return 10.3 if collapsed and config.cell_order != "rows-up" else 15.1
 
 
-def outcome(config):
-    history = config.policy == "history"
-    return {
-        "detection_distance_m": 20.0 if config.scenario == "cutin" else distance(config),
-        "undetected_to_m": None,
-        "braked": not history or config.seed < 3,
-        "min_distance_m": 4.0 if history else 5.7,
-        "clearance_m": 3.0,
-        "collision": False,
-    }
-
-
-ROWS = [config.row() | outcome(config) for config in order_study(range(5))]
+ROWS = [as_in_the_paper(config, distance(config)) for config in order_study(range(5))]
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import pytest
 
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.study.designs.paper import paper_study
+from tests.helpers.made_rows import as_in_the_paper
 
 
 def distance(config):
@@ -17,19 +18,7 @@ def distance(config):
     )
 
 
-def outcome(config):
-    history = config.policy == "history"
-    return {
-        "detection_distance_m": 20.0 if config.scenario == "cutin" else distance(config),
-        "undetected_to_m": None,
-        "braked": not history or config.seed < 3,
-        "min_distance_m": 4.0 if history else 5.7,
-        "clearance_m": 3.0,
-        "collision": False,
-    }
-
-
-STUDY = [config.row() | outcome(config) for config in paper_study(range(5))]
+STUDY = [as_in_the_paper(config, distance(config)) for config in paper_study(range(5))]
 
 
 def differing(rows):
