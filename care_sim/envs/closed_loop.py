@@ -19,7 +19,6 @@ from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
-from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures.keyframe import draw_keyframe
@@ -153,16 +152,16 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         )
         conditions, physics = split_conditions(parameters)
         check_engine(conditions.engine)
+        self.scenario = make_scenario(self.scenario_name, **physics)
         super().__init__(
             conditions,
-            cameras=(FRONT_CAMERA,),
+            cameras=self.scenario.cameras,
             sensor_height_m=LIDAR_POSITION[2],
             budget=budget,
             keyframe_s=keyframe_s,
             secret=secret,
             scoring_info=scoring_info,
         )
-        self.scenario = make_scenario(self.scenario_name, **physics)
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []

@@ -14,6 +14,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Scan, Tracks
 from care_sim.driving.braking import BrakingController
+from care_sim.driving.corridor import along_route
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
@@ -40,10 +41,10 @@ class ClosedLoop:
     """Where the LiDAR is."""
     belief: Belief
     """All that a policy may know when it chooses the cells."""
-    picture: Picture
-    """What the camera as it was designed shows. Truth: for scoring and people."""
+    pictures: tuple[Picture, ...]
+    """What each camera as it was designed shows. Truth: for scoring and people."""
     seen: IdentifiedDetections
-    """What the camera as it is mounted shows, before misses, false boxes and delay. Truth: for
+    """What the cameras as they are mounted show, before misses, false boxes and delay. Truth: for
     scoring and people.
     """
     detected_bodies: Integers
@@ -99,7 +100,7 @@ class ClosedLoop:
         detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, detected)
-        command = self._controller.command(self._memory.tracks(sensor), self.belief.ego)
+        command = self._controller.command(self._tracks_ahead(sensor), self.belief.ego)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
@@ -152,16 +153,32 @@ class ClosedLoop:
         (cells,) = self.rig.hulls(self._local_boxes(np.array([target.body], np.int64)))
         return self._lidar.hits(target.body, cells, self.sensor) >= self._min_returns
 
+    def shows(self, body: int) -> bool:
+        """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
+        return any(picture.shows(body) for picture in self.pictures)
+
+    def _tracks_ahead(self, sensor: Frame) -> Tracks:
+        """The tracks as the controller takes them: along the way that the car is to go."""
+        tracks = self._memory.tracks(sensor)
+        route = self.world.route
+        return tracks if route is None else along_route(tracks, route, sensor)
+
     def _look(self, ranges: NDArray[np.float32]) -> None:
-        """Take the camera's picture and form the belief on which the next cells are chosen."""
+        """Take the cameras' pictures and form the belief on which the next cells are chosen."""
         self.sensor = sensor = Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
         boxes = self._local_boxes(self._reported)
-        (nominal,), (mounted,) = self.rig.cameras, self._camera.mounted
-        self.picture = self._photograph(nominal, sensor, boxes)
-        # The scoring sees the world through the camera as designed, the detector through the one
-        # that is mounted; without an error of the mount one picture serves both.
-        taken = self.picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
-        self.seen = faultless_detections([taken], self._labels)
+        self.pictures = tuple(
+            self._photograph(camera, sensor, boxes) for camera in self.rig.cameras
+        )
+        # The scoring sees the world through the cameras as designed, the detector through those
+        # that are mounted; without an error of the mount one picture serves both.
+        taken = [
+            picture if mounted == nominal else self._photograph(mounted, sensor, boxes)
+            for picture, nominal, mounted in zip(
+                self.pictures, self.rig.cameras, self._camera.mounted, strict=True
+            )
+        ]
+        self.seen = faultless_detections(taken, self._labels)
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
@@ -187,7 +204,7 @@ class ClosedLoop:
 
     def _in_view(self) -> bool:
         target = self.world.first_sighting
-        return target is not None and self.picture.shows(target.body)
+        return target is not None and self.shows(target.body)
 
     def _distance_to_first_sighting(self, sensor: Frame) -> float:
         if self.world.first_sighting is None:

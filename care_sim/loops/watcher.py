@@ -118,7 +118,7 @@ class EpisodeWatcher:
     def _missed(self, given: Integers) -> ImageDetections:
         """What a camera without faults would report now, less the bodies that were `given`."""
         # Through the camera as designed: what an error of its mount hides is missed, too.
-        clear = faultless_detections([self._loop.picture], self._labels)
+        clear = faultless_detections(self._loop.pictures, self._labels)
         rows = clear.detections.rows()
         sure = clear.detections.confidences >= self._confidence
         return ImageDetections.from_rows(rows[sure & ~np.isin(clear.objects, given)])

@@ -2,10 +2,13 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 
@@ -43,6 +46,8 @@ FIRST_HOUSE_X = -30.0
 class Scenario(ABC):
     """The physics of a scenario: numbers, and ranges within which a seeded generator draws."""
 
+    cameras: ClassVar[tuple[PinholeCamera, ...]] = (FRONT_CAMERA,)
+    """What the car has."""
     duration_s: float = bounded(6.0, 0.05, LONGEST_EPISODE_S)
 
     def __post_init__(self) -> None:

@@ -179,6 +179,11 @@ class RoadVehicle:
         """m/s along the heading."""
         return float(self._vehicle.speed)
 
+    @property
+    def yaw_rate(self) -> float:
+        """rad/s: 0, since what asks for it, the ego, drives straight ahead."""
+        return 0.0
+
     def enter(self) -> None:
         """Join the traffic: from now on the vehicle moves, and others see it."""
         self._traffic.join(self._vehicle)

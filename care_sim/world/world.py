@@ -14,6 +14,8 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.route import Route
+from care_sim.world.route_car import RouteCar
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
@@ -59,7 +61,8 @@ class ClosestApproach:
 class World:
     """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
 
-    World frame: x along the road, y left, z up; the ego starts with its centre at the origin.
+    World frame: x along the road, y left, z up; the ego starts with its centre at the origin and
+    drives along x, or at the start of its `route` and along that.
     """
 
     time: float
@@ -68,14 +71,21 @@ class World:
     """All bodies but the ego, in the order in which they were added."""
     first_sighting: Actor | None
     """The actor whom the episode is about; its scenario sets it."""
+    route: Route | None
+    """The way that the ego is to go, as its navigation knows it; None is straight ahead."""
 
-    def __init__(self, traffic: Traffic, ego_speed: float):
+    def __init__(self, traffic: Traffic, ego_speed: float, route: Route | None = None):
         self.bullet = BulletWorld()
         self.traffic = traffic
+        self.route = route
         self.time = 0.0
         self.actors = []
         self.ego_kind = CATALOGUE["ego"]
-        self.ego = traffic.add_ego(0.0, ego_speed, self.ego_kind)
+        self.ego: RoadVehicle | RouteCar = (
+            RouteCar(route, ego_speed)
+            if route is not None
+            else traffic.add_ego(0.0, ego_speed, self.ego_kind)
+        )
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
@@ -166,7 +176,9 @@ class World:
         self._events = [(start, event) for start, event in self._events if start > self.time]
         for event in due:
             event()
-        self._ego_motion = Ego(self.ego.speed, 0.0, (self.ego.speed - before) / WORLD_STEP_S)
+        self._ego_motion = Ego(
+            self.ego.speed, self.ego.yaw_rate, (self.ego.speed - before) / WORLD_STEP_S
+        )
 
         # Poses are read after events, which may change who moves.
         bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])

@@ -19,7 +19,8 @@ class Notes(Watching):
 
     def look(self, loop):
         labelled = [actor.body for actor in loop.world.actors if actor.label is not None]
-        seen = np.isin(loop.picture.bodies, labelled) & (loop.picture.pixels >= MIN_PIXELS)
+        (picture,) = loop.pictures
+        seen = np.isin(picture.bodies, labelled) & (picture.pixels >= MIN_PIXELS)
         self.shown.append(int(np.count_nonzero(seen)))
 
     def keep(self, watched):

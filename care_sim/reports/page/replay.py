@@ -138,7 +138,7 @@ class Recorder:
                     explained(loop.belief.detections, tracks, loop.rig),
                     loop.rig,
                 ),
-                "seen": "".join(str(int(loop.picture.shows(actor.body))) for actor in self.actors),
+                "seen": "".join(str(int(loop.shows(actor.body))) for actor in self.actors),
             }
         )
 

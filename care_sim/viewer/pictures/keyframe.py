@@ -140,7 +140,7 @@ def mark_first_sighting(
     if frame is not None and frame.detected:
         state = "detected"
         colour = DETECTED_COLOUR
-    elif loop.picture.shows(target.body):
+    elif loop.shows(target.body):
         state = "in view"
         colour = IN_VIEW_COLOUR
     (box,) = loop.sensor.boxes_to_local(loop.world.boxes([target]))

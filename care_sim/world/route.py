@@ -1,0 +1,146 @@
+"""The way that a car is to go: straights and bends of one curvature each, one after the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from care_sim.base.checks import check_number
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Pose, turned
+
+Leg = tuple[float, float]
+"""Length in metres and curvature in 1/m, positive to the left; 0 is a straight."""
+
+_SHARPEST_PER_M = 1.0
+"""No road vehicle turns within a radius of a metre."""
+_FAR_M = 1e6
+"""The straights before the first leg and after the last one are as good as endless."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """A line in the world that begins at the pose `start` and goes through `legs`.
+
+    Places on it are `s`, metres along the line, and `d`, metres to its left. Before its start and
+    after its last leg it goes on straight. Raises InvalidInput for a leg without length or with a
+    bend that no road vehicle can drive.
+    """
+
+    start: Pose = (0.0, 0.0, 0.0)
+    legs: tuple[Leg, ...] = ()
+
+    def __post_init__(self) -> None:
+        for length, curvature in self.legs:
+            check_number("curvature of a leg", curvature, -_SHARPEST_PER_M, _SHARPEST_PER_M)
+            if not 0 < length < _FAR_M:
+                raise InvalidInput(f"length of a leg must be above 0 m, got {length!r}")
+
+    @property
+    def length(self) -> float:
+        """Metres from the start to the end of the last leg."""
+        return float(sum(length for length, _ in self.legs))
+
+    def pose(self, s: float) -> Pose:
+        """World pose of the line at `s`."""
+        leg = self._leg(s)
+        return _after(leg.start, s - leg.begins, leg.curvature)
+
+    def curvature(self, s: float) -> float:
+        """Curvature of the line at `s`, 1/m."""
+        return self._leg(s).curvature
+
+    def places(self, points: Floats) -> Floats:
+        """(n, 3) `s`, `d` and the line's heading where it comes nearest to world points (n, 2)."""
+        found = np.stack([leg.places(points) for leg in self._legs])  # (legs, n, 4)
+        nearest = np.argmin(found[:, :, 3], axis=0)
+        return np.asarray(found[nearest, np.arange(len(points)), :3])
+
+    def _leg(self, s: float) -> "_PlacedLeg":
+        return next(leg for leg in self._legs if s < leg.begins + leg.length)
+
+    @cached_property
+    def _legs(self) -> tuple["_PlacedLeg", ...]:
+        """The legs where they lie, with the straights before and after them."""
+        poses, begins = [self.start], [0.0]
+        for length, curvature in self.legs:
+            poses.append(_after(poses[-1], length, curvature))
+            begins.append(begins[-1] + length)
+        before = _PlacedLeg(_after(self.start, -_FAR_M, 0.0), -_FAR_M, _FAR_M, 0.0)
+        placed = [
+            _PlacedLeg(pose, s, length, curvature)
+            for pose, s, (length, curvature) in zip(poses, begins, self.legs, strict=False)
+        ]
+        return before, *placed, _PlacedLeg(poses[-1], begins[-1], np.inf, 0.0)
+
+
+@dataclass(frozen=True)
+class _PlacedLeg:
+    """A leg that starts at a world pose, where the line is `begins` metres long."""
+
+    start: Pose
+    begins: float
+    length: float
+    curvature: float
+
+    def places(self, points: Floats) -> Floats:
+        """(n, 4) `s`, `d`, heading and squared distance of the nearest point of the leg."""
+        x, y = turned(points - self.start[:2], -self.start[2]).T
+        if self.curvature == 0.0:
+            along = np.clip(x, 0.0, self.length)
+        else:
+            # Seen from the centre of the circle, a point's direction says how far along the arc its
+            # foot is. Half a circle either way of the middle: beyond it the other end is nearer.
+            radius = 1.0 / abs(self.curvature)
+            turn = np.arctan2(x, radius - np.sign(self.curvature) * y)
+            middle = self.length / radius / 2
+            turn = middle + np.angle(np.exp(1j * (turn - middle)))
+            along = np.clip(turn * radius, 0.0, self.length)
+        heading = self.curvature * along
+        foot_x, foot_y = _chord(along, self.curvature)
+        off_x, off_y = x - foot_x, y - foot_y
+        d = np.cos(heading) * off_y - np.sin(heading) * off_x
+        return np.column_stack(
+            [self.begins + along, d, self.start[2] + heading, off_x**2 + off_y**2]
+        )
+
+
+def _chord(along: Floats | float, curvature: float) -> tuple[Floats, Floats]:
+    """Where an arc that starts at the origin along x is after `along` metres."""
+    # NumPy's sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the arc is straight.
+    half = np.asarray(along) * curvature / 2
+    chord = along * np.sinc(half / np.pi)
+    return chord * np.cos(half), chord * np.sin(half)
+
+
+def _after(start: Pose, along: float, curvature: float) -> Pose:
+    x, y = turned(np.array(_chord(along, curvature), float), start[2])
+    return start[0] + float(x), start[1] + float(y), start[2] + curvature * along
+
+
+def through(points: Sequence[tuple[float, float]], radius_m: float) -> Route:
+    """The route along straight lines through `points` (at least two), each corner rounded by an arc
+    of `radius_m`.
+
+    Raises InvalidInput where the arcs of two corners would overlap.
+    """
+    corners = np.asarray(points, float)
+    steps = np.diff(corners, axis=0)
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    # An arc that turns by t begins and ends radius * tan(t / 2) from its corner.
+    turns = np.diff(headings)
+    cuts = np.concatenate([[0.0], radius_m * np.tan(np.abs(turns) / 2), [0.0]])
+    straights = np.hypot(*steps.T) - cuts[:-1] - cuts[1:]
+    if np.any(straights < 0):
+        raise InvalidInput(f"corners of a route are too close for bends of {radius_m} m")
+    legs: list[Leg] = []
+    for number, straight in enumerate(straights.tolist()):
+        if straight > 0:
+            legs.append((straight, 0.0))
+        if number < len(turns) and turns[number] != 0.0:
+            turn = float(turns[number])
+            legs.append((abs(turn) * radius_m, float(np.sign(turn)) / radius_m))
+    x, y = corners[0].tolist()
+    return Route((x, y, float(headings[0])), tuple(legs))
