@@ -102,7 +102,7 @@ COMMANDS = {
     "detectors": CommandEntry(
         "listings",
         "Detectors",
-        "List the detectors of the open loop.",
+        "List the detectors.",
     ),
     "scenarios": CommandEntry(
         "listings",

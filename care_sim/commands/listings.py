@@ -23,7 +23,7 @@ class Policies:
 
 @dataclass(frozen=True)
 class Detectors:
-    """List the detectors of the open loop."""
+    """List the detectors."""
 
     def __call__(self) -> int:
         """Run it."""

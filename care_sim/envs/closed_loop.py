@@ -11,12 +11,14 @@ from care_sim.base.checks import check_arguments, check_choice, check_number
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.types import Action
 from care_sim.envs import reward as rewards
+from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.false_box_pools import pool_of_another_drive
 from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
+from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import check_engine
@@ -90,6 +92,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | argument | default | meaning |
     |---|---|---|
     | `budget` | 0.10 | beta, the share of the cells that may fire, in (0, 1] |
+    | `detector` | "returns" | by name (`care_sim.perception.detectors.detector_names`) |
+    | `detector_parameters` | None | a mapping of the detector's own parameters |
     | `keyframe_s` | 0.1 | seconds between two decisions, at most 1 |
     | `reward_weights` | None | a mapping of changes to `care_sim.envs.reward.REWARD_WEIGHTS` |
     | `render_mode` | None | None or "rgb_array" |
@@ -136,6 +140,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self,
         *,
         budget: float = 0.10,
+        detector: str = PROXY,
+        detector_parameters: Mapping[str, object] | None = None,
         keyframe_s: float = 0.1,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
@@ -162,6 +168,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             secret=secret,
             scoring_info=scoring_info,
         )
+        made = detector_of(detector, detector_parameters, conditions, LIDAR_POSITION[2])
+        # The proxy asks whose return each is, which the loop knows without a cloud.
+        self._detector = None if detector == PROXY else made
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
@@ -191,7 +200,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self._detected = False
         self._potential = rewards.Potential()
         self.keyframes = []
-        loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool)
+        loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, self._detector)
         return self._begin(loop, floor), self._info_of({}, {"seed": entropy})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
@@ -241,7 +250,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         seeds = SensorSeeds(camera, lidar, odometry)
         world = self.scenario.build(np.random.default_rng(another))
         return pool_of_another_drive(
-            world, self.scenario.duration_s, self.rig, self.conditions, seeds
+            world, self.scenario.duration_s, self.rig, self.conditions, seeds, self._detector
         )
 
     def _detectable(self) -> bool:

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
-from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import Action
+from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
-from care_sim.evaluation import matching
 from care_sim.evaluation.recall import SceneScore
 from care_sim.evaluation.sightings import ANNOTATED, Sightings, check_presence
 from care_sim.loops.film import Film
 from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.loops.seeds import SensorSeeds
-from care_sim.perception.detectors import PROXY, check_detector, make_detector
+from care_sim.perception import matching
+from care_sim.perception.detectors import PROXY
 from care_sim.viewer.pictures.scene_from_above import draw_plan
 
 UNFILMED = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine")
@@ -93,11 +93,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         check_film_arguments(type(self), parameters)
         check_presence(presence)
         conditions, _ = split_conditions(parameters)
-        check_detector(detector)
-        if detector != PROXY and conditions.min_returns != MIN_RETURNS:
-            raise InvalidInput(
-                f"min_returns is of the detector {PROXY}, {detector} does not know it"
-            )
+        self._detector = detector_of(detector, detector_parameters, conditions, sensor_height_m)
         super().__init__(
             conditions,
             cameras=cameras,
@@ -106,16 +102,6 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             keyframe_s=keyframe_s,
             secret=secret,
             scoring_info=scoring_info,
-        )
-        # The proxy has a threshold that is a condition; other detectors have parameters of their
-        # own.
-        own = {"min_returns": conditions.min_returns} if detector == PROXY else {}
-        if not isinstance(detector_parameters, Mapping | None):
-            raise InvalidInput(
-                f"detector_parameters must map names to values, got {shown(detector_parameters)}"
-            )
-        self._detector = make_detector(
-            detector, sensor_height_m, **own | dict(detector_parameters or {})
         )
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
         self.render_mode = render_mode

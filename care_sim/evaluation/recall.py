@@ -21,8 +21,8 @@ from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers, Mask
 from care_sim.core.types import CLASSES, Detections
-from care_sim.evaluation import matching
 from care_sim.evaluation.sightings import Sightings
+from care_sim.perception import matching
 
 CENSORED_AT = 6
 """K, in keyframes: three seconds at 2 Hz (paper, Remark 1)."""

@@ -12,16 +12,18 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
-from care_sim.core.types import Scan, Tracks
+from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.corridor import along_route
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
+from care_sim.perception.base import Detector
+from care_sim.perception.matching import found_objects
 from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
@@ -32,7 +34,8 @@ from care_sim.world.world import World
 class ClosedLoop:
     """A world, the sensors and the car's software over the keyframes of one episode.
 
-    Its attributes are of the coming keyframe: they change with every call of `keyframe`.
+    Without a `detector` the paper's proxy detects what enough fired rays hit. Its attributes are of
+    the coming keyframe: they change with every call of `keyframe`.
     """
 
     index: int
@@ -59,17 +62,20 @@ class ClosedLoop:
         sensing: Sensing,
         seeds: SensorSeeds,
         pool: BoxPool = EMPTY_POOL,
+        detector: Detector | None = None,
     ):
         self.world = world
         self.rig = rig
         self._labels = labels = world.labels()
         self._reported = np.array(list(labels), np.int64)
+        self._classes = np.array(list(labels.values()), np.int64)
         self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, sensing, seeds.lidar)
         self._camera = CameraDetector(
             list(labels), sensing, rig.keyframe_s, seeds.camera, rig.cameras, pool
         )
         self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
+        self._detector = detector
         self._returns_rule = ReturnsRule(labels, sensing.min_returns)
         self._min_returns = sensing.min_returns
         self._limits = Limits(rig)
@@ -97,9 +103,9 @@ class ClosedLoop:
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
-        detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
+        detections, behind, found = self._detect(scan, bodies)
         tracks = self._memory.update(detections, sensor)
-        self._track_objects.note(tracks, detected)
+        self._track_objects.note(tracks, behind)
         command = self._controller.command(self._tracks_ahead(sensor), self.belief.ego)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
@@ -115,7 +121,7 @@ class ClosedLoop:
             time_s=time,
             fired=fired,
             in_view=in_view,
-            detected=target is not None and target.body in detected,
+            detected=target is not None and target.body in found,
             braking=command.braking,
             speed_mps=speed,
             distance_m=distance,
@@ -156,6 +162,28 @@ class ClosedLoop:
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
         return any(picture.shows(body) for picture in self.pictures)
+
+    def _detect(self, scan: Scan, bodies: Integers) -> tuple[Detections, Integers, Integers]:
+        """What is detected in a scan: the detections, the body behind each or NO_OBJECT, and all
+        bodies that were found.
+
+        `bodies` are those behind the returns. The proxy alone may ask whose return each is. What
+        another detector finds is scored by the class-consistent 2 m match (paper, Remark 1), and
+        only what a box has returns of: else a box on the end of a lorry would find who is hidden
+        behind it.
+        """
+        if self._detector is None:
+            detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
+            return detections, detected, detected
+        (returned,) = np.nonzero(np.isfinite(scan.ranges))
+        cells = scan.cells[returned]
+        points = self.rig.grid.directions[cells] * scan.ranges[returned, None]
+        reported = np.isin(bodies[returned], self._reported)
+        cloud = Cloud(cells, points, np.where(reported, bodies[returned], NO_OBJECT))
+        present = Annotations(self._reported, self._classes, self._local_boxes(self._reported))
+        detections, behind = self._detector.detect(cloud, present)
+        found = found_objects(present, detections) & np.isin(self._reported, behind)
+        return detections, behind, self._reported[found]
 
     def _tracks_ahead(self, sensor: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""

@@ -12,6 +12,7 @@ from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
 from care_sim.loops.seeds import SensorSeeds
+from care_sim.perception.base import Detector
 from care_sim.sensors.box_pool import BoxPool
 from care_sim.world.world import World
 
@@ -33,6 +34,7 @@ def pool_of_another_drive(
     rig: Rig,
     sensing: Sensing,
     seeds: SensorSeeds,
+    detector: Detector | None = None,
 ) -> BoxPool:
     """Drive through `world`, every cell fired, and close it: what the camera shows before misses
     and delay.
@@ -44,7 +46,9 @@ def pool_of_another_drive(
     camera would be known among those of a crooked one.
     """
     with closing(world):
-        loop = ClosedLoop(world, rig, replace(sensing, false_positive_rate=0.0), seeds)
+        loop = ClosedLoop(
+            world, rig, replace(sensing, false_positive_rate=0.0), seeds, detector=detector
+        )
         cells = np.arange(rig.grid.size)
         seen = []
         times_s = []

@@ -91,7 +91,7 @@ class TrackObjects:
         known = [
             (row, self._objects[track])
             for row, track in enumerate(tracks.ids.tolist())
-            if track in self._objects
+            if self._objects.get(track, NO_OBJECT) != NO_OBJECT
         ]
         present = boxes_of([number for _, number in known])
         for row, number in known:

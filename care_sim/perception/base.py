@@ -1,4 +1,4 @@
-"""What a detector of the open loop is."""
+"""What a detector is."""
 
 from typing import Protocol
 
@@ -8,7 +8,7 @@ from care_sim.sensors.annotated import Annotations, Cloud
 
 
 class Detector(Protocol):
-    """What the open loop calls at every keyframe."""
+    """What a loop calls at every keyframe."""
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:
         """Detections in the sensor frame from the returns of the fired cells, and (n,) the

@@ -13,8 +13,10 @@ import gymnasium
 from care_sim.base.checks import check_known, check_seed
 from care_sim.core.conditions import Conditions
 from care_sim.envs import CLOSED_LOOP
+from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
 from care_sim.study.parameters import Parameters
+from care_sim.study.provenance import detector_digest
 from care_sim.study.run_config import (
     CONDITION_NAMES,
     Row,
@@ -24,6 +26,7 @@ from care_sim.study.run_config import (
     collected,
     departures,
     effective_conditions,
+    files_in,
     flat,
 )
 
@@ -37,7 +40,7 @@ class EpisodeConfig(Conditions, RunConfig):
     """Everything that decides an episode.
 
     The fields are the arguments of the environments (see
-    `care_sim.envs.closed_loop.ClosedLoopEnv`); `scenario_parameters` and `policy_parameters` are
+    `care_sim.envs.closed_loop.ClosedLoopEnv`); those of detector, scenario and policy are
     pairs of name and value. Raises InvalidInput for anything that scenario, environment or policy
     does not accept.
     """
@@ -46,12 +49,14 @@ class EpisodeConfig(Conditions, RunConfig):
     policy: str
     budget: float = 0.1
     seed: int = 0
+    detector: str = PROXY
+    detector_parameters: Parameters = ()
     scenario_parameters: Parameters = ()
     policy_parameters: Parameters = ()
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
-        self.check_parameters("scenario_parameters", "policy_parameters")
+        self.check_parameters("detector_parameters", "scenario_parameters", "policy_parameters")
         make_scenario(self.scenario, **dict(self.scenario_parameters))
         check_known("environment of the scenario", self.scenario, ENVIRONMENT_IDS)
         # Making the environment and the policy is the check of all other fields: they alone know
@@ -73,18 +78,36 @@ class EpisodeConfig(Conditions, RunConfig):
             f"care_sim:{ENVIRONMENT_IDS[self.scenario]}",
             disable_env_checker=True,
             budget=self.budget,
+            detector=self.detector,
+            detector_parameters=dict(self.detector_parameters),
             **{name: getattr(self, name) for name in CONDITION_NAMES},
             **dict(self.scenario_parameters),
         )
 
     def row(self) -> Row:
-        """All parameters, flat; those of scenario and policy as `scenario.NAME`, `policy.NAME`."""
+        """All parameters, flat; those of detector, scenario and policy as `detector.NAME`,
+        `scenario.NAME`, `policy.NAME`. `detector` is a column only where it is not the default.
+        """
         plain = {name: getattr(self, name) for name in PLAIN_FIELDS}
+        # Without the column the rows, and the digests made of them, stay as they were before there
+        # was a choice.
+        other = {} if self.detector == PROXY else {"detector": self.detector}
         return (
             plain
+            | other
+            | flat("detector", self.detector_parameters)
             | flat("scenario", self.scenario_parameters)
             | flat("policy", self.policy_parameters)
         )
+
+    def installed(self) -> list[str | None]:
+        """Those of the base, and of another detector than the default its hash and those of the
+        files that its parameters name.
+        """
+        if self.detector == PROXY:
+            return super().installed()
+        own = [detector_digest(self.detector), *files_in(self.detector_parameters)]
+        return [*super().installed(), *own]
 
     @property
     def label(self) -> str:

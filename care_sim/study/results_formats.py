@@ -89,7 +89,7 @@ _EPISODES = Schema(
         "impact_speed_mps": as_optional(SUM),
         "rays_fired": COUNT,
     },
-    _BY_WRITER,
+    _BY_WRITER | {"detector": as_optional(TEXT)},
 )
 _COUNTS = Column("lists of whole numbers", least=0)
 _ANY_PLAY = {
@@ -158,7 +158,7 @@ MECHANISM = ResultsFormat(
 )
 RESULTS_FORMATS = (EPISODES, PLAYS, MECHANISM)
 _PARAMETERS = frozenset(
-    {*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "camera_detections", "presence", "driver"}
+    {*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "detector", "camera_detections", "presence", "driver"}
 )
 
 

@@ -1,38 +1,10 @@
-"""Hand-built annotations and reports of a detector."""
+"""Random streets, and reports of a detector about them."""
 
 import numpy as np
 import pytest
 
 from care_sim.core.types import CLASSES, Detections
 from care_sim.sensors.annotated import Annotations
-
-
-def columns(classes, centres):
-    boxes = np.array([[x, y, -1.0, 2.0, 1.0, 1.5, 0.0] for x, y in centres]).reshape(-1, 7)
-    return np.array([CLASSES.index(name) for name in classes], np.int64), boxes
-
-
-@pytest.fixture(scope="session")
-def shown():
-    """Annotations of a keyframe from (object, class name, x, y)."""
-
-    def make(*objects):
-        numbers = np.array([number for number, *_ in objects], np.int64)
-        return Annotations(numbers, *columns([o[1] for o in objects], [o[2:] for o in objects]))
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def reported():
-    """Detections from (class name, x, y), or with a score each (class name, x, y, score)."""
-
-    def make(*objects):
-        scores = np.array([o[3] for o in objects]) if objects and len(objects[0]) > 3 else None
-        found = columns([o[0] for o in objects], [o[1:3] for o in objects])
-        return Detections(*found, np.full(len(objects), 3), scores)
-
-    return make
 
 
 @pytest.fixture(scope="session")

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import turned
 from care_sim.core.types import Detections
-from care_sim.evaluation import matching
 from care_sim.evaluation.recall import SceneScore, Tally, score_scene
 from care_sim.evaluation.sightings import Sightings
+from care_sim.perception import matching
 from care_sim.sensors.annotated import Annotations
 
 NONE = np.zeros(0, bool)

@@ -6,6 +6,7 @@ from typing import Any
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import Conditions
+from care_sim.perception.detectors import PROXY
 from care_sim.study.parameters import parameters
 from care_sim.study.run_config import MOST_TASKS
 
@@ -14,6 +15,12 @@ from care_sim.study.run_config import MOST_TASKS
 class Options(Conditions):
     """Conditions that all episodes share."""
 
+    detector: str = PROXY
+    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
+    package.
+    """
+    detector_parameters: tuple[str, ...] = ()
+    """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
     scenario_parameters: tuple[str, ...] = ()
     """Physics of the scenario as NAME=VALUE, a range as NAME=LOW,HIGH, for example vehicles=7
     gap_m=0.8,1.2; see `care-sim scenarios`."""
@@ -24,6 +31,7 @@ class Options(Conditions):
     def arguments(self) -> dict[str, Any]:
         """As arguments of `EpisodeConfig`."""
         pairs = {
+            "detector_parameters": parameters(self.detector_parameters),
             "scenario_parameters": parameters(self.scenario_parameters),
             "policy_parameters": parameters(self.policy_parameters),
         }

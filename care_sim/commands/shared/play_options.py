@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import tyro
 
 from care_sim.core.conditions import Conditions
+from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Source, source_of
 from care_sim.study.parameters import parameters
 
@@ -43,7 +44,7 @@ class PlayOptions(SourceOptions):
 
     source: str = "streets"
     """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
-    detector: str = "returns"
+    detector: str = PROXY
     """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
     package.
     """

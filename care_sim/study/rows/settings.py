@@ -17,7 +17,8 @@ class Setting:
     """Where rows were played, and the conditions in which they depart from the defaults.
 
     `world` is a scenario in the closed loop and a source of films in the open loop. `detector` is
-    that of the open loop with its parameters, empty in the closed loop.
+    that of the open loop with its parameters, empty in the closed loop, where another than the
+    default is among the conditions.
     """
 
     world: str

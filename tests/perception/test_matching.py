@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import turned
 from care_sim.core.types import Detections
-from care_sim.evaluation.matching import found_objects
+from care_sim.perception.matching import found_objects
 from care_sim.sensors.annotated import Annotations
 
 

@@ -1,0 +1,28 @@
+"""The detector that an environment's arguments name."""
+
+from collections.abc import Mapping
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.conditions import MIN_RETURNS, Conditions
+from care_sim.perception.base import Detector
+from care_sim.perception.detectors import PROXY, check_detector, make_detector
+
+
+def detector_of(
+    name: str,
+    parameters: Mapping[str, object] | None,
+    conditions: Conditions,
+    sensor_height_m: float,
+) -> Detector:
+    """The detector `name` with its own `parameters`.
+
+    The proxy's threshold is the condition `min_returns`. Raises InvalidInput for a name or
+    parameter that is unknown, and for a `min_returns` beside another detector.
+    """
+    check_detector(name)
+    if name != PROXY and conditions.min_returns != MIN_RETURNS:
+        raise InvalidInput(f"min_returns is of the detector {PROXY}, {name} does not know it")
+    if not isinstance(parameters, Mapping | None):
+        raise InvalidInput(f"detector_parameters must map names to values, got {shown(parameters)}")
+    own = {"min_returns": conditions.min_returns} if name == PROXY else {}
+    return make_detector(name, sensor_height_m, **own | dict(parameters or {}))
