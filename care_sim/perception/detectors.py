@@ -14,12 +14,17 @@ from care_sim.base.errors import InvalidInput, MissingExtra, error_line, printab
 from care_sim.base.plugins import Plugins
 from care_sim.perception.base import Detector
 from care_sim.perception.cluster.detector import ClusterDetector
+from care_sim.perception.graded import GradedProxy
 from care_sim.perception.points_only import BrokenDetector, PointDetector, PointsOnly
 from care_sim.perception.proxy import ReturnsProxy
 from care_sim.perception.torchscript import TorchScriptDetector
 
 PROXY = "returns"
-"""The one that reads whose return each one is; all others are `PointDetector`s."""
+"""The paper's proxy."""
+GRADED = "graded"
+"""The proxy that is surer with more returns."""
+_PRIVILEGED = (PROXY, GRADED)
+"""Those that read whose return each one is; all others are `PointDetector`s."""
 
 
 def _faults(made: Any) -> Iterator[str]:
@@ -32,6 +37,7 @@ DETECTORS: Plugins[Any] = Plugins(
     group="care_sim.detectors",
     built_in={
         PROXY: ReturnsProxy,
+        GRADED: GradedProxy,
         "cluster": ClusterDetector,
         "torchscript": TorchScriptDetector,
     },
@@ -54,14 +60,15 @@ def check_detector(name: object) -> None:
 def make_detector(name: str, sensor_height_m: float, /, **parameters: object) -> Detector:
     """The detector for a film whose LiDAR is `sensor_height_m` above the road.
 
-    All but the proxy are handed points alone, whoever wrote them. Raises InvalidInput for an
+    All but the proxies are handed points alone, whoever wrote them. Raises InvalidInput for an
     unknown name or parameter, or a value that is not allowed; BrokenDetector for one that cannot be
     loaded or made; MissingExtra for one whose library is not installed.
     """
     make = _maker(name)
     _check_parameters(name, make, parameters)
-    if name == PROXY:
-        return ReturnsProxy(**parameters)  # type: ignore[arg-type]
+    if name in _PRIVILEGED:
+        proxy: Detector = make(**parameters)
+        return proxy
     return PointsOnly(name, _point_detector(name, make, parameters), sensor_height_m)
 
 

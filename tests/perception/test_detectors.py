@@ -74,7 +74,7 @@ def installed(install):
 
 
 def test_ours_are_known():
-    assert detector_names() == ["returns", "cluster", "torchscript"]
+    assert detector_names() == ["returns", "graded", "cluster", "torchscript"]
     assert isinstance(make_detector("returns", HEIGHT, min_returns=5), ReturnsProxy)
 
 
@@ -84,7 +84,7 @@ def test_the_cluster_detector_finds_a_car_and_names_the_object():
 
 
 def test_an_installed_detector_is_listed_made_and_handed_points_only(installed):
-    assert detector_names()[3:] == [
+    assert detector_names()[4:] == [
         "blind",
         "listed",
         "loose",
@@ -148,7 +148,7 @@ def test_a_broken_one_gets_one_line(installed, name, line):
 @pytest.mark.parametrize(
     ("name", "parameters", "line"),
     [
-        ("yolo", {}, "unknown detector 'yolo'; known: cluster, returns, torchscript"),
+        ("yolo", {}, "unknown detector 'yolo'; known: cluster, graded, returns, torchscript"),
         (
             "returns",
             {"least": 3},

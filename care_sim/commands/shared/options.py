@@ -16,8 +16,8 @@ class Options(Conditions):
     """Conditions that all episodes share."""
 
     detector: str = PROXY
-    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
-    package.
+    """returns (the paper's proxy), graded (the surer the more returns), cluster (a real
+    one), torchscript, or that of an installed package.
     """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""

@@ -45,8 +45,8 @@ class PlayOptions(SourceOptions):
     source: str = "streets"
     """streets, argoverse2:FOLDER or nuscenes:FOLDER."""
     detector: str = PROXY
-    """returns (the paper's proxy), cluster (a real one), torchscript, or that of an installed
-    package.
+    """returns (the paper's proxy), graded (the surer the more returns), cluster (a real
+    one), torchscript, or that of an installed package.
     """
     detector_parameters: tuple[str, ...] = ()
     """Parameters of the detector as NAME=VALUE, for example file=model.pt for torchscript."""
