@@ -22,7 +22,7 @@ class Fan(Policy):
     name = "fan"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
-    keeps_order = True
+    is_pattern = True
 
     def __init__(self, rig: Rig):
         super().__init__(rig)
@@ -35,4 +35,4 @@ class Fan(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern]])
+        return Demand(layers=[[self._pattern[: belief.budget]]])

@@ -51,6 +51,13 @@ def test_every_statement_has_a_verdict_under_every_order(tables):
     assert measured[1:3] == ("10.3 against 15.1", "15.1 against 15.1")
 
 
+def test_verdicts_say_how_many_episodes_they_rest_on(tables):
+    for title in TITLES[:2]:
+        assert "Of each cell 5 episodes; the paper has 5." in tables[title].notes
+    single = order_tables([row for row in ROWS if row["seed"] == 0])
+    assert "Of each cell 1 episode; the paper has 5." in single[0].notes
+
+
 def test_detections_stand_under_their_setting_with_the_full_scan_in_every_column(tables):
     table = tables[TITLES[2]]
     start = table.rows.index(("dense",))
@@ -72,6 +79,16 @@ def test_differences_are_those_to_the_usual_order_seed_by_seed(tables):
     assert table.columns[2:4] == ("rows-up", "columns")
     assert camera[:4] == ("all-camera", "3%", "+4.8* [4.8,4.8]", "+0.0 [0.0,0.0]")
     assert isinstance(camera[2], Bold)
+
+
+def test_a_pattern_has_one_level_for_all_orders_and_no_differences():
+    rows = [as_in_the_paper(config, distance(config)) for config in order_study([0], ["fan"])]
+    made = {table.title: table for table in order_tables(rows)}
+    fans = [row for row in made[TITLES[2]].rows if row[0] == "fan"]
+    assert len(fans) == 4 + 3 + 1 + 2 + 2
+    assert all(len(set(row[2:])) == 1 for row in fans)
+    assert not [row for row in made[TITLES[3]].rows if row[0] in ("fan", "full")]
+    assert "Feel no order, played once: full, fan." in made[TITLES[3]].notes
 
 
 def test_the_closing_names_what_hangs_on_the_numbering():
