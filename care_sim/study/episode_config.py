@@ -11,7 +11,7 @@ from typing import Any, Self
 import gymnasium
 
 from care_sim.base.checks import check_known, check_seed
-from care_sim.core.conditions import Conditions
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
@@ -36,7 +36,7 @@ ENVIRONMENT_IDS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 
 
 @dataclass(frozen=True)
-class EpisodeConfig(Conditions, RunConfig):
+class EpisodeConfig(ClosedLoopConditions, RunConfig):
     """Everything that decides an episode.
 
     The fields are the arguments of the environments (see

@@ -17,7 +17,7 @@ from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.commands.shared.options import seeds_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
-from care_sim.core.conditions import Conditions
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
@@ -85,7 +85,14 @@ def refused(named, make, /, *arguments, **options):
 
 BOUNDED = [
     (kind, field.name)
-    for kind in (Conditions, ForgettingRules, AngularGrid, PinholeCamera, Rig, *SCENARIOS.values())
+    for kind in (
+        ClosedLoopConditions,
+        ForgettingRules,
+        AngularGrid,
+        PinholeCamera,
+        Rig,
+        *SCENARIOS.values(),
+    )
     for field in fields(kind)
     if allowed(field)
 ]
@@ -111,7 +118,7 @@ def test_every_bounded_number_keeps_its_bounds(kind, name):
 
 
 def test_every_number_of_conditions_and_scenarios_has_bounds():
-    for kind in (Conditions, *SCENARIOS.values()):
+    for kind in (ClosedLoopConditions, *SCENARIOS.values()):
         for field in fields(kind):
             is_number = isinstance(field.default, int | float) and not isinstance(
                 field.default, bool

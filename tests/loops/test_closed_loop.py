@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
 from care_sim.loops.closed_loop import ClosedLoop
@@ -50,11 +50,11 @@ def row_of_cars(street):
     return make
 
 
-def loop_in(world, seeds=(0, 1, 2), **sensing):
+def loop_in(world, seeds=(0, 1, 2), **conditions):
     return ClosedLoop(
         world,
         RIG,
-        Sensing(**sensing),
+        ClosedLoopConditions(**conditions),
         SensorSeeds(*(np.random.SeedSequence(seed) for seed in seeds)),
     )
 

@@ -153,8 +153,9 @@ def test_a_row_gives_its_configuration_back(config):
 
 def test_a_condition_that_the_row_does_not_tell_is_the_default():
     row = CONFIG.row()
-    del row["cell_order"]
-    assert config_of(row) == config_of(row | {"cell_order": None}) == CONFIG
+    for name in ("cell_order", "driver", "brake_mps2"):
+        del row[name]
+    assert config_of(row) == config_of(row | {"cell_order": None, "driver": None}) == CONFIG
 
 
 def test_seeds_are_watched_one_after_the_other():
