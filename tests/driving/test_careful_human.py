@@ -65,6 +65,7 @@ def test_what_is_behind_the_bumper_or_as_fast_is_no_danger():
     assert keyframes_to_braking(-4.01, 0.0, 10.0, 0.0) is None
     assert keyframes_to_braking(-3.99, 0.0, 10.0, 0.0) == 4
     assert keyframes_to_braking(5.0, 0.0, 20.0, 0.0) is None
+    assert keyframes_to_braking(-1.0, 0.0, 20.1, 0.0) is None
 
 
 def test_an_interrupted_risk_is_evaluated_anew():
