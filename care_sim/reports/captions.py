@@ -44,6 +44,17 @@ _COVERAGE = (
 )
 # Studies of differences alone print no levels, and their captions do not explain them.
 EPISODES_CAPTION = " ".join([_READING, _CENSORING, _LEVELS, _STATISTICS, _COVERAGE])
+# The classes are in care_sim.evaluation.collision_outcomes, the mark in care_sim.scenarios.r157.
+R157_CAPTION = " ".join(
+    [
+        "A cut-in is preventable where a car that never brakes is touched and the careful human "
+        "driver of UN Regulation 157 is not; only these are played. Avoided: nothing was touched; "
+        "mitigated: touched, the car more than 1 km/h slower than it came; hit: touched at that "
+        "speed. Impact: the car's speed at the first contact. Differences are points of the cases "
+        "avoided, paired by case and seed.",
+        _STATISTICS,
+    ]
+)
 DIFFERENCES_CAPTION = " ".join([_READING, _CENSORING, _STATISTICS, _COVERAGE])
 
 _PROTOCOL_READING = (

@@ -28,7 +28,7 @@ from care_sim.envs.scenarios import DenseEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.dartout import Dartout
-from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_config import ENVIRONMENT_IDS, EpisodeConfig
 from care_sim.study.executors import cluster
 from care_sim.study.parameters import parameters
 from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
@@ -135,9 +135,7 @@ def test_an_episode_at_the_bounds_of_any_range_stays_in_its_space(name, extreme)
     for field in ranges:
         end = field.metadata["bounds"][extreme == "most"]
         env = gymnasium.make(
-            f"care_sim:CARE-{name}-v0".replace("dartout", "Dartout")
-            .replace("dense", "Dense")
-            .replace("cutin", "CutIn"),
+            f"care_sim:{ENVIRONMENT_IDS[name]}",
             disable_env_checker=True,
             duration_s=0.2,
             **{field.name: (end, end)},

@@ -36,7 +36,7 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
         "known: ablate, ablate-open-loop, crowding, faults, mechanism, order, order-open-loop, "
-        "paper, protocol, sweep",
+        "paper, protocol, r157, sweep",
     ):
         study_of(tmp_path / "episodes.parquet")
 

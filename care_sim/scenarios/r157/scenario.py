@@ -1,4 +1,4 @@
-"""The world of a cut-in: three lanes, the ego in the middle one, a vehicle in one beside it."""
+"""UN Regulation 157: a slower vehicle changes over from the lane beside into the ego's."""
 
 from dataclasses import dataclass
 
@@ -38,8 +38,8 @@ MOTORWAY_LIMIT_MPS = 130 * KPH
 
 @dataclass(frozen=True)
 class R157(Scenario):
-    """A vehicle in the lane beside the ego, slower than it, changes over into its lane. Nothing
-    hides it, and nobody else is on the road, as in the regulation.
+    """Three lanes, the ego in the middle one. A slower vehicle in the lane beside changes over into
+    it. Nothing hides it, and nobody else is on the road, as in the regulation.
 
     What is None is drawn by the seed: kind and side first, then among the preventable cases of the
     grid (`care_sim.scenarios.r157.grid`) that have the values that are given; among all of them
@@ -93,7 +93,7 @@ class R157(Scenario):
         start_x = apart + (ego_mps - case.other_mps) * lead_s
         start = (start_x, lane_m if case.side == "left" else -lane_m)
         change = LaneChange(start, case.other_mps, lead_s, case.lateral_mps, to_y=0.0)
-        world.first_sighting = world.add(f"cutting-in {case.kind}", case.kind, change.pose)
+        world.first_sighting = world.add(case.kind, case.kind, change.pose)
         return world
 
     def draw_case(self, rng: np.random.Generator) -> CutInCase:
