@@ -95,10 +95,7 @@ def _order_closing(rows: Sequence[Row]) -> list[str]:
 
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
-_CASE_COLUMNS = {
-    "driver": TEXT,
-    **{name: TEXT if name.endswith(("kind", "side")) else SUM for name in CASE_COLUMNS},
-}
+_CASE_COLUMNS = {name: TEXT if name.endswith(("kind", "side")) else SUM for name in CASE_COLUMNS}
 
 
 _ALL = (

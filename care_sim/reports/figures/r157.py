@@ -37,10 +37,17 @@ def r157_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     panels = figure.subplots(
         len(study.budgets), len(policies), squeeze=False, sharex=True, sharey=True
     )
+    boundaries = {
+        (mps, style): boundary_m(_LINE_KPH, mps)
+        for mps, style in ((LATERAL_MPS[0], "-"), (LATERAL_MPS[-1], ":"))
+    }
     for line, budget in zip(panels, study.budgets, strict=True):
         for axes, policy in zip(line, policies, strict=True):
             own = "every cell" if policy == FULL else percent(budget)
             axes.set_title(f"{marked(policy, study.tags[policy])}, {own}", loc="left", fontsize=9)
+            for (mps, style), gaps in boundaries.items():
+                label = f"a careful human prevents above, car at {mps:g} m/s across"
+                axes.plot(_LINE_KPH, gaps, style, color="0.3", linewidth=1, label=label)
             _draw(axes, study.of(policy, budget))
     for axes in panels[-1]:
         axes.set_xlabel("relative speed (km/h)", fontsize=8)
@@ -53,15 +60,6 @@ def r157_figures(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def _draw(axes: Axes, rows: Sequence[Row]) -> None:
-    for lateral_mps, style in ((LATERAL_MPS[0], "-"), (LATERAL_MPS[-1], ":")):
-        axes.plot(
-            _LINE_KPH,
-            boundary_m(_LINE_KPH, lateral_mps),
-            style,
-            color="0.3",
-            linewidth=1,
-            label=f"a careful human prevents above, car at {lateral_mps:g} m/s across",
-        )
     met: dict[tuple[float, float], list[bool]] = {}
     for row in rows:
         case = case_of(row)

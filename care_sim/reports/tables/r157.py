@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_sim.base.errors import percent
+from care_sim.core.driver_settings import FIXED
 from care_sim.evaluation.collision_outcomes import AVOIDED, HIT, MITIGATED
 from care_sim.reports.collisions import CollisionRows
 from care_sim.reports.controls import BEST_CONTROL, IN_HINDSIGHT
@@ -28,7 +29,7 @@ def cut_in_rows(rows: Sequence[Row]) -> CollisionRows:
 def r157_tables(rows: Sequence[Row]) -> list[Table]:
     """Outcomes with their paired differences, then the share avoided by the ego's speed."""
     study = cut_in_rows(rows)
-    drivers = ", ".join(dict.fromkeys(row["driver"] for row in rows))
+    drivers = ", ".join(dict.fromkeys(row.get("driver") or FIXED for row in rows))
     return [_outcome_table(study, drivers), _speed_table(study, drivers)]
 
 

@@ -137,10 +137,11 @@ def test_a_story_is_unpacked_as_it_was_packed(replay):
             "care-sbf",
             0.05,
             1,
-            (("vehicles", 9),),
-            (("k_safe", 0.5),),
+            scenario_parameters=(("vehicles", 9),),
+            policy_parameters=(("k_safe", 0.5),),
             lidar_dead_rows=(10, 11),
         ),
+        EpisodeConfig("dense", "care", driver="careful-human", comfort_mps2=2.0),
     ],
 )
 def test_a_row_gives_its_configuration_back(config):
@@ -153,8 +154,7 @@ def test_a_row_gives_its_configuration_back(config):
 
 def test_a_condition_that_the_row_does_not_tell_is_the_default():
     row = CONFIG.row()
-    for name in ("cell_order", "driver", "brake_mps2"):
-        del row[name]
+    del row["cell_order"]
     assert config_of(row) == config_of(row | {"cell_order": None, "driver": None}) == CONFIG
 
 
