@@ -11,7 +11,9 @@ from care_sim.study.designs.r157 import r157_study
 
 @dataclass(frozen=True, kw_only=True)
 class R157(FixedStudy):
-    """Play the cut-ins that the careful human driver of UN Regulation 157 prevents."""
+    """Play the cut-ins that the careful human driver of UN Regulation 157 prevents, and tell which
+    of them every policy avoids.
+    """
 
     seeds: tuple[int, ...] = (1,)
     """One number: that many seeds, from 0. Several numbers: these seeds."""

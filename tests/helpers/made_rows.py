@@ -69,7 +69,7 @@ def cut_ins(policy, impacts, budget=0.01, tags="causal", **changes):
 
 
 CUT_INS = [
-    *cut_ins("history", [40.0, 39.5, 38.0, None]),
+    *cut_ins("history", [40.0, 39.5, 20.0, None]),
     *cut_ins("care", [None, None, None, None]),
     *cut_ins("fan", [None, None, 50.0, None], tags="control"),
     *cut_ins("stride", [30.0, None, 50.0, None], tags="control"),

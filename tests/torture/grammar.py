@@ -151,6 +151,7 @@ LONG = (
     "order",
     "faults",
     "crowding",
+    "r157",
     "protocol",
     "mechanism",
     "bench",
