@@ -19,7 +19,7 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import half_extents
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
-from care_sim.driving.human_model import CAREFUL_HUMAN
+from care_sim.driving.human_model import HUMAN_MODEL
 
 _STEADY_MPS = 0.1
 """Slower sideways motion is none: a box that is 1 cm off between two keyframes moves as fast."""
@@ -54,7 +54,7 @@ class CarefulHuman:
         closing = ego.speed - tracks.velocities[:, 0]
         if self._danger_s is None:
             gaps = tracks.boxes[:, 0] - half_x - self._front_m
-            if np.any(risks & (closing > 0) & (gaps <= closing * CAREFUL_HUMAN.danger_s)):
+            if np.any(risks & (closing > 0) & (gaps <= closing * HUMAN_MODEL.danger_s)):
                 self._danger_s = 0.0
         else:
             self._danger_s += self._keyframe_s
@@ -69,7 +69,7 @@ class CarefulHuman:
             return Command(float(min(max(wanted, -comfort), comfort)), False)
         # The mean over the keyframe, for which the car holds it.
         ends = np.array([self._danger_s, self._danger_s + self._keyframe_s])
-        before, after = CAREFUL_HUMAN.speed_lost(ends)
+        before, after = HUMAN_MODEL.speed_lost(ends)
         return Command(float((before - after) / self._keyframe_s), True)
 
     def _risky(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> Mask:
@@ -80,7 +80,7 @@ class CarefulHuman:
         off_m = np.abs(tracks.boxes[:, 1])
         in_the_way = off_m <= self._half_width_m + half_y
         towards_mps = -np.sign(tracks.boxes[:, 1]) * tracks.velocities[:, 1]
-        off_its_lane = off_m < CAREFUL_HUMAN.lane_m - CAREFUL_HUMAN.wander_m
+        off_its_lane = off_m < HUMAN_MODEL.lane_m - HUMAN_MODEL.wander_m
         return ahead & (in_the_way | (off_its_lane & (towards_mps > _STEADY_MPS)))
 
     def _perceived(self, tracks: Tracks, risky: Mask) -> Mask:
@@ -91,6 +91,6 @@ class CarefulHuman:
             track: known.get(track, -self._keyframe_s) + self._keyframe_s
             for track in tracks.ids[risky].tolist()
         }
-        least_s = CAREFUL_HUMAN.evaluation_s - LAST_BITS_S
+        least_s = HUMAN_MODEL.evaluation_s - LAST_BITS_S
         evaluated = [self._evaluated_s.get(track, -1.0) for track in tracks.ids.tolist()]
         return np.array(evaluated, dtype=float) >= least_s

@@ -73,5 +73,5 @@ class HumanModel:
         return np.minimum(braking, self.jerk_s), np.maximum(braking - self.jerk_s, 0.0)
 
 
-CAREFUL_HUMAN = HumanModel()
+HUMAN_MODEL = HumanModel()
 """The driver with the numbers of the regulation."""

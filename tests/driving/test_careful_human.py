@@ -7,7 +7,7 @@ from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.careful_human import CarefulHuman
 from care_sim.driving.drivers import check_driver, make_driver
-from care_sim.driving.human_model import CAREFUL_HUMAN as HUMAN
+from care_sim.driving.human_model import HUMAN_MODEL as HUMAN
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
 BESIDE = HALF_WIDTH + 1.0

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from care_sim.driving.human_model import CAREFUL_HUMAN
+from care_sim.driving.human_model import HUMAN_MODEL
 from care_sim.scenarios.r157.grid import KPH, CutInCase
 from care_sim.world.bodies import CATALOGUE
 
@@ -24,7 +24,7 @@ _EGO_LENGTH_M, _EGO_WIDTH_M, _ = CATALOGUE["ego"].size
 
 def verdicts(cases: Sequence[CutInCase]) -> list[str]:
     """For every case `HARMLESS`, `PREVENTABLE` or `UNPREVENTABLE`."""
-    human = CAREFUL_HUMAN
+    human = HUMAN_MODEL
     gap = np.array([case.gap_m for case in cases])
     closing = np.array([case.relative_kph * KPH for case in cases])
     lateral = np.array([case.lateral_mps for case in cases])

@@ -7,7 +7,7 @@ import numpy as np
 from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput
-from care_sim.driving.human_model import CAREFUL_HUMAN
+from care_sim.driving.human_model import HUMAN_MODEL
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Range, Scenario, draw
 from care_sim.scenarios.r157.grid import (
     EGO_KPH,
@@ -33,7 +33,9 @@ _BOUNDS = {
     "gap_m": (0.1, 200.0),
     "lateral_mps": (0.1, 5.0),
 }
-MOTORWAY_LIMIT_MPS = 130 * KPH
+"""Of the numbers of a case: beyond the regulation's grid on both sides."""
+_ROAD_LIMIT_MPS = 130 * KPH
+"""The lanes must have a limit; nobody on this road drives by it."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,8 @@ class R157(Scenario):
         # The order of the draws is part of what a seed means.
         case = self.draw_case(rng)
         lead_s = draw(rng, self.lead_s)
-        lane_m = CAREFUL_HUMAN.lane_m
-        traffic = Traffic((1, 1, 1), 1, lane_m, MOTORWAY_LIMIT_MPS)
+        lane_m = HUMAN_MODEL.lane_m
+        traffic = Traffic((1, 1, 1), 1, lane_m, _ROAD_LIMIT_MPS)
         ego_mps = case.ego_kph * KPH
         world = World(traffic, ego_mps)
 
