@@ -24,8 +24,8 @@ _COLUMNS = (
 )
 _LEGEND = (
     "seen: the camera shows the actor; found: the LiDAR detector reports it; distances are "
-    "planar.\nThe brake acts {delay:g} s after the decision. Keyframes in which nothing changes are "
-    "left out."
+    "planar.\nThe brake acts {delay:g} s after the decision. Keyframes in which nothing changes "
+    "are left out."
 )
 _LABELS = {
     "detection_distance_m": "detection_distance_m (sensor to actor)",
