@@ -71,6 +71,12 @@ COMMANDS = {
         "Crowding",
         "Find where the all-camera reserve collapses as vehicles fill the dense street.",
     ),
+    "r157": CommandEntry(
+        "r157",
+        "R157",
+        "Play the cut-ins that the careful human driver of UN Regulation 157 prevents, and tell "
+        "which of them every policy avoids.",
+    ),
     "protocol": CommandEntry(
         "protocol",
         "Protocol",

@@ -9,6 +9,7 @@ from care_sim.perception.detectors import detector_lines
 from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import SCENARIOS
 from care_sim.scenarios.crossing import OCCLUDERS
+from care_sim.scenarios.r157.grid import KINDS, SIDES
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,10 @@ class Detectors:
         return 0
 
 
+_NAMED = {"occluder": OCCLUDERS, "kind": KINDS, "side": SIDES}
+"""The choices of the parameters of scenarios that are names."""
+
+
 @dataclass(frozen=True)
 class Scenarios:
     """List the scenarios and their parameters."""
@@ -47,8 +52,8 @@ class Scenarios:
 
 def _choices(field: Field[Any]) -> str:
     """The values that a parameter may have, in brackets; empty where nothing bounds them."""
-    if field.name == "occluder":
-        return f" (of {', '.join(OCCLUDERS)})"
+    if field.name in _NAMED:
+        return f" (of {', '.join(_NAMED[field.name])})"
     return f" ({allowed(field)})" if allowed(field) else ""
 
 

@@ -1,4 +1,5 @@
-"""The conditions of an environment: how well the car senses, and how its budget is spent.
+"""The conditions of an environment: how well the car senses, who drives it, and how its budget is
+spent.
 
 The fields are at once keyword arguments of the environments, options of the command line and
 columns of the results. Every fault is off by default. Their bounds are far beyond what any sensor
@@ -16,6 +17,7 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.allocation import RESERVE_FRACTION
 from care_sim.core.cell_order import AS_DEMANDED
+from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
 
 MIN_RETURNS = 3
@@ -122,7 +124,7 @@ class Sensing(CameraFaults, LidarFaults):
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions(Sensing):
-    """All conditions: sensing, and how the budget is spent.
+    """The conditions of both loops: sensing, and how the budget is spent.
 
     `care_sim.core.rig.Rig` checks what the allocator is given; the environments check whether
     engine and rows exist.
@@ -145,7 +147,13 @@ class Conditions(Sensing):
     """
 
 
-DEFAULTS = {field.name: field.default for field in fields(Conditions)}
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoopConditions(DriverSettings, Conditions):
+    """All conditions: those of both loops, and the driver, whom only the closed loop has."""
+
+
+DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
+OF_BOTH_LOOPS = tuple(field.name for field in fields(Conditions))
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))
 UNUSED_BY_FULL_SCAN = (
     *CAMERA_FAULTS,

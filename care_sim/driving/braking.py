@@ -1,53 +1,31 @@
 """The fixed braking controller: the same for every policy, and stated here in full.
 
-A track counts when its box, widened by `side_margin_m` on both sides, overlaps the strip that the
-ego sweeps straight ahead, now or at any time within `horizon_s` if it keeps its velocity. Only what
-lies ahead of the front bumper counts. A track seen once has no velocity and counts only where it
-is.
+A track counts when its box, widened by `brake_side_margin_m` on both sides, overlaps the strip that
+the ego sweeps straight ahead, now or at any time within `brake_horizon_s` if it keeps its velocity.
+Only what lies ahead of the front bumper counts. A track seen once has no velocity and counts only
+where it is.
 
 The brake goes on when the gap to a counting track is at most the ego's stopping distance,
 v * t_reaction + v^2 / (2 b) + s_0, less what a track that drives ahead needs to stop itself,
 v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first keyframe that is at
-least `reaction_s` later. It stays on while any counting track is not faster than the ego, and for
-`release_s` after the last one. Then the ego gains speed at `comfort` up to its cruising speed.
+least `brake_reaction_s` later. It stays on while any counting track is not faster than the ego, and
+for `brake_release_s` after the last one. Then the ego gains speed at `comfort_mps2` up to its
+cruising speed. Numbers and sources are those of `care_sim.core.driver_settings`.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.boxes import half_extents
+from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
 
 
-@dataclass(frozen=True)
-class BrakingRules:
-    """The numbers of the controller and their sources."""
-
-    deceleration: float = 5.0
-    """b in m/s^2, the least that UN Regulation 152 asks of emergency braking."""
-    reaction_s: float = 0.3
-    """From decision to full braking: build-up of brake pressure."""
-    standstill_m: float = 2.0
-    """s_0, jam distance of the intelligent driver model (Treiber et al. 2000), as in the guard of
-    SBF.
-    """
-    horizon_s: float = 2.0
-    """How far ahead an entry is predicted: the two-second rule (Vogel 2003), as in the guard of
-    SBF.
-    """
-    side_margin_m: float = 0.3
-    """Room kept on either side of the ego."""
-    release_s: float = 0.5
-    """The way must have been free this long before the brake is released."""
-    comfort: float = 1.5
-    """Acceleration back to cruising speed, m/s^2."""
-
-
 class BrakingController:
-    """Brakes on tracks. `front_m` and `half_width_m` are the ego's extents seen from its sensor."""
+    """Brakes on tracks. `front_m` and `half_width_m` are the ego's extents seen from its sensor,
+    metres; it cruises at `cruise_mps`.
+    """
 
     def __init__(
         self,
@@ -55,8 +33,9 @@ class BrakingController:
         front_m: float,
         half_width_m: float,
         keyframe_s: float,
-        rules: BrakingRules = BrakingRules(),
+        rules: DriverSettings,
     ):
+        self.guarded_m = 2 * (half_width_m + rules.brake_side_margin_m)
         self._cruise_mps = cruise_mps
         self._front_m = front_m
         self._half_width_m = half_width_m
@@ -78,32 +57,33 @@ class BrakingController:
             self._braking_s += self._keyframe_s
             blocked = bool(np.any(counting & (tracks.velocities[:, 0] <= ego.speed)))
             self._free_s = 0.0 if blocked else self._free_s + self._keyframe_s
-            if self._free_s > self._rules.release_s - LAST_BITS_S:
+            if self._free_s > self._rules.brake_release_s - LAST_BITS_S:
                 self._braking_s = None
         return self._act(ego.speed)
 
     def _act(self, speed: float) -> Command:
         if self._braking_s is None:
             wanted = (self._cruise_mps - speed) / self._keyframe_s
-            comfort = self._rules.comfort
+            comfort = self._rules.comfort_mps2
             return Command(float(min(max(wanted, -comfort), comfort)), False)
-        acting = self._braking_s >= self._rules.reaction_s - LAST_BITS_S
-        return Command(-self._rules.deceleration if acting else 0.0, True)
+        acting = self._braking_s >= self._rules.brake_reaction_s - LAST_BITS_S
+        return Command(-self._rules.brake_mps2 if acting else 0.0, True)
 
     def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> Mask:
         """(n,) which tracks count; `half_x` and `half_y` (n,) are the half extents of boxes."""
         rules = self._rules
         ahead = tracks.boxes[:, 0] + half_x > self._front_m
-        reach = self._half_width_m + rules.side_margin_m + half_y
+        reach = self._half_width_m + rules.brake_side_margin_m + half_y
         # Sideways motion is even, so that a track is in the strip at some time of the horizon
         # exactly if the stretch between where it is now and where it is then meets the strip.
         now = tracks.boxes[:, 1]
-        then = now + tracks.velocities[:, 1] * rules.horizon_s
+        then = now + tracks.velocities[:, 1] * rules.brake_horizon_s
         return ahead & (np.minimum(now, then) <= reach) & (np.maximum(now, then) >= -reach)
 
     def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
         """(n,) gaps in metres at which the ego must begin to brake."""
         rules = self._rules
-        own = speed * rules.reaction_s + speed**2 / (2 * rules.deceleration) + rules.standstill_m
-        theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.deceleration)
+        braking = speed**2 / (2 * rules.brake_mps2)
+        own = speed * rules.brake_reaction_s + braking + rules.brake_standstill_m
+        theirs = np.maximum(tracks.velocities[:, 0], 0.0) ** 2 / (2 * rules.brake_mps2)
         return own - theirs

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from care_sim.base.checks import check_arguments, check_choice, check_number
 from care_sim.base.times import LAST_BITS_S
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.types import Action
+from care_sim.driving.drivers import check_driver
 from care_sim.envs import reward as rewards
 from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
@@ -31,7 +33,7 @@ LONGEST_KEYFRAME_S = 1.0
 
 
 class ClosedLoopEnv(SensingEnv[ClosedLoop]):
-    """A scenario in which the agent chooses the LiDAR's cells and a fixed controller brakes.
+    """A scenario in which the agent chooses the LiDAR's cells and a driver brakes by fixed rules.
 
     ### Action
     `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest
@@ -105,8 +107,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     episodes up. Take at least 16 random bytes, since a word can be tried like a seed. False, the
     default, means none.
 
-    The conditions are the fields of `care_sim.core.conditions.Conditions`, which says more of each.
-    Faults are off by default and drawn by the seed.
+    The conditions are the fields of `care_sim.core.conditions.ClosedLoopConditions`, which says
+    more of each. Faults are off by default and drawn by the seed.
 
     | condition | of | meaning |
     |---|---|---|
@@ -131,10 +133,23 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_dropout` | LiDAR | share of the returns that are lost |
     | `lidar_dead_rows` | LiDAR | elevation rows that return nothing; row 0 is the highest |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
+    | `driver` | driver | who brakes, "fixed" or "careful-human" (3) |
+    | `brake_mps2` | fixed driver | its deceleration, m/s^2 |
+    | `brake_reaction_s` | fixed driver | from decision to full braking, s |
+    | `brake_standstill_m` | fixed driver | gap at which it means to stand, m |
+    | `brake_horizon_s` | fixed driver | how far ahead it foresees an entry, s |
+    | `brake_side_margin_m` | fixed driver | room that it keeps on either side, m |
+    | `brake_release_s` | fixed driver | time of free way before it lets go, s |
+    | `comfort_mps2` | driver | acceleration back to cruising speed, m/s^2 |
+
+    (3) `care_sim.driving.braking` and `care_sim.driving.careful_human`. Only `fixed` has the
+    settings that begin with `brake_`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
     scenario_name: ClassVar[str]
+    conditions: ClosedLoopConditions
+    conditions_kind = ClosedLoopConditions
 
     def __init__(
         self,
@@ -156,8 +171,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         check_arguments(
             type(self).__name__, parameters, [*arguments_of(type(self)), *kind.__dataclass_fields__]
         )
-        conditions, physics = split_conditions(parameters)
+        conditions, physics = split_conditions(self.conditions_kind, parameters)
         check_engine(conditions.engine)
+        check_driver(conditions)
         self.scenario = make_scenario(self.scenario_name, **physics)
         super().__init__(
             conditions,

@@ -92,7 +92,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         check_choice("render_mode", render_mode, self.metadata["render_modes"])
         check_film_arguments(type(self), parameters)
         check_presence(presence)
-        conditions, _ = split_conditions(parameters)
+        conditions, _ = split_conditions(self.conditions_kind, parameters)
         self._detector = detector_of(detector, detector_parameters, conditions, sensor_height_m)
         super().__init__(
             conditions,

@@ -35,3 +35,15 @@ class CutInEnv(ClosedLoopEnv):
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "cutin"
+
+
+class R157Env(ClosedLoopEnv):
+    """`CARE-R157-v0`: a slower vehicle changes over into the ego's lane (UN Regulation 157).
+
+    `ego_kph`, `relative_kph`, `gap_m`, `lateral_mps`, `kind` and `side` set a case; what is not
+    given the seed draws among the cases that the regulation's careful human driver prevents from
+    ending in a collision (`care_sim.scenarios.r157`). Nothing hides the vehicle.
+    """
+
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
+    scenario_name = "r157"

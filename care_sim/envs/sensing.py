@@ -5,7 +5,7 @@ No action can overspend that budget.
 
 import inspect
 from collections.abc import Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import gymnasium
 import numpy as np
@@ -29,6 +29,7 @@ from care_sim.sensors.lidar_faults import check_dead_rows
 
 Observed = dict[str, NDArray[np.float32]]
 AnyLoop = TypeVar("AnyLoop", bound=Loop)
+AnyConditions = TypeVar("AnyConditions", bound=Conditions)
 
 
 class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
@@ -39,6 +40,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     """
 
     acted: NDArray[np.float32]
+    conditions: Conditions
+    conditions_kind: ClassVar[type[Conditions]] = Conditions
+    """What its conditions are made as."""
 
     def __init__(
         self,
@@ -173,15 +177,17 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return fired.copy() if self.conditions.floor else fired.tolist()
 
 
-def split_conditions(parameters: Mapping[str, Any]) -> tuple[Conditions, dict[str, Any]]:
+def split_conditions(
+    kind: type[AnyConditions], parameters: Mapping[str, Any]
+) -> tuple[AnyConditions, dict[str, Any]]:
     """The conditions among keyword arguments, and the other arguments.
 
     Raises InvalidInput for a value that is not allowed.
     """
-    names = Conditions.__dataclass_fields__
+    names = kind.__dataclass_fields__
     given = {name: value for name, value in parameters.items() if name in names}
     others = {name: value for name, value in parameters.items() if name not in names}
-    return Conditions(**given), others
+    return kind(**given), others
 
 
 def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
@@ -195,7 +201,7 @@ def arguments_of(kind: type[SensingEnv[Any]]) -> list[str]:
     named = [each for make in made for each in inspect.signature(make).parameters.values()]
     # Positional ones are what a class of the family fills in for its base: cameras, keyframes.
     own = [each.name for each in named if each.kind is each.KEYWORD_ONLY]
-    return [*dict.fromkeys([*own, *Conditions.__dataclass_fields__])]
+    return [*dict.fromkeys([*own, *kind.conditions_kind.__dataclass_fields__])]
 
 
 def sensing(env: gymnasium.Env[Any, Any]) -> SensingEnv[Any]:

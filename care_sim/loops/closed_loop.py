@@ -6,15 +6,15 @@ from numpy.typing import NDArray
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
 from care_sim.core.boxes import planar_ranges
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
-from care_sim.driving.braking import BrakingController
 from care_sim.driving.corridor import along_route
+from care_sim.driving.drivers import make_driver
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
@@ -54,12 +54,14 @@ class ClosedLoop:
     """(n,) the body behind each camera detection of the belief, NO_OBJECT behind a false one.
     Truth: for scoring and people.
     """
+    guarded_m: float
+    """Width of the strip ahead that the driver guards, metres."""
 
     def __init__(
         self,
         world: World,
         rig: Rig,
-        sensing: Sensing,
+        conditions: ClosedLoopConditions,
         seeds: SensorSeeds,
         pool: BoxPool = EMPTY_POOL,
         detector: Detector | None = None,
@@ -69,24 +71,25 @@ class ClosedLoop:
         self._labels = labels = world.labels()
         self._reported = np.array(list(labels), np.int64)
         self._classes = np.array(list(labels.values()), np.int64)
-        self._engine = ENGINES[sensing.engine](world.bullet, rig.grid)
-        self._lidar = Lidar(rig.grid, self._engine, sensing, seeds.lidar)
+        self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
+        self._lidar = Lidar(rig.grid, self._engine, conditions, seeds.lidar)
         self._camera = CameraDetector(
-            list(labels), sensing, rig.keyframe_s, seeds.camera, rig.cameras, pool
+            list(labels), conditions, rig.keyframe_s, seeds.camera, rig.cameras, pool
         )
-        self._odometry = Odometry(sensing.ego_speed_sigma, seeds.odometry)
+        self._odometry = Odometry(conditions.ego_speed_sigma, seeds.odometry)
         self._detector = detector
-        self._returns_rule = ReturnsRule(labels, sensing.min_returns)
-        self._min_returns = sensing.min_returns
+        self._returns_rule = ReturnsRule(labels, conditions.min_returns)
+        self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
         self._track_objects = TrackObjects()
-        # The controller steers by the sensor, which sits behind the middle of the car: the front
-        # bumper is farther from it than half a length.
+        # The driver goes by the sensor, which sits behind the middle of the car: the front bumper
+        # is farther from it than half a length.
         length, width, _ = world.ego_kind.size
-        self._controller = BrakingController(
-            world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
-        )
+        front_m = length / 2 - LIDAR_POSITION[0]
+        cruise_mps = world.ego_motion.speed
+        self._driver = make_driver(conditions, cruise_mps, front_m, width / 2, rig.keyframe_s)
+        self.guarded_m = self._driver.guarded_m
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -106,7 +109,7 @@ class ClosedLoop:
         detections, behind, found = self._detect(scan, bodies)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
-        command = self._controller.command(self._tracks_ahead(sensor), self.belief.ego)
+        command = self._driver.command(self._tracks_ahead(sensor), self.belief.ego)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)

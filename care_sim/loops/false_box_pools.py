@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.conditions import Sensing
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
@@ -32,7 +32,7 @@ def pool_of_another_drive(
     world: World,
     duration_s: float,
     rig: Rig,
-    sensing: Sensing,
+    conditions: ClosedLoopConditions,
     seeds: SensorSeeds,
     detector: Detector | None = None,
 ) -> BoxPool:
@@ -47,7 +47,7 @@ def pool_of_another_drive(
     """
     with closing(world):
         loop = ClosedLoop(
-            world, rig, replace(sensing, false_positive_rate=0.0), seeds, detector=detector
+            world, rig, replace(conditions, false_positive_rate=0.0), seeds, detector=detector
         )
         cells = np.arange(rig.grid.size)
         seen = []

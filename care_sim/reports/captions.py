@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import NamedTuple
 
-from care_sim.reports.contrasts import GATE_M, GATE_POINTS
+from care_sim.reports.contrasts import GATE_COLLISION_POINTS, GATE_M, GATE_POINTS
 from care_sim.reports.protocol.differences import OVER_EVENTS
 from care_sim.reports.protocol.formatting import PAPER
 from care_sim.reports.table import Bold, Table
@@ -36,10 +36,8 @@ def caption(remarks: Sequence[Remark], tables: Sequence[Table]) -> str:
     )
 
 
-# How censored distances enter each statistic is decided in care_sim.evaluation.censoring, the
-# resampling in care_sim.evaluation.bootstrap, the gates in care_sim.reports.contrasts; the coverage
-# is measured again by tests/evaluation/test_bootstrap.py.
-EPISODES_CAPTION = (
+# How censored distances enter each statistic is decided in care_sim.evaluation.censoring.
+_EPISODES_READING = (
     Remark(
         "First detection: planar distance in metres from the sensor to the first-sighting actor at "
         "the first keyframe it is detected; median [quartiles]. k/n: k of n episodes, one a seed. "
@@ -69,21 +67,38 @@ EPISODES_CAPTION = (
         "later.",
         ("regret",),
     ),
-    Remark(
-        "Differences are means, paired by seed (common random numbers), with 95% percentile "
-        "bootstrap intervals of 10,000 resamples; positive favours the first named."
-    ),
-    Remark(
-        "Bold differences: the interval excludes zero wherever in their range the censored "
-        "distances lie, on five or more seeds.",
-        (_BOLD,),
-    ),
-    Remark(
-        "Asterisk: it does, and the mean reaches the gate stated in advance: "
-        f"{GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, "
-        f"0.3 s) or {GATE_POINTS:.0f} points of a rate.",
-        ("*",),
-    ),
+)
+
+
+# The resampling is in care_sim.evaluation.bootstrap, the gates in care_sim.reports.contrasts.
+def _statistics(points: str) -> tuple[Remark, ...]:
+    """How differences are made, and the gate of those that are in `points`."""
+    return (
+        Remark(
+            "Differences are means, paired by seed (common random numbers), with 95% percentile "
+            "bootstrap intervals of 10,000 resamples; positive favours the first named."
+        ),
+        Remark(
+            "Bold differences: the interval excludes zero wherever in their range the censored "
+            "distances lie, on five or more seeds.",
+            (_BOLD,),
+        ),
+        Remark(
+            "Asterisk: it does, and the mean reaches the gate stated in advance: "
+            f"{GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, "
+            f"0.3 s) or {points}.",
+            ("*",),
+        ),
+    )
+
+
+_OF_RATES = _statistics(f"{GATE_POINTS:.0f} points of a rate")
+_OF_COLLISIONS = _statistics(
+    f"{GATE_COLLISION_POINTS:.0f} points of the collisions that the full scan avoids on the same "
+    "seed"
+)
+# Measured again by tests/evaluation/test_bootstrap.py.
+_EPISODES_COVERAGE = (
     Remark(
         "No correction is made for the number of differences in a table. The ego covers 0.8 m of "
         "road a keyframe, so differences come in such steps. How often the intervals hold the "
@@ -92,6 +107,34 @@ EPISODES_CAPTION = (
         "sets of five show no difference at all. An interval without width says that all seeds "
         "differ alike, not that the estimate is exact."
     ),
+)
+EPISODES_CAPTION = (*_EPISODES_READING, *_OF_RATES, *_EPISODES_COVERAGE)
+VALIDATION_CAPTION = (*_EPISODES_READING, *_OF_COLLISIONS, *_EPISODES_COVERAGE)
+# The classes are in care_sim.evaluation.collision_outcomes, the mark in care_sim.scenarios.r157.
+R157_CAPTION = (
+    Remark(
+        "A cut-in is preventable where a car that never brakes is touched and the careful human "
+        "driver of UN Regulation 157 is not; only these are played. Avoided: nothing was touched; "
+        "mitigated: touched, the car more than 1 km/h slower than it came; hit: touched at that "
+        "speed. Impact: the car's speed at the first contact. Differences are points of the cases "
+        "avoided, paired by case and seed."
+    ),
+    *_OF_RATES,
+)
+NCAP_CAPTION = (
+    Remark(
+        "Avoided: no contact; mitigated: an impact slower than that of a car that does not brake; "
+        "hit: at its speed. Score: 5 without a contact, else 4 max(0, 1 - v_impact / v_reference), "
+        "where v_reference is the speed at which a car hits that does not brake (Ljungbergh et al. "
+        "2024, NeuroNCAP); on a target that goes ahead at an even speed both are speeds of "
+        "closing. A target that was never detected counts by what came of it. In all: the mean of "
+        "the tests' scores, each the mean over its speeds and seeds. Reported, unreported: whether "
+        "perception reports the cars that hide the target; the same seeds play both. Differences "
+        "are paired by seed (common random numbers), with 95% percentile bootstrap intervals of "
+        "10,000 resamples; positive favours the policy named. No correction is made for the number "
+        "of differences."
+    ),
+    Remark("Bold: the interval excludes zero, on five or more seeds.", (_BOLD,)),
 )
 PROTOCOL_CAPTION = (
     Remark(

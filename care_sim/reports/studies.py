@@ -11,6 +11,7 @@ from care_sim.reports.captions import (
     EPISODES_CAPTION,
     MECHANISM_CAPTION,
     PROTOCOL_CAPTION,
+    R157_CAPTION,
     Remark,
 )
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
@@ -23,6 +24,7 @@ from care_sim.reports.figures.order import (
     order_figures,
 )
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
+from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol import ablations as open_ablations
 from care_sim.reports.protocol import order as open_order
@@ -34,12 +36,14 @@ from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.reports.tables.paper_statements import statements
+from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.paper import NO_COLLISION
+from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
-from care_sim.study.rows.schema import COUNT, TEXT, Column, Schema
+from care_sim.study.rows.schema import COUNT, SUM, TEXT, Column, Schema
 from care_sim.study.run_config import Row
 
 
@@ -91,6 +95,7 @@ def _order_closing(rows: Sequence[Row]) -> list[str]:
 
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
+_CASE_COLUMNS = {name: TEXT if name.endswith(("kind", "side")) else SUM for name in CASE_COLUMNS}
 
 
 _ALL = (
@@ -118,6 +123,16 @@ _ALL = (
         _sweep_closing,
         (CROWDING_FIGURE,),
         columns={VEHICLES_COLUMN: COUNT},
+    ),
+    Study(
+        "r157",
+        "Cut-ins of UN Regulation 157",
+        r157_tables,
+        r157_figures,
+        _sweep_closing,
+        (R157_FIGURE,),
+        R157_CAPTION,
+        columns=_CASE_COLUMNS,
     ),
     Study(
         "ablate",

@@ -11,7 +11,8 @@ from typing import Any, Self
 import gymnasium
 
 from care_sim.base.checks import check_known, check_seed
-from care_sim.core.conditions import Conditions
+from care_sim.core.conditions import DEFAULTS, ClosedLoopConditions
+from care_sim.core.driver_settings import DRIVER_SETTINGS
 from care_sim.envs import CLOSED_LOOP
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
@@ -36,7 +37,7 @@ ENVIRONMENT_IDS = {name.split("-")[1].lower(): name for name in CLOSED_LOOP}
 
 
 @dataclass(frozen=True)
-class EpisodeConfig(Conditions, RunConfig):
+class EpisodeConfig(ClosedLoopConditions, RunConfig):
     """Everything that decides an episode.
 
     The fields are the arguments of the environments (see
@@ -86,12 +87,14 @@ class EpisodeConfig(Conditions, RunConfig):
 
     def row(self) -> Row:
         """All parameters, flat; those of detector, scenario and policy as `detector.NAME`,
-        `scenario.NAME`, `policy.NAME`. `detector` is a column only where it is not the default.
+        `scenario.NAME`, `policy.NAME`. `detector` and the settings of the driver are columns only
+        where they are not the default.
         """
-        plain = {name: getattr(self, name) for name in PLAIN_FIELDS}
-        # Without the column the rows, and the digests made of them, stay as they were before there
+        plain = {name: getattr(self, name) for name in PLAIN_FIELDS if name not in DRIVER_SETTINGS}
+        # Without the columns the rows, and the digests made of them, stay as they were before there
         # was a choice.
-        other = {} if self.detector == PROXY else {"detector": self.detector}
+        chosen = {"detector": PROXY} | {name: DEFAULTS[name] for name in DRIVER_SETTINGS}
+        other = {n: getattr(self, n) for n, usual in chosen.items() if getattr(self, n) != usual}
         return (
             plain
             | other

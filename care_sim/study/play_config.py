@@ -9,7 +9,7 @@ from typing import Any, Self
 import gymnasium
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import DEFAULTS, Conditions
+from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, Conditions
 from care_sim.envs.open_loop import UNFILMED, FilmEnv
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.loops.film import Film
@@ -18,7 +18,6 @@ from care_sim.sources.scenes import Scene, Source
 from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest
 from care_sim.study.run_config import (
-    CONDITION_NAMES,
     FULL,
     Row,
     RunConfig,
@@ -31,7 +30,7 @@ from care_sim.study.run_config import (
     flat,
 )
 
-_FILMED = [name for name in CONDITION_NAMES if name not in UNFILMED]
+_FILMED = [name for name in OF_BOTH_LOOPS if name not in UNFILMED]
 
 
 @dataclass(frozen=True)

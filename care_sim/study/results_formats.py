@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from care_sim.core.driver_settings import DRIVER_SETTINGS
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
 from care_sim.study.mechanism_play import (
@@ -73,10 +74,16 @@ _BY_WRITER = {
 """Columns that every study writes. Older files and those of others may lack them: a condition that
 they do not know was at its default.
 """
+_OF_EPISODES = (
+    _BY_WRITER
+    | {"detector": as_optional(TEXT)}
+    | {name: CONDITION_COLUMNS[name] for name in DRIVER_SETTINGS}
+)
+"""Those of every study of the closed loop."""
 # What a file must have as a column is optional in a row where it tells of what did not happen: a
 # detection, a view of the actor, a collision.
 _EPISODES = Schema(
-    {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS if name not in _BY_WRITER}
+    {name: CONDITION_COLUMNS.get(name, TEXT) for name in PLAIN_FIELDS if name not in _OF_EPISODES}
     | {
         "budget": SHARE,
         "seed": SEED,
@@ -89,7 +96,7 @@ _EPISODES = Schema(
         "impact_speed_mps": as_optional(SUM),
         "rays_fired": COUNT,
     },
-    _BY_WRITER | {"detector": as_optional(TEXT)},
+    _OF_EPISODES,
 )
 _COUNTS = Column("lists of whole numbers", least=0)
 _ANY_PLAY = {

@@ -17,7 +17,7 @@ from care_sim.base.errors import InvalidInput, one_line, shown
 from care_sim.commands.shared.options import seeds_of
 from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
-from care_sim.core.conditions import Conditions
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
@@ -28,7 +28,7 @@ from care_sim.envs.scenarios import DenseEnv
 from care_sim.envs.scenes import ReplayEnv, StreetEnv
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.scenarios.dartout import Dartout
-from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_config import ENVIRONMENT_IDS, EpisodeConfig
 from care_sim.study.executors import cluster
 from care_sim.study.parameters import parameters
 from care_sim.wrappers import ExportScans, GridObservation, SectorReserve, SectorScores
@@ -85,7 +85,14 @@ def refused(named, make, /, *arguments, **options):
 
 BOUNDED = [
     (kind, field.name)
-    for kind in (Conditions, ForgettingRules, AngularGrid, PinholeCamera, Rig, *SCENARIOS.values())
+    for kind in (
+        ClosedLoopConditions,
+        ForgettingRules,
+        AngularGrid,
+        PinholeCamera,
+        Rig,
+        *SCENARIOS.values(),
+    )
     for field in fields(kind)
     if allowed(field)
 ]
@@ -111,7 +118,7 @@ def test_every_bounded_number_keeps_its_bounds(kind, name):
 
 
 def test_every_number_of_conditions_and_scenarios_has_bounds():
-    for kind in (Conditions, *SCENARIOS.values()):
+    for kind in (ClosedLoopConditions, *SCENARIOS.values()):
         for field in fields(kind):
             is_number = isinstance(field.default, int | float) and not isinstance(
                 field.default, bool
@@ -128,9 +135,7 @@ def test_an_episode_at_the_bounds_of_any_range_stays_in_its_space(name, extreme)
     for field in ranges:
         end = field.metadata["bounds"][extreme == "most"]
         env = gymnasium.make(
-            f"care_sim:CARE-{name}-v0".replace("dartout", "Dartout")
-            .replace("dense", "Dense")
-            .replace("cutin", "CutIn"),
+            f"care_sim:{ENVIRONMENT_IDS[name]}",
             disable_env_checker=True,
             duration_s=0.2,
             **{field.name: (end, end)},

@@ -3,8 +3,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Ego, Tracks
-from care_sim.driving.braking import BrakingController, BrakingRules
+from care_sim.driving.braking import BrakingController
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
 STOPPING_AT_10 = 10 * 0.3 + 10**2 / (2 * 5.0) + 2.0
@@ -14,7 +15,7 @@ EDGE = HALF_WIDTH + 0.3 + 0.5
 
 
 def controller(cruise=10.0, **rules):
-    return BrakingController(cruise, FRONT, HALF_WIDTH, KEYFRAME, BrakingRules(**rules))
+    return BrakingController(cruise, FRONT, HALF_WIDTH, KEYFRAME, DriverSettings(**rules))
 
 
 def objects(*rows, size=(2.0, 1.0, 1.5), yaw=0.0):
@@ -122,7 +123,7 @@ def test_of_many_the_one_that_counts_decides():
 
 
 def test_reaction_time_is_kept_to_the_keyframe():
-    software = controller(reaction_s=0.15)
+    software = controller(brake_reaction_s=0.15)
     commands = [software.command(objects((5, 0, 0, 0)), Ego(10.0)) for _ in range(4)]
     assert [command.acceleration for command in commands] == [0.0, 0.0, -5.0, -5.0]
     assert all(command.braking for command in commands)

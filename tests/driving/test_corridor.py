@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
@@ -45,9 +46,9 @@ def test_a_person_beyond_the_bend_walks_across_the_way():
 def test_the_controller_brakes_for_what_stands_on_the_way_alone(place, brakes):
     sensor = Frame(10.0, 0.0, 1.84, 0.0)
     seen = track(place[0] - 10.0, place[1])
-    controller = BrakingController(8.0, 1.5, 0.9, 0.1)
+    controller = BrakingController(8.0, 1.5, 0.9, 0.1, DriverSettings())
     assert controller.command(along_route(seen, LEFT_TURN, sensor), Ego(8.0)).braking == brakes
-    straight_on = BrakingController(8.0, 1.5, 0.9, 0.1)
+    straight_on = BrakingController(8.0, 1.5, 0.9, 0.1, DriverSettings())
     assert straight_on.command(seen, Ego(8.0)).braking != brakes
 
 

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import care_sim
-from care_sim.core.conditions import Conditions
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.reward import REWARD_WEIGHTS
@@ -227,11 +227,41 @@ def test_arguments_of_the_sensing_arrive():
         "camera_latency": 2,
         "lidar_dropout": 0.1,
     }
-    assert make("CARE-Dartout-v0", **arguments).unwrapped.conditions == Conditions(**arguments)
+    env = make("CARE-Dartout-v0", **arguments).unwrapped
+    assert env.conditions == ClosedLoopConditions(**arguments)
+
+
+def braked_by(**driver):
+    """When the brake is on and how fast the car is, keyframe by keyframe, behind a standing bus
+    15 m ahead.
+    """
+    env = make("CARE-Dartout-v0", budget=1.0, **driver).unwrapped
+    env.scenario = BusAhead(gap_m=15.0)
+    env.reset(seed=0)
+    over = False
+    while not over:
+        _, _, terminated, truncated, _ = env.step(EVERYTHING)
+        over = terminated or truncated
+    env.close()
+    return [frame.braking for frame in env.keyframes], [frame.speed_mps for frame in env.keyframes]
+
+
+def test_the_driver_and_its_rules_are_arguments():
+    """The controller brakes at once, 15 m being its stopping distance. The careful human evaluates
+    for 0.4 s, since the bus is a danger from the start, and brakes 0.75 s later.
+    """
+    braking, speeds = braked_by()
+    assert (braking[0], speeds[:5]) == (True, pytest.approx([10, 10, 10, 10, 9.5]))
+    _, harder = braked_by(brake_mps2=8.0, brake_reaction_s=0.1, brake_standstill_m=8.0)
+    assert harder[:3] == pytest.approx([10, 10, 9.2])
+    braking, speeds = braked_by(driver="careful-human")
+    assert braking[:5] == [False] * 4 + [True]
+    assert min(speeds[:12]) == 10.0 > speeds[12]
 
 
 def test_every_condition_stands_on_the_page_of_the_environments():
-    assert [f.name for f in fields(Conditions) if f"`{f.name}`" not in ClosedLoopEnv.__doc__] == []
+    names = [field.name for field in fields(ClosedLoopConditions)]
+    assert [name for name in names if f"`{name}`" not in ClosedLoopEnv.__doc__] == []
 
 
 def test_a_contact_ends_the_episode_with_the_speed_it_happened_at():
@@ -358,6 +388,8 @@ def test_step_before_reset_says_so():
         ({"lidar_range_sigma": -1.0}, "range_sigma"),
         ({"engine": "magic"}, "unknown engine 'magic'; known: bullet"),
         ({"cell_order": "magic"}, "unknown cell_order 'magic'; known: as-demanded, columns"),
+        ({"driver": "magic"}, "unknown driver 'magic'; known: careful-human, fixed"),
+        ({"brake_mps2": 0.0}, "brake_mps2 must lie in"),
         ({"keyframe_s": 0.12}, "multiple of the world step"),
         ({"render_mode": "ascii"}, "render_mode must be"),
         ({"occluder": "cloud"}, "unknown occluder"),

@@ -45,6 +45,39 @@ CROWD = [
 ]
 
 
+def cut_ins(policy, impacts, budget=0.01, tags="causal", **changes):
+    """The rows of two cut-ins of UN Regulation 157, at 40 and 60 km/h, with two seeds each; one
+    impact speed a row in km/h, None where nothing was touched.
+    """
+    cases = (
+        {"ego_kph": ego, "relative_kph": 20.0, "gap_m": 20.0, "lateral_mps": 1.0}
+        | {"kind": "car", "side": "left"}
+        for ego in (40.0, 60.0)
+    )
+    configs = [
+        config
+        for case in cases
+        for config in grid(
+            ["r157"], [policy], [budget], [0, 1], scenario_parameters=tuple(case.items())
+        )
+    ]
+    return [
+        row(config, 20.0, tags=tags, collision=kph is not None, **changes)
+        | {"impact_speed_mps": None if kph is None else kph / 3.6}
+        for config, kph in zip(configs, impacts, strict=True)
+    ]
+
+
+CUT_INS = [
+    *cut_ins("history", [40.0, 39.5, 20.0, None]),
+    *cut_ins("care", [None, None, None, None]),
+    *cut_ins("fan", [None, None, 50.0, None], tags="control"),
+    *cut_ins("stride", [30.0, None, 50.0, None], tags="control"),
+    *cut_ins("full", [None, None, None, None]),
+    *cut_ins("care", [None, None, 20.0, None], budget=0.03),
+]
+
+
 def as_in_the_paper(config, distance):
     """The row of an episode of the paper's study, first detected at this distance but in the
     cut-in: nobody is hit, and history brakes with three seeds of five.

@@ -14,7 +14,7 @@ from care_sim.study.designs import ablations, crowding, faults, order, paper
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
-from tests.helpers.made_rows import CROWD, STUDY, row
+from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row
 
 
 @pytest.mark.parametrize("name", STUDIES)
@@ -36,7 +36,7 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
         "known: ablate, ablate-open-loop, crowding, faults, mechanism, order, order-open-loop, "
-        "paper, protocol, sweep",
+        "paper, protocol, r157, sweep",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -47,6 +47,7 @@ EPISODES = {
     "crowding": CROWD,
     "ablate": STUDY,
     "faults": STUDY,
+    "r157": [each for each in CUT_INS if not each["collision"]],
     "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
 }
 
@@ -71,9 +72,8 @@ def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys)
         *((tmp_path / f).read_text() for f in ("tables.md", "tables.tex")),
     )
     assert "Collisions: 0 in" in printed
-    assert all(
-        "Collisions: 0 in" in text and "never detected" in text for text in (markdown, latex)
-    )
+    read_as = "careful human" if name == "r157" else "never detected"
+    assert all("Collisions: 0 in" in text and read_as in text for text in (markdown, latex))
     tables = study.tables(rows)
     assert latex.count(r"\begin{table}") == len(tables)
     assert all(f"## {table.title}\n" in markdown for table in tables)

@@ -8,6 +8,7 @@ import pytest
 
 from care_sim.base import package_files
 from care_sim.base.errors import InvalidInput
+from care_sim.core.driver_settings import DRIVER_SETTINGS
 from care_sim.study import provenance
 from care_sim.study.episode_config import (
     ENVIRONMENT_IDS,
@@ -29,7 +30,7 @@ def test_every_scenario_has_its_environment():
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        ({"scenario": "dance"}, ["'dance'", "cutin, dartout, dense"]),
+        ({"scenario": "dance"}, ["'dance'", "cutin, dartout, dense, r157"]),
         ({"policy": "best"}, ["'best'", "all-camera", "care-sbf"]),
         ({"budget": 0.0}, ["budget", "(0, 1]"]),
         ({"budget": 1.1}, ["budget", "(0, 1]"]),
@@ -54,6 +55,15 @@ def test_bad_input_names_the_thing_and_what_is_allowed(change, names):
         replace(GOOD, **change)
     assert all(name in str(error.value) for name in names), error.value
     assert "\n" not in str(error.value)
+
+
+def test_settings_of_the_driver_are_columns_only_where_they_are_not_the_default():
+    """So that rows and digests of before there was a choice stay as they were."""
+    assert not {*DRIVER_SETTINGS} & {*GOOD.row()}
+    other = replace(GOOD, driver="careful-human", comfort_mps2=2.0)
+    added = {"driver": "careful-human", "comfort_mps2": 2.0}
+    assert other.row() == GOOD.row() | added
+    assert other.digest() != GOOD.digest()
 
 
 def test_the_digest_is_that_of_the_values_and_not_of_their_types():
@@ -148,7 +158,7 @@ def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers
 
 def test_the_row_is_flat_and_the_label_names_what_is_unusual():
     config = replace(GOOD, camera_latency=2, scenario_parameters=(("vehicles", 7),))
-    assert set(config.row()) == {*PLAIN_FIELDS, "scenario.vehicles"}
+    assert set(config.row()) == {*PLAIN_FIELDS, "scenario.vehicles"} - {*DRIVER_SETTINGS}
     assert config.label == "dense care 0.1 seed 0 camera_latency=2 scenario.vehicles=7"
 
 

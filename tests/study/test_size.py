@@ -13,6 +13,7 @@ from care_sim.study.designs.ablations import ablation_study
 from care_sim.study.designs.crowding import crowding_study
 from care_sim.study.designs.faults import fault_study
 from care_sim.study.designs.paper import paper_study
+from care_sim.study.designs.r157 import r157_study
 from care_sim.study.episode_config import grid, of_seeds
 from care_sim.study.play_config import play_grid
 
@@ -25,9 +26,11 @@ COMMANDS = (
     "ablate --seeds 5000",
     "faults --seeds 5000",
     "crowding --seeds 5000",
+    "r157 --seeds 5000",
     "protocol --floor-seeds 1000000000",
     "protocol --floor-seeds 5000 --policies care --budgets 0.1",
 )
+STUDIES = (paper_study, ablation_study, crowding_study, fault_study, r157_study)
 ALL_IN_ONE = """
 import sys
 from care_sim.cli import main
@@ -68,7 +71,7 @@ def test_axes_are_counted_before_they_are_multiplied(monkeypatch):
         grid(["dartout"], ["care", "full"], [0.1, 0.2], range(5))
 
 
-@pytest.mark.parametrize("study", [paper_study, ablation_study, crowding_study, fault_study])
+@pytest.mark.parametrize("study", STUDIES)
 def test_a_study_of_several_seeds_is_that_of_one_with_each(study, monkeypatch):
     monkeypatch.setattr(config.EpisodeConfig, "__post_init__", lambda self: None)
     whole = study((3, 1, 4), ["random"])

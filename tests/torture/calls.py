@@ -106,13 +106,13 @@ def environment(case):
     """Make an environment, reset it, take a few steps."""
     import gymnasium
 
-    from care_sim.core.conditions import Conditions
+    from care_sim.core.conditions import ClosedLoopConditions
     from care_sim.scenarios import SCENARIOS
 
     name = case.rng.choice(LOOPS)
     case.tell(name)
     scenario = SCENARIOS[name.split("-")[1].lower()]
-    known = _fields_of(Conditions) | _fields_of(scenario) | dict.fromkeys(MORE)
+    known = _fields_of(ClosedLoopConditions) | _fields_of(scenario) | dict.fromkeys(MORE)
     make = partial(gymnasium.make, name, disable_env_checker=case.rng.random() < 0.7)
     if case.rng.random() < 0.5:
         make = gymnasium.envs.registration.load_env_creator(gymnasium.spec(name).entry_point)
@@ -406,9 +406,9 @@ def scenario(case):
 
 def conditions(case):
     """The conditions alone."""
-    from care_sim.core.conditions import Conditions
+    from care_sim.core.conditions import ClosedLoopConditions
 
-    Conditions(**draw(case, _fields_of(Conditions), 5))
+    ClosedLoopConditions(**draw(case, _fields_of(ClosedLoopConditions), 5))
 
 
 def wrapper(case):

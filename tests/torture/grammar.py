@@ -151,6 +151,7 @@ LONG = (
     "order",
     "faults",
     "crowding",
+    "r157",
     "protocol",
     "mechanism",
     "bench",
@@ -264,6 +265,7 @@ class Grammar:
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""
         from care_sim.core.cell_order import CELL_ORDERS
+        from care_sim.driving.drivers import DRIVERS
         from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
 
@@ -277,6 +279,7 @@ class Grammar:
             "also": policy_names(),
             "engine": ["fast", "bullet"],
             "cell_order": [*CELL_ORDERS],
+            "driver": [*DRIVERS],
         }
         return names.get(name, []) * 6
 

@@ -6,14 +6,14 @@ from typing import Any
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.commands.shared.selection import policy_parameters
-from care_sim.core.conditions import Conditions
+from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.perception.detectors import PROXY
 from care_sim.study.parameters import parameters
 from care_sim.study.run_config import MOST_TASKS
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Conditions):
+class Options(ClosedLoopConditions):
     """Conditions that all episodes share."""
 
     detector: str = PROXY

@@ -8,6 +8,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.boxes import planar_ranges
+from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
 from care_sim.core.types import Ego, ImageDetections, Tracks
@@ -110,7 +111,11 @@ class StageByStage:
         self._memory = TrackMemory(rig.keyframe_s)
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
-            world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
+            world.ego_motion.speed,
+            length / 2 - LIDAR_POSITION[0],
+            width / 2,
+            rig.keyframe_s,
+            DriverSettings(),
         )
 
     def keyframe(self, fired: Cells, ego: Ego) -> tuple[ImageDetections, Tracks]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from care_sim.base.checks import is_number
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import DEFAULTS
+from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.policies import tags_of
@@ -21,7 +21,7 @@ from care_sim.study.run_config import Row
 
 _AXES = ("scenario", "policy", "budget", "seed")
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
-_USUAL_PLAY = {name: value for name, value in DEFAULTS.items() if name != "floor_seed"} | {
+_USUAL_PLAY = {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"} | {
     "camera_detections": None,
     "presence": ANNOTATED,
 }

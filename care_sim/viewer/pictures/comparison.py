@@ -68,7 +68,7 @@ def _write_header(draw: ImageDraw.ImageDraw, name: str, loop: ClosedLoop, frame:
 
 def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
     with furnished(loop.world) as scene:
-        add_car(scene, loop.world, LIDAR_POSITION[0])
+        add_car(scene, loop.world, LIDAR_POSITION[0], loop.guarded_m)
         view = Image.fromarray(scene.colours(_CAMERA, loop.sensor))
     draw = ImageDraw.Draw(view)
     mark_tracks(draw, _CAMERA, loop.belief.tracks)

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 import numpy as np
 
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.driving.braking import BrakingRules
 from care_sim.world.bodies import BodyKind, Part, Triple
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
@@ -41,18 +40,18 @@ def furnished(world: World) -> Iterator[BulletWorld]:
         scene.close()
 
 
-def add_car(scene: BulletWorld, world: World, sensor_x: float) -> None:
-    """Add the car and, on the ground, the strip that the controller guards, with a bar every ten
+def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float) -> None:
+    """Add the car and, on the ground, the strip that the driver guards, with a bar every ten
     metres.
 
-    `sensor_x` is the place of the LiDAR ahead of the car's centre, metres.
+    `sensor_x` is the place of the LiDAR ahead of the car's centre, `guarded_m` the strip's width,
+    metres.
     """
     # Path and bars stand 2 cm over what is below them, so that they are what is seen.
     x, y, yaw = world.ego.pose
-    width = world.ego_kind.size[1] + 2 * BrakingRules().side_margin_m
     for kind, ahead in (
-        (_slab("path", (METRE_MARKS[-1], width, 0.02), 0.01, _PATH), METRE_MARKS[-1] / 2),
-        *((_slab("bar", (0.15, width, 0.04), 0.02, _BAR), mark) for mark in METRE_MARKS),
+        (_slab("path", (METRE_MARKS[-1], guarded_m, 0.02), 0.01, _PATH), METRE_MARKS[-1] / 2),
+        *((_slab("bar", (0.15, guarded_m, 0.04), 0.02, _BAR), mark) for mark in METRE_MARKS),
     ):
         reach = sensor_x + ahead
         scene.add(kind, (x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw))

@@ -68,7 +68,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     with furnished(loop.world) as scene:
         # The front camera does not see the car that carries it, nor the marks on the ground.
         camera = Image.fromarray(scene.colours(loop.rig.cameras[0], loop.sensor))
-        add_car(scene, loop.world, LIDAR_POSITION[0])
+        add_car(scene, loop.world, LIDAR_POSITION[0], loop.guarded_m)
         chase = Image.fromarray(scene.colours(CHASE_CAMERA, loop.sensor))
     _annotate_chase(chase, loop, frame)
     _annotate_camera(camera, loop)

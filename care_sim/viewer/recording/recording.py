@@ -52,9 +52,7 @@ class Recording(AbstractContextManager["Recording"]):
         if name not in self._lanes:
             raise unknown("lane", name, self._lanes)
         colour = LANES[self._lanes.index(name) % len(LANES)]
-        return RecordedEpisode(
-            Lane(self._stream, name), loop.rig, loop.world.ego_kind.size[1], colour
-        )
+        return RecordedEpisode(Lane(self._stream, name), loop.rig, loop.guarded_m, colour)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -71,9 +69,9 @@ class Recording(AbstractContextManager["Recording"]):
 class RecordedEpisode:
     """Logs one episode, keyframe by keyframe."""
 
-    def __init__(self, lane: Lane, rig: Rig, ego_width_m: float, colour: tuple[int, int, int]):
+    def __init__(self, lane: Lane, rig: Rig, guarded_m: float, colour: tuple[int, int, int]):
         self._lane = lane
-        self._space = SpaceLog(lane, rig, ego_width_m)
+        self._space = SpaceLog(lane, rig, guarded_m)
         self._pictures = PictureLog(lane, rig)
         self._curves = MeasureLog(lane, rig.budget, colour)
         self._photo = b""

@@ -10,13 +10,12 @@ from care_sim.core.arrays import Floats
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
-from care_sim.driving.braking import BrakingRules
 from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 
 _PATH_M = 40.0
-"""Length of the strip that the controller guards, as far as it is drawn."""
+"""Length of the strip that the driver guards, as far as it is drawn."""
 _CORNERS = (1, 2, 4, 3)
 """Places of the corners of an image box among its rays, one after the other around it."""
 _SHARE_COLOURS = np.array(entities.SHARE_COLOURS, np.uint8)
@@ -27,18 +26,17 @@ _MARGIN_M = 0.15
 
 
 class SpaceLog:
-    """Logs the 3D part of an episode whose car is `ego_width_m` wide."""
+    """Logs the 3D part of an episode whose driver guards a strip `guarded_m` wide."""
 
-    def __init__(self, lane: Lane, rig: Rig, ego_width_m: float):
+    def __init__(self, lane: Lane, rig: Rig, guarded_m: float):
         self._lane = lane
         self._rig = rig
         self._driven: list[Floats] = []
         lane.fix("world", rr.ViewCoordinates.FLU)
 
-        # The strip on the ground that the controller guards, below the sensor.
-        width = ego_width_m + 2 * BrakingRules().side_margin_m
+        # The strip on the ground that the driver guards, below the sensor.
         strip = np.array(
-            [[_PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, _PATH_M, width, 0.02, 0.0]]
+            [[_PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, _PATH_M, guarded_m, 0.02, 0.0]]
         )
         lane.fix(
             "world/lidar/path", box_batch(strip, colors=entities.PATH_RGB, fill_mode=FillMode.Solid)

@@ -137,10 +137,11 @@ def test_a_story_is_unpacked_as_it_was_packed(replay):
             "care-sbf",
             0.05,
             1,
-            (("vehicles", 9),),
-            (("k_safe", 0.5),),
+            scenario_parameters=(("vehicles", 9),),
+            policy_parameters=(("k_safe", 0.5),),
             lidar_dead_rows=(10, 11),
         ),
+        EpisodeConfig("dense", "care", driver="careful-human", comfort_mps2=2.0),
     ],
 )
 def test_a_row_gives_its_configuration_back(config):
@@ -154,7 +155,7 @@ def test_a_row_gives_its_configuration_back(config):
 def test_a_condition_that_the_row_does_not_tell_is_the_default():
     row = CONFIG.row()
     del row["cell_order"]
-    assert config_of(row) == config_of(row | {"cell_order": None}) == CONFIG
+    assert config_of(row) == config_of(row | {"cell_order": None, "driver": None}) == CONFIG
 
 
 def test_seeds_are_watched_one_after_the_other():

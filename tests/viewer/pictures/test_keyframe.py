@@ -15,6 +15,7 @@ from care_sim.viewer.pictures.keyframe import (
     BRAKING_COLOUR,
     DETECTED_COLOUR,
     HIDDEN_COLOUR,
+    IN_VIEW_COLOUR,
     PICTURE_HEIGHT,
     PICTURE_WIDTH,
     TRACKED_COLOUR,
@@ -71,7 +72,8 @@ def test_it_has_one_size_before_and_after_the_first_scan(name):
         assert picture.shape == (PICTURE_HEIGHT, PICTURE_WIDTH, 3)
         assert picture.dtype == np.uint8
     assert np.any(before != after)
-    assert shows(before, HIDDEN_COLOUR)
+    # Nothing hides the vehicle of a cut-in of UN Regulation 157.
+    assert shows(before, IN_VIEW_COLOUR if "R157" in name else HIDDEN_COLOUR)
 
 
 def test_rendering_changes_no_observation():

@@ -1,0 +1,33 @@
+from collections import Counter
+
+import numpy as np
+
+from care_sim.scenarios import make_scenario
+from care_sim.scenarios.r157.grid import kinds_in_turn
+from care_sim.scenarios.r157.preventable import preventable
+from care_sim.study.designs import r157
+from care_sim.study.episode_config import grid
+
+
+def test_the_study_plays_every_preventable_case_and_no_other(monkeypatch):
+    few = preventable(kinds_in_turn())[::100]
+    monkeypatch.setattr(r157, "kinds_in_turn", lambda: [*few, *kinds_in_turn()[:3]])
+    configs = r157.r157_study([0, 1], ["fan"])
+    assert {r157.case_of(config.row()) for config in configs} == {*few}
+    played = Counter((config.policy, config.budget) for config in configs)
+    policies = ("history", "all-camera", "care", "fan")
+    budgeted = [(policy, budget) for policy in policies for budget in (0.01, 0.03)]
+    assert played == dict.fromkeys([*budgeted, ("full", 1.0)], 2 * len(few))
+    assert {config.driver for config in configs} == {"fixed"}
+    assert {config.driver for config in r157.r157_study([0], driver="careful-human")} == {
+        "careful-human"
+    }
+
+
+def test_a_case_as_parameters_is_the_case_that_is_drawn():
+    for case in kinds_in_turn()[::97]:
+        config, *_ = grid(
+            ["r157"], ["care"], [0.1], [0], scenario_parameters=tuple(vars(case).items())
+        )
+        scenario = make_scenario("r157", **dict(config.scenario_parameters))
+        assert scenario.draw_case(np.random.default_rng(0)) == case
