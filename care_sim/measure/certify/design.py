@@ -51,6 +51,8 @@ NOT_YET_CERTIFIED = (
     "place",
     "history-rows",
     "history-place",
+    "learned-place",
+    "history-learned-place",
 )
 """Younger than the published list. They come into it when it is published anew."""
 
