@@ -71,6 +71,12 @@ COMMANDS = {
         "Crowding",
         "Find where the all-camera reserve collapses as vehicles fill the dense street.",
     ),
+    "validate": CommandEntry(
+        "validate",
+        "Validate",
+        "Say whether a world of the closed loop discriminates: whether a camera leads the best "
+        "control, a full scan leaves anything to win, and the reserves are told apart.",
+    ),
     "protocol": CommandEntry(
         "protocol",
         "Protocol",

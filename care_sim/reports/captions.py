@@ -2,7 +2,7 @@
 loop, and of its mechanism.
 """
 
-from care_sim.reports.contrasts import GATE_M, GATE_POINTS
+from care_sim.reports.contrasts import GATE_COLLISION_POINTS, GATE_M, GATE_POINTS
 from care_sim.reports.protocol.differences import OVER_EVENTS
 
 _READING = (
@@ -25,15 +25,21 @@ _LEVELS = (
     "policy's, mean in metres, 0 at best, and its interval; as full: episodes in which the policy "
     "detects no later."
 )
+
+
 # The resampling is in care_sim.evaluation.bootstrap, the gates in care_sim.reports.contrasts.
-_STATISTICS = (
-    "Differences are means, paired by seed (common random numbers), with 95% percentile bootstrap "
-    "intervals of 10,000 resamples; positive favours the first named. Bold: the interval excludes "
-    "zero wherever in their range the censored distances lie, on five or more seeds. Asterisk: it "
-    f"does, and the mean reaches the gate stated in advance: {GATE_M} m of first detection (the "
-    f"road covered at 30 km/h while the brake builds up, 0.3 s) or {GATE_POINTS:.0f} points of a "
-    "rate. No correction is made for the number of differences in a table."
-)
+def _statistics(points: str) -> str:
+    """How differences are made, and the gate of those that are in `points`."""
+    return (
+        "Differences are means, paired by seed (common random numbers), with 95% percentile "
+        "bootstrap intervals of 10,000 resamples; positive favours the first named. Bold: the "
+        "interval excludes zero wherever in their range the censored distances lie, on five or "
+        "more seeds. Asterisk: it does, and the mean reaches the gate stated in advance: "
+        f"{GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, "
+        f"0.3 s) or {points}. No correction is made for the number of differences in a table."
+    )
+
+
 # Measured again by tests/evaluation/test_bootstrap.py.
 _COVERAGE = (
     "The ego covers 0.8 m of road a keyframe, so differences come in such steps. How often the "
@@ -43,8 +49,14 @@ _COVERAGE = (
     "seeds differ alike, not that the estimate is exact."
 )
 # Studies of differences alone print no levels, and their captions do not explain them.
-EPISODES_CAPTION = " ".join([_READING, _CENSORING, _LEVELS, _STATISTICS, _COVERAGE])
-DIFFERENCES_CAPTION = " ".join([_READING, _CENSORING, _STATISTICS, _COVERAGE])
+_OF_RATES = _statistics(f"{GATE_POINTS:.0f} points of a rate")
+_OF_COLLISIONS = _statistics(
+    f"{GATE_COLLISION_POINTS:.0f} points of the collisions that the full scan avoids on the same "
+    "seed"
+)
+EPISODES_CAPTION = " ".join([_READING, _CENSORING, _LEVELS, _OF_RATES, _COVERAGE])
+DIFFERENCES_CAPTION = " ".join([_READING, _CENSORING, _OF_RATES, _COVERAGE])
+VALIDATION_CAPTION = " ".join([_READING, _CENSORING, _OF_COLLISIONS, _COVERAGE])
 
 _PROTOCOL_READING = (
     "Differences are points of recall (TTFD: keyframes), positive where the first named has more, "

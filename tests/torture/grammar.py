@@ -151,6 +151,7 @@ LONG = (
     "order",
     "faults",
     "crowding",
+    "validate",
     "protocol",
     "mechanism",
     "bench",
