@@ -41,6 +41,7 @@ TRAINING = {
     "care": (15.0, 0),
     "fan": (14.0, 1),
     "rows": (9.0, 0),
+    "seed-finder": (16.0, 0),
 }
 """CARE is the best with a camera; `rows` hits nobody, so that the earlier `fan` is worse."""
 SATURATED = {

@@ -125,6 +125,11 @@ def test_each_question_can_fail_alone(changed, reason):
     assert only(world(TELLING | changed, TRAINING)).failings(0.03) == [reason]
 
 
+def test_two_are_apart_whichever_of_them_is_ahead():
+    test = TELLING | {"full": (19.0, 1), "history": (18.5, 1)}
+    assert only(world(test, TRAINING)).failings(0.03) == []
+
+
 def test_without_training_nobody_is_chosen():
     assert only(world(TELLING, {})).failings(0.03) == ["nobody was chosen on training seeds"]
 

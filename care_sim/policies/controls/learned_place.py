@@ -61,7 +61,7 @@ def _learned(rig: Rig, scenario: Scenario, seeds: int) -> Cells:
     for seed in training_seeds(seeds):
         # A hull is dilated by the paper's margins, its guess of how far off a box can be.
         for hull in _first_hulls(rig, scenario, seed):
-            sightings[hull] += 1 / len(hull)
+            sightings[hull] += 1
     return likeliest_first(rig.grid, sightings)
 
 

@@ -10,7 +10,6 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.learned_place import LearnedPlace, learned_cells
-from care_sim.policies.controls.place import likeliest_first
 from care_sim.scenarios import make_scenario
 
 GRID = Rig().grid
@@ -34,13 +33,14 @@ def test_of_one_seed_it_fires_where_the_full_scan_first_finds_the_actor():
     assert sorted(cells) == [*range(GRID.size)]
 
 
-def test_of_several_seeds_every_actor_weighs_alike():
-    hulls = [hull_when_a_full_scan_finds_the_actor(seed) for seed in (10_000, 10_001, 10_002)]
-    sightings = np.zeros(GRID.size)
-    for hull in hulls:
-        sightings[hull] += 1 / len(hull)
-    expected = likeliest_first(GRID, sightings)
-    assert np.array_equal(learned_cells(Rig(), "dartout", 3), expected)
+def test_the_cells_that_held_most_actors_come_first():
+    """At speeds so different they are found near and far, in many cells and in few."""
+    speeds = {"ego_speed_mps": (4.0, 14.0)}
+    hulls = [hull_when_a_full_scan_finds_the_actor(10_000 + n, **speeds) for n in range(3)]
+    held = [sum(cell in hull for hull in hulls) for cell in range(GRID.size)]
+    assert {*held} == {0, 1, 2, 3}
+    found = learned_cells(Rig(), make_scenario("dartout", **speeds), 3)
+    assert [held[cell] for cell in found] == sorted(held, reverse=True)
 
 
 @pytest.mark.parametrize(("mirrored", "side"), [("never", -1), ("always", 1)])
