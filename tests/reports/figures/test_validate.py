@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.reports.figures.validate import validation_figures
-from tests.helpers.made_worlds import STUDY, cell
+from tests.helpers.made_worlds import MIRRORED, STUDY, TELLING, TRAINING, cell, world
 
 
 def heights(axes):
@@ -20,6 +20,13 @@ def test_every_world_has_its_place_with_the_factor_that_is_changed():
     assert heights(hit)["history"] == [0.0, 100.0]
     assert heights(hit)["all-camera"] == [0.0, pytest.approx(50.0)]
     assert "seed-finder §" in heights(found)
+
+
+def test_the_best_control_is_that_of_each_world():
+    fan_is_best = TRAINING | {"rows": (9.0, 3), "fan": (14.0, 0)}
+    rows = [*world(TELLING, TRAINING), *world(TELLING, fan_is_best, parameters=MIRRORED)]
+    figure = validation_figures(rows)["validation"]
+    assert heights(figure.axes[0])["best control"] == [10.0, 15.0]
 
 
 def test_somebody_never_detected_stands_at_zero():
