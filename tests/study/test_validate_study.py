@@ -46,6 +46,7 @@ def test_what_is_learned_is_learned_on_as_many_seeds_as_are_trained_on(configs):
     told = {(c.policy, dict(c.policy_parameters).get("seeds")) for c in configs}
     assert {number for policy, number in told if policy.endswith("learned-place")} == {2}
     assert (MEMORISER, 2000) in told
+    assert all(dict(c.policy_parameters)["hidden_first"] for c in configs if c.policy == MEMORISER)
     assert ("care", None) in told
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from care_sim.base.checks import check_whole
+from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame
@@ -33,6 +33,9 @@ class SeedFinder(Policy):
     alone it takes `dense`. In another scenario than it is given by name the first speed can be the
     same. It then finds the seed, and fires where the actor would be in the scenario that it knows.
 
+    With `hidden_first` it asks for that hull before anything else and gives its tracks what is
+    left: the most that memory of the seeds can do.
+
     It is a control, no contender: what it reaches without a camera is what the seeds give away.
     """
 
@@ -42,9 +45,17 @@ class SeedFinder(Policy):
     told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
     """A rig does not say through which scenario it drives, and scenarios share first speeds."""
 
-    def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 30):
+    def __init__(
+        self,
+        rig: Rig,
+        scenario: Scenario | str | None = None,
+        seeds: int = 30,
+        hidden_first: bool = False,
+    ):
         check_whole("seeds", seeds, 1, 10**6)
+        check_flag("hidden_first", hidden_first)
         super().__init__(rig)
+        self._hidden_first = hidden_first
         self._scenario = known_scenario(scenario)
         self._seeds = seeds
         self._twin: World | None = None
@@ -60,9 +71,13 @@ class SeedFinder(Policy):
         self._speed: float | None = None
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, then that of the actor whom nobody has seen."""
+        """Hulls, and that of the actor whom nobody has seen."""
         self._follow(belief)
-        return Demand(self.rig.hulls(belief.tracks.boxes), [self.rig.hulls(self._expected())])
+        tracked = self.rig.hulls(belief.tracks.boxes)
+        hidden = self.rig.hulls(self._expected())
+        if self._hidden_first:
+            return Demand(layers=[hidden, tracked])
+        return Demand(tracked, [hidden])
 
     def _follow(self, belief: Belief) -> None:
         speed = belief.ego.speed

@@ -73,6 +73,9 @@ def validation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     for axes in panels[-1]:
         axes.set_xticks(range(len(worlds)), _names(worlds), rotation=30, ha="right", fontsize=8)
     notes = tag_notes(tags[policy] for policy in _SHOWN if policy in tags)
+    seeds = len({row["seed"] for world in worlds for row in world.test_rows})
+    title = f"{worlds[0].setting.label}, then with one factor changed: {seeds} test seeds"
+    figure.suptitle(title, x=0.01, ha="left", fontsize=10)
     figure.supxlabel("\n".join(("at 0 m: not detected", *notes)), fontsize=9)
     figure.legend(
         *panels[0][0].get_legend_handles_labels(),
@@ -92,7 +95,10 @@ def _names(worlds: Sequence[WorldPlays]) -> list[str]:
     )
     return [
         base.world,
-        *("\n".join(f"{name} {value}" for name, value in pairs) or "as it is" for pairs in changed),
+        *(
+            "\n".join(f"{name.replace('_', ' ')} {value}" for name, value in each)
+            for each in changed
+        ),
     ]
 
 

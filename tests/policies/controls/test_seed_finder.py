@@ -120,6 +120,18 @@ def test_of_seeds_that_share_a_speed_it_takes_the_one_whose_picture_it_sees(make
         assert finder.found == found
 
 
+def test_it_may_ask_for_the_hidden_one_before_its_tracks(make):
+    """At 1% the hulls of the dense street's tracks leave the hidden one 49 of its cells."""
+    env = make("dense", budget=0.01)
+
+    def watch(policy, observation, action):
+        (hidden,) = policy.rig.hulls(policy._expected())
+        first = hidden[: policy.rig.budget]
+        assert action.ravel()[first].all()
+
+    played(env, "seed-finder", watch=watch, hidden_first=True)
+
+
 def test_of_a_rig_alone_it_knows_the_dense_street(make):
     env = make("cutin", budget=0.03)
     observation, _ = env.reset(seed=9)
@@ -151,6 +163,7 @@ def test_all_leaves_controls_out_unless_they_are_named():
         ({"scenario": ["moon"]}, "unknown scenario"),
         ({"seeds": 0}, "seeds must be"),
         ({"seeds": 1.5}, "seeds must"),
+        ({"hidden_first": 1}, "hidden_first must be True or False"),
     ],
 )
 def test_other_parameters_are_refused(make, parameters, message):

@@ -15,6 +15,7 @@ def test_every_world_has_its_place_with_the_factor_that_is_changed():
     found, hit = figure.axes
     assert [label.get_text() for label in hit.get_xticklabels()] == ["dartout", "mirrored drawn"]
     assert found.get_title(loc="left") == "budget 3%"
+    assert figure.get_suptitle() == "dartout, then with one factor changed: 6 test seeds"
     assert heights(found)["care"] == [16.0, 15.0]
     assert heights(found)["best control"] == [16.0, 10.0]
     assert heights(hit)["history"] == [0.0, 100.0]
