@@ -36,6 +36,7 @@ _STUDIES = (
     "faults",
     "crowding",
     "r157",
+    "validate",
     "protocol",
     "mechanism",
 )

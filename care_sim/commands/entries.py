@@ -77,6 +77,12 @@ COMMANDS = {
         "Play the cut-ins that the careful human driver of UN Regulation 157 prevents, and tell "
         "which of them every policy avoids.",
     ),
+    "validate": CommandEntry(
+        "validate",
+        "Validate",
+        "Say whether a world of the closed loop discriminates: whether a camera leads the best "
+        "control, a full scan leaves anything to win, and the reserves are told apart.",
+    ),
     "protocol": CommandEntry(
         "protocol",
         "Protocol",

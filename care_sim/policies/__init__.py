@@ -81,11 +81,17 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         HistoryPlace,
     )
 }
-# Loaded when it is asked for, as those of installed packages are: it plays scenarios by itself, and
-# their traffic (highway-env, which brings pandas and Matplotlib) doubles the time of every import.
-BUILT_IN["seed-finder"] = EntryPoint(
-    "seed-finder", "care_sim.policies.controls.seed_finder:SeedFinder", "care_sim.policies"
-)
+# Loaded when they are asked for, as those of installed packages are: they play scenarios by
+# themselves, and their traffic (highway-env, which brings pandas and Matplotlib) doubles the time
+# of every import.
+BUILT_IN |= {
+    name: EntryPoint(name, f"care_sim.policies.controls.{place}", "care_sim.policies")
+    for name, place in {
+        "seed-finder": "seed_finder:SeedFinder",
+        "learned-place": "learned_place:LearnedPlace",
+        "history-learned-place": "history_learned_place:HistoryLearnedPlace",
+    }.items()
+}
 
 POLICIES: Plugins[Policy] = Plugins("policy", "care_sim.policies", BUILT_IN, policy_faults)
 

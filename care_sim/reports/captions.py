@@ -85,8 +85,8 @@ def _statistics(points: str) -> tuple[Remark, ...]:
         ),
         Remark(
             "Asterisk: it does, and the mean reaches the gate stated in advance: "
-            f"{GATE_M} m of first detection (the road covered at 30 km/h while the brake builds up, "
-            f"0.3 s) or {points}.",
+            f"{GATE_M} m of first detection (the road covered at 30 km/h while the brake builds "
+            f"up, 0.3 s) or {points}.",
             ("*",),
         ),
     )

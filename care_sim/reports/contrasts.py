@@ -18,6 +18,8 @@ earlier detection by less buys less than the reaction.
 """
 GATE_POINTS = 5.0
 """The gate of the paper (Sec. 5.2), fixed there before the runs."""
+GATE_COLLISION_POINTS = 10.0
+"""Of the collisions that a full scan prevents; stated before a world was validated."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,13 @@ DETECTION = Measure("First detection", "m", 1, GATE_M, detection)
 BRAKED = Measure("Braked", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
 DETECTED = Measure(
     "Detected", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored))
+)
+AVOIDED = Measure(
+    "Collision avoided",
+    "points",
+    0,
+    GATE_COLLISION_POINTS,
+    lambda row: Reading(100.0 * (not row["collision"])),
 )
 
 

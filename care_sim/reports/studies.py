@@ -12,6 +12,7 @@ from care_sim.reports.captions import (
     MECHANISM_CAPTION,
     PROTOCOL_CAPTION,
     R157_CAPTION,
+    VALIDATION_CAPTION,
     Remark,
 )
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
@@ -25,6 +26,7 @@ from care_sim.reports.figures.order import (
 )
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, protocol_figures
 from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
+from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol import ablations as open_ablations
 from care_sim.reports.protocol import order as open_order
@@ -38,6 +40,7 @@ from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
+from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
 from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.designs.r157 import CASE_COLUMNS
@@ -88,6 +91,10 @@ def _no_figures(_rows: Sequence[Row]) -> dict[str, Figure]:
 
 def _paper_closing(rows: Sequence[Row]) -> list[str]:
     return [f'{collisions(rows)} Paper: "{NO_COLLISION}"', *map(str, statements(rows))]
+
+
+def _validation_closing(rows: Sequence[Row]) -> list[str]:
+    return [collisions(rows), *validation_closing(rows)]
 
 
 def _order_closing(rows: Sequence[Row]) -> list[str]:
@@ -158,6 +165,15 @@ _ALL = (
         _order_closing,
         (ORDER_FIGURE,),
         columns=_ORDER_COLUMNS,
+    ),
+    Study(
+        "validate",
+        "Validation of a world",
+        validation_tables,
+        validation_figures,
+        _validation_closing,
+        (VALIDATION_FIGURE,),
+        VALIDATION_CAPTION,
     ),
     Study(
         "order-open-loop",

@@ -18,10 +18,10 @@ from care_sim.scenarios.base import (
     RIGHT_PARKING_Y,
     USUAL_EGO_SPEED_MPS,
     Range,
-    Scenario,
     draw,
     line_with_terraces,
 )
+from care_sim.scenarios.mirroring import MirrorableScenario
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk
@@ -33,7 +33,7 @@ OCCLUDERS = ("trailer", "truck", "van", "hoarding")
 
 
 @dataclass(frozen=True)
-class CrossingScenario(Scenario):
+class CrossingScenario(MirrorableScenario):
     """A two-way street with a parking lane on each side. The occluder stands in the right one. The
     person waits hidden behind its far end, then runs straight across to the far kerb.
 
@@ -79,7 +79,7 @@ class CrossingScenario(Scenario):
         ego_speed = draw(rng, self.ego_speed_mps)
         crossing_x = draw(rng, self.crossing_m)
         traffic = Traffic((1, -1), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
-        world = World(traffic, ego_speed)
+        world = self.empty_world(traffic, ego_speed, rng)
         start_y = self._add_occluder(world, crossing_x, rng)
         self._add_person(world, start_y, crossing_x, ego_speed, rng)
         self.furnish(world, crossing_x, rng)

@@ -11,10 +11,10 @@ from care_sim.scenarios.base import (
     SPEED_LIMIT_MPS,
     USUAL_EGO_SPEED_MPS,
     Range,
-    Scenario,
     draw,
     line_with_terraces,
 )
+from care_sim.scenarios.mirroring import MirrorableScenario
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
@@ -27,7 +27,7 @@ of 4.25 m on the right, where the stop is, and of 4.75 m on the left.
 
 
 @dataclass(frozen=True)
-class CutIn(Scenario):
+class CutIn(MirrorableScenario):
     """Two lanes in the ego's direction, the ego in the left one. A bus stands at its stop in the
     right lane. A car stands hidden before the bus and pulls out ahead of the ego (highway-env lane
     change, IDM).
@@ -52,7 +52,7 @@ class CutIn(Scenario):
         ego_speed = draw(rng, self.ego_speed_mps)
         stop_x = draw(rng, self.stop_m)
         traffic = Traffic((1, 1), ego_lane=1, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
-        world = World(traffic, ego_speed)
+        world = self.empty_world(traffic, ego_speed, rng)
         occluder = CATALOGUE["bus"]
         car = CATALOGUE["car"]
         stop = (stop_x - occluder.size[0] / 2, -LANE_WIDTH_M, 0.0)

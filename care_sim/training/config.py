@@ -9,11 +9,11 @@ from typing import Any, ClassVar, Literal
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput
+from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.envs.reward import HEAVIEST
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.study.parameters import parameters
-from care_sim.training.seeds import TRAINING, VALIDATION
 
 HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 """Fields in which a resumed run may differ from the run before."""
@@ -21,7 +21,7 @@ HOW_LONG = ("steps", "out", "resume", "tensorboard", "threads", "processes")
 
 @dataclass(frozen=True, kw_only=True)
 class AgentConfig:
-    """Fields that all learners share. `care_sim.training.seeds` tells which seeds are for what."""
+    """Fields that all learners share. `care_sim.base.seed_ranges` says which seeds are for what."""
 
     algorithm: ClassVar[str]
 

@@ -25,11 +25,12 @@ from care_sim.base.checks import LARGEST_INTEGER, check_known, is_number
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import replacing, write_text
 from care_sim.base.json_text import check_file_size, json_content
+from care_sim.base.seed_ranges import TRAINING
 from care_sim.core.rig import Rig
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.config import ALGORITHMS, AgentConfig
-from care_sim.training.seeds import TRAINING, validation_seeds
+from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import ValidationScore
 
 if TYPE_CHECKING:

@@ -1,15 +1,4 @@
-"""Which seeds are for what, disjoint by construction.
-
-| seeds | for |
-|---|---|
-| 0 to 1,999 | the benchmark; of streets 0 to 149 for evaluation, 1,000 to 1,019 for calibration |
-| 2,000 to 9,999 | validation: the learning curve, and which weights are kept |
-| 10,000 and up | training |
-
-No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
-seed below 2,000. Where episodes differ by the recording and not by the seed (`CARE-Replay-v0`),
-hold out recordings.
-"""
+"""Episodes of training and of validation seeds alone (`care_sim.base.seed_ranges`)."""
 
 from typing import Any
 
@@ -17,11 +6,7 @@ import gymnasium
 import numpy as np
 
 from care_sim.base.errors import InvalidInput
-
-VALIDATION = 2_000
-TRAINING = 10_000
-LAST = 2**31 - 1
-"""Training seeds lie below it."""
+from care_sim.base.seed_ranges import LAST, TRAINING, VALIDATION
 
 
 class TrainingSeeds(gymnasium.Wrapper[Any, Any, Any, Any]):

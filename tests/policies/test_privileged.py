@@ -20,7 +20,9 @@ from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
 
 PRIVILEGED = ["history-oracle", "random-points", "farthest-points"]
-ORDINARY = [name for name in BUILT_IN if name not in (*PRIVILEGED, "full")]
+TWIN = "seed-finder"
+"""It holds a world that it has built by itself."""
+ORDINARY = [name for name in BUILT_IN if name not in (*PRIVILEGED, "full", TWIN)]
 
 
 @pytest.fixture(params=PRIVILEGED)
@@ -65,6 +67,16 @@ def used(name, environment, encounter):
 @pytest.mark.parametrize("name", ORDINARY)
 def test_an_ordinary_policy_cannot_reach_truth(name, environment, encounter):
     assert not knows(used(name, environment, encounter))
+
+
+def test_a_twin_is_no_part_of_the_environment(environment, encounter):
+    policy = used(TWIN, environment, encounter)
+    reached = reachable(policy).values()
+    (twin,) = (thing for thing in reached if isinstance(thing, World))
+    world = environment.unwrapped.loop.world
+    assert twin is not world
+    assert twin.bullet is not world.bullet
+    assert not any(isinstance(thing, gymnasium.Env | ClosedLoop) for thing in reached)
 
 
 def test_a_privileged_policy_is_handed_truth(privileged, environment, encounter):

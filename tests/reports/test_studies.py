@@ -10,10 +10,11 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import StudyReport, print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
-from care_sim.study.designs import ablations, crowding, faults, order, paper
+from care_sim.study.designs import ablations, crowding, faults, order, paper, validate
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
+from tests.helpers import made_worlds
 from tests.helpers.made_rows import CROWD, CUT_INS, STUDY, row
 
 
@@ -36,7 +37,7 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
         "known: ablate, ablate-open-loop, crowding, faults, mechanism, order, order-open-loop, "
-        "paper, protocol, r157, sweep",
+        "paper, protocol, r157, sweep, validate",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -48,6 +49,7 @@ EPISODES = {
     "ablate": STUDY,
     "faults": STUDY,
     "r157": [each for each in CUT_INS if not each["collision"]],
+    "validate": made_worlds.world(made_worlds.SATURATED, {"care": (15.0, 0), "fan": (14.0, 0)}),
     "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
 }
 
@@ -89,6 +91,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         "order": order.order_study(range(2)),
         "crowding": crowding.crowding_study(range(2)),
         "paper": paper.paper_study(range(2)),
+        "validate": validate.validation_study("cutin", [(("mirrored", "drawn"),)], [0.1], [0], 1),
     }
     for name, configs in played.items():
         rows = with_added_columns(

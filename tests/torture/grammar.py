@@ -152,6 +152,7 @@ LONG = (
     "faults",
     "crowding",
     "r157",
+    "validate",
     "protocol",
     "mechanism",
     "bench",

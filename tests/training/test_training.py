@@ -9,13 +9,14 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.base.seed_ranges import TRAINING, VALIDATION
 from care_sim.cli import main
 from care_sim.policies.learned.weights import load_weights
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.training.algorithms import algorithm
 from care_sim.training.config import PpoConfig, SacConfig
 from care_sim.training.environments import plain, training
-from care_sim.training.seeds import TRAINING, VALIDATION, validation_seeds
+from care_sim.training.seeds import validation_seeds
 from care_sim.training.validation import evaluate, rule
 
 SHORT = ["--environments", "2", "--episodes", "2", "--env-parameters", "duration_s=1.0"]

@@ -52,6 +52,8 @@ CERTIFIED_POLICIES = (
     "place",
     "history-rows",
     "history-place",
+    "learned-place",
+    "history-learned-place",
 )
 """Written out, because one more changes what every episode of the list is made of."""
 AS_LISTED: dict[str, dict[str, Any]] = {"seed-finder": {"scenario": "dense"}}

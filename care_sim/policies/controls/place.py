@@ -3,9 +3,10 @@
 from os import PathLike
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_sim.core.belief import Belief
-from care_sim.core.grid import Cells
+from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -39,7 +40,13 @@ def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:
     """(N,) all cells, those with most first sightings first; of equals, as `rows` has them."""
     weights = load_weights(shipped_weights("place") if path is None else path)
     weights.check("place", rig)
-    sightings = weights.array("sightings", *rig.grid.shape)
-    # Most cells of the map have none: without the rows, larger budgets would go to the sky.
-    rows = nearest_rows(rig.grid)
-    return rows[np.argsort(-sightings.ravel()[rows], kind="stable")]
+    return likeliest_first(rig.grid, weights.array("sightings", *rig.grid.shape).ravel())
+
+
+def likeliest_first(grid: AngularGrid, sightings: NDArray[np.floating]) -> Cells:
+    """(N,) all cells, those with the highest `sightings` (N,) first; of equals, as `rows` has
+    them.
+    """
+    # Most cells of a map have none: without the rows, larger budgets would go to the sky.
+    rows = nearest_rows(grid)
+    return rows[np.argsort(-sightings[rows], kind="stable")]

@@ -1,39 +1,40 @@
-"""A warning: it finds the seed by the car's first speed and knows the episode from then on."""
+"""A warning: it finds the seed by the first observation and knows the episode from then on."""
 
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import replace
 from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 
-from care_sim.base.checks import check_known, check_whole
-from care_sim.base.random_streams import streams
+from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.policies.controls.rehearsal import known_scenario, rehearsal
+from care_sim.scenarios.base import Scenario
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import World
-
-FALLBACK_SCENARIO = "dense"
-"""The scenario that it knows if it is told none."""
 
 
 class SeedFinder(Policy):
     """What an agent can do that holds this package. Of the first `seeds` seeds of a public
-    `scenario` it takes the one whose ego begins at the speed that it reads. It lets that episode's
-    world go on by itself, and reserves the hull of where the hidden actor is by then. It needs no
-    camera and no return. It plays as history does if no seed that it knows begins at that speed:
-    with a seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
+    `scenario` it takes the one whose ego begins at the speed that it reads, and of several such the
+    one whose first picture it sees. It lets a twin of that episode's world go on beside it, its ego
+    driven as the own car drives, and reserves the hull of where the hidden actor is by then. It
+    needs no return. It plays as history does if no seed that it knows begins at that speed: with a
+    seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
 
-    `make_policy` tells it the `scenario` of the environment. Made of a rig alone it takes `dense`.
-    It knows scenarios with their default arguments. With others, or in another scenario, the first
-    speed can be the same. It then finds the seed, and fires where the actor would be in the
-    scenario that it knows.
+    `make_policy` tells it the `scenario` of the environment, with its parameters. Made of a rig
+    alone it takes `dense`. In another scenario than it is given by name the first speed can be the
+    same. It then finds the seed, and fires where the actor would be in the scenario that it knows.
+
+    With `hidden_first` it asks for that hull before anything else and gives its tracks what is
+    left: the most that memory of the seeds can do.
 
     It is a control, no contender: what it reaches without a camera is what the seeds give away.
     """
@@ -41,75 +42,85 @@ class SeedFinder(Policy):
     name = "seed-finder"
     tags = ("generator", "control")
     source = "own: what public seeds give away"
-    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario_name"}
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
     """A rig does not say through which scenario it drives, and scenarios share first speeds."""
 
-    def __init__(self, rig: Rig, scenario: str | None = None, seeds: int = 30):
-        scenario = FALLBACK_SCENARIO if scenario is None else scenario
-        check_known("scenario", scenario, SCENARIOS)
+    def __init__(
+        self,
+        rig: Rig,
+        scenario: Scenario | str | None = None,
+        seeds: int = 30,
+        hidden_first: bool = False,
+    ):
         check_whole("seeds", seeds, 1, 10**6)
+        check_flag("hidden_first", hidden_first)
         super().__init__(rig)
-        self._scenario = scenario
+        self._hidden_first = hidden_first
+        self._scenario = known_scenario(scenario)
         self._seeds = seeds
+        self._twin: World | None = None
         self.reset()
 
     def reset(self) -> None:
         """Forget the episode."""
         self.found: int | None = None
         """The seed that fits the first observation; None if there is none."""
-        self._hidden: Floats = np.empty((0, 7))
+        if self._twin is not None:
+            self._twin.close()
+        self._twin = None
         self._speed: float | None = None
-        self._keyframe = 0
-        self._x = 0.0
 
     def remember(self, belief: Belief) -> None:
-        """Find the seed by the first speed, then follow the car."""
+        """Find the seed by what is seen first, then let its twin follow the car."""
         speed = belief.ego.speed
         if self._speed is None:
-            self.found = _first_speeds(self._scenario, self._seeds).get(speed)
+            self.found = self._seed_of(belief)
             if self.found is not None:
-                self._hidden = _hidden_boxes(self._scenario, self.found, self.rig.keyframe_s)
-        else:
-            # The car drives straight on: between keyframes at the mean of both speeds.
-            self._keyframe += 1
-            self._x += (self._speed + speed) / 2 * self.rig.keyframe_s
+                self._twin = rehearsal(self._scenario, self.found, self.rig).world
+        elif self._twin is not None:
+            # Between keyframes the car holds one acceleration, which both speeds tell.
+            held = (speed - self._speed) / self.rig.keyframe_s
+            self._twin.advance(held, self.rig.keyframe_s)
         self._speed = speed
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, then that of the actor whom nobody has seen."""
-        return Demand(self.rig.hulls(belief.tracks.boxes), [self.rig.hulls(self._expected())])
+        """Hulls, and that of the actor whom nobody has seen."""
+        tracked = self.rig.hulls(belief.tracks.boxes)
+        hidden = self.rig.hulls(self._expected())
+        if self._hidden_first:
+            return Demand(layers=[hidden, tracked])
+        return Demand(tracked, [hidden])
+
+    def _seed_of(self, belief: Belief) -> int | None:
+        # All budgets share what is seen first.
+        rig = replace(self.rig, budget=self.rig.grid.size)
+        seen = _picture(belief)
+        alike: int | None = None
+        for seed in range(self._seeds):
+            speed, picture = _first_look(self._scenario, seed, rig)
+            if speed == belief.ego.speed:
+                if picture == seen:
+                    return seed
+                # A camera with faults shows another picture: then the speed alone has to do.
+                alike = seed if alike is None else alike
+        return alike
 
     def _expected(self) -> Floats:
         """(n, 7) the box of the hidden actor in the sensor frame, none if it is not known."""
-        # All scenarios have a straight road, with the ego's lane along x.
-        sensor = Frame.mounted((self._x, 0.0, 0.0), LIDAR_POSITION)
-        return sensor.boxes_to_local(self._hidden[self._keyframe : self._keyframe + 1])
+        if self._twin is None or self._twin.first_sighting is None:
+            return np.empty((0, 7))
+        sensor = Frame.mounted(self._twin.ego.pose, LIDAR_POSITION)
+        return sensor.boxes_to_local(self._twin.boxes([self._twin.first_sighting]))
 
 
-@lru_cache(maxsize=4)
-def _first_speeds(scenario: str, seeds: int) -> dict[float, int]:
-    """The seed of every first speed, as an observation shows it: in float32."""
-    speeds = {}
-    for seed in range(seeds):
-        with closing(_world(scenario, seed)) as world:
-            speeds[float(np.float32(world.ego.speed))] = seed
-    return speeds
+@lru_cache(maxsize=10_000)
+def _first_look(scenario: Scenario, seed: int, rig: Rig) -> tuple[float, bytes]:
+    """Speed and picture with which the episode of a seed begins, as an observation holds them."""
+    loop = rehearsal(scenario, seed, rig)
+    with closing(loop.world):
+        return float(np.float32(loop.belief.ego.speed)), _picture(loop.belief)
 
 
-@lru_cache(maxsize=4)
-def _hidden_boxes(scenario: str, seed: int, keyframe_s: float) -> Floats:
-    """(k, 7) where the hidden actor is at every keyframe, in the world frame. It does not react to
-    the ego, so that an ego that never brakes shows it.
-    """
-    boxes: list[Floats] = []
-    with closing(_world(scenario, seed)) as world:
-        hidden = [world.first_sighting] if world.first_sighting else []
-        for _ in range(round(SCENARIOS[scenario].duration_s / keyframe_s)):
-            boxes.extend(world.boxes(hidden))
-            world.advance(0.0, keyframe_s)
-    return np.array(boxes).reshape(-1, 7)
-
-
-def _world(scenario: str, seed: int) -> World:
-    """The world of a seed, as the environment builds it."""
-    return make_scenario(scenario).build(np.random.default_rng(streams((seed,), 1)[0]))
+def _picture(belief: Belief) -> bytes:
+    """The camera's boxes, as an observation holds them: in float32."""
+    return belief.detections.rows().astype(np.float32).tobytes()

@@ -5,8 +5,10 @@ import pytest
 
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.policies.controls.history_learned_place import HistoryLearnedPlace
 from care_sim.policies.controls.history_place import HistoryPlace
 from care_sim.policies.controls.history_rows import HistoryRows
+from care_sim.policies.controls.learned_place import learned_cells
 from care_sim.policies.controls.rows import nearest_rows
 from care_sim.policies.learned.weights import Card, save_weights
 
@@ -35,6 +37,13 @@ def test_the_hull_of_the_track_comes_first_and_then_the_map(belief_of, car, tmp_
     ((pattern,),) = demand.layers
     assert pattern[:2].tolist() == [4 * GRID.columns + 7, 9 * GRID.columns + 300]
     assert len(set(pattern)) == len(pattern) == 819
+
+
+def test_the_hull_of_the_track_comes_first_and_then_the_learned_map(belief_of, car):
+    demand = HistoryLearnedPlace(Rig(), "cutin", 1).demand(belief_of([car(1, 20)]))
+    assert [cells.tolist() for cells in demand.exploitation] == [HULL]
+    ((pattern,),) = demand.layers
+    assert np.array_equal(pattern, learned_cells(Rig(), "cutin", 1))
 
 
 @pytest.mark.parametrize("make", [HistoryRows, HistoryPlace])

@@ -19,7 +19,17 @@ from care_sim.policies.controls.sweep import Sweep
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.policies.paper.history_uniform import uniform_pattern
 
-CONTROLS = ["rows", "fan", "stride", "sweep", "place", "history-rows", "history-place"]
+CONTROLS = [
+    "rows",
+    "fan",
+    "stride",
+    "sweep",
+    "place",
+    "history-rows",
+    "history-place",
+    "learned-place",
+    "history-learned-place",
+]
 PATTERNS = [Rows, Fan, Stride, Sweep, Place]
 GRID = AngularGrid()
 

@@ -1,0 +1,51 @@
+"""`care-sim validate`: whether a world tells a good allocator from a lucky pattern."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from care_sim.base.bounds import bounded
+from care_sim.base.checks import check_known
+from care_sim.commands.shared.episode_studies import EpisodeStudy
+from care_sim.commands.shared.options import seeds_of
+from care_sim.commands.shared.selection import check_values
+from care_sim.scenarios import SCENARIOS
+from care_sim.study.designs.validate import levels_of, validation_study
+from care_sim.study.parameters import parameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class Validate(EpisodeStudy):
+    """Say whether a world of the closed loop discriminates: whether a camera leads the best
+    control, a full scan leaves anything to win, and the reserves are told apart.
+    """
+
+    world: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="WORLD")]
+    """dartout, dense or cutin; `care-sim scenarios` lists them."""
+    seeds: tuple[int, ...] = (20,)
+    """The test seeds. One number: that many, from 0. Several numbers: these, below 2,000."""
+    training_seeds: int = bounded(10, 1, 1000)
+    """Number of training seeds, from 10,000 on: on them the best are chosen and places learned."""
+    budgets: tuple[float, ...] = (0.01, 0.03, 0.1)
+    """Shares of the cells that may fire at a keyframe, above 0 and at most 1."""
+    scenario_parameters: tuple[str, ...] = ()
+    """Physics of the world as NAME=VALUE, a range as NAME=LOW,HIGH; see `care-sim scenarios`."""
+    factors: tuple[str, ...] = ()
+    """Further worlds, each with one parameter changed, as NAME=VALUE: for example mirrored=drawn
+    ego_speed_mps=12.2,12.8."""
+    out: Path = Path("runs/validate")
+    """Folder of the results; an interrupted validation goes on there."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        check_known("scenario", self.world, SCENARIOS)
+        check_values(self, "seeds", "budgets")
+        levels = levels_of(
+            parameters(self.scenario_parameters), [parameters([text]) for text in self.factors]
+        )
+        configs = validation_study(
+            self.world, levels, self.budgets, seeds_of(self.seeds), self.training_seeds
+        )
+        return self.play_study("validate", configs, self.out)

@@ -1,0 +1,83 @@
+"""A control: where this very scenario hid its actor in other seeds, without camera, tracks or
+memory.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import replace
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from care_sim.base.checks import check_whole
+from care_sim.base.seed_ranges import training_seeds
+from care_sim.core.belief import Belief
+from care_sim.core.grid import Cells
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy
+from care_sim.policies.controls.place import likeliest_first
+from care_sim.policies.controls.rehearsal import known_scenario, rehearsal
+from care_sim.scenarios.base import Scenario
+
+
+class LearnedPlace(Policy):
+    """Fires the cells in which a full scan first detected the first-sighting actor in the first
+    `seeds` training seeds of the scenario: the pattern that is learned here, and no other.
+
+    `make_policy` tells it the `scenario` of the environment, with its parameters. Raises
+    InvalidInput for an unknown scenario.
+    """
+
+    name = "learned-place"
+    tags = ("causal", "learned", "control")
+    source = "own: a map of the scenario's training seeds that never changes"
+    told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
+    keeps_order = True
+
+    def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
+        super().__init__(rig)
+        self._pattern = learned_cells(rig, scenario, seeds)
+
+    def demand(self, belief: Belief) -> Demand:
+        """The same cells at every keyframe."""
+        return Demand(layers=[[self._pattern]])
+
+
+def learned_cells(rig: Rig, scenario: Scenario | str | None, seeds: int) -> Cells:
+    """(N,) all cells, those first in which most of the actors were found.
+
+    Raises InvalidInput for an unknown scenario, or `seeds` beyond 1 to 1,000.
+    """
+    check_whole("seeds", seeds, 1, 1000)
+    # All budgets share a map: it is learned with a full scan.
+    return _learned(replace(rig, budget=rig.grid.size), known_scenario(scenario), seeds)
+
+
+@lru_cache(maxsize=8)
+def _learned(rig: Rig, scenario: Scenario, seeds: int) -> Cells:
+    sightings = np.zeros(rig.grid.size)
+    for seed in training_seeds(seeds):
+        # A hull is dilated by the paper's margins, its guess of how far off a box can be.
+        for hull in _first_hulls(rig, scenario, seed):
+            sightings[hull] += 1
+    return likeliest_first(rig.grid, sightings)
+
+
+def _first_hulls(rig: Rig, scenario: Scenario, seed: int) -> Iterator[Cells]:
+    """The hull of every first-sighting actor at the keyframe at which a full scan detects it."""
+    everything = np.arange(rig.grid.size)
+    found: set[int] = set()
+    loop = rehearsal(scenario, seed, rig)
+    with closing(loop.world) as world:
+        while world.time < scenario.duration_s:
+            # Where the actor is at the scan: the keyframe moves the world on.
+            target = world.first_sighting
+            boxes = loop.sensor.boxes_to_local(world.boxes([target] if target else []))
+            record = loop.keyframe(everything)
+            if target and record.detected and target.body not in found:
+                found.add(target.body)
+                yield from rig.hulls(boxes)
+            if record.impact_speed_mps is not None:
+                return

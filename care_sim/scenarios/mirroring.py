@@ -1,0 +1,72 @@
+"""Either side of the street: a scenario's world as it was drawn, or reflected at the ego's lane."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.base.checks import check_known
+from care_sim.core.frames import Pose
+from care_sim.scenarios.base import Scenario
+from care_sim.world.traffic import RoadVehicle, Traffic
+from care_sim.world.world import Actor, Motion, World
+
+MIRRORED = ("never", "drawn", "always")
+
+
+@dataclass(frozen=True)
+class MirrorableScenario(Scenario):
+    """A scenario whose world may be reflected at the middle of the ego's lane, as in left-hand
+    traffic: what stood on the right stands on the left.
+
+    `mirrored="drawn"` reflects the worlds of half of the seeds. A world and its reflection share
+    every other draw of the seed.
+    """
+
+    mirrored: str = "never"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_known("mirrored", self.mirrored, MIRRORED)
+
+    def empty_world(self, traffic: Traffic, ego_speed: float, rng: np.random.Generator) -> World:
+        """The world to be filled, at time zero; `ego_speed` in m/s."""
+        return (MirroredWorld if self._reflects(rng) else World)(traffic, ego_speed)
+
+    def _reflects(self, rng: np.random.Generator) -> bool:
+        # A stream of its own: the draws that follow are those of the world that is not reflected.
+        return self.mirrored == "always" or (
+            self.mirrored == "drawn" and rng.spawn(1)[0].random() < 0.5
+        )
+
+
+class MirroredWorld(World):
+    """A world whose bodies stand and move reflected at the x axis, on which the ego drives.
+
+    Bodies keep their shapes: a person still has the right leg in front.
+    """
+
+    def add(
+        self,
+        name: str,
+        kind: str,
+        pose: Pose | Motion | RoadVehicle,
+        *,
+        reported: bool = True,
+        backdrop: bool = False,
+    ) -> Actor:
+        """Add a body where `World.add` would put its reflection."""
+        reflected = _reflected(pose)
+        return super().add(name, kind, reflected, reported=reported, backdrop=backdrop)
+
+
+def _reflected(pose: Pose | Motion | RoadVehicle) -> Pose | Motion:
+    if isinstance(pose, RoadVehicle):
+        return lambda _time: _on_the_other_side(pose.pose)
+    if callable(pose):
+        return lambda time: _on_the_other_side(pose(time))
+    return _on_the_other_side(pose)
+
+
+def _on_the_other_side(pose: Pose) -> Pose:
+    x, y, heading = pose
+    return x, -y, -heading

@@ -1,0 +1,87 @@
+"""The validation of a world: everything that tells whether it discriminates between policies, for
+the world as it is and with one factor changed at a time.
+
+What is chosen is chosen on training seeds, and what is said is said of test seeds.
+"""
+
+from collections.abc import Sequence
+
+from care_sim.base.seed_ranges import (
+    TRAINING,
+    VALIDATION,
+    check_benchmark_seeds,
+    training_seeds,
+)
+from care_sim.study.episode_config import EpisodeConfig, grid
+from care_sim.study.parameters import Parameters
+from care_sim.study.run_config import FULL, Row
+
+CAMERA_POLICIES = ("all-camera", "care", "care-sightlines")
+"""The causal policies with a camera; the best of them has to beat the best control."""
+CONTROLS = (
+    "fan",
+    "rows",
+    "stride",
+    "sweep",
+    "place",
+    "history-rows",
+    "history-place",
+    "learned-place",
+    "history-learned-place",
+)
+"""Patterns that no camera moves. The last two are learned on the world's own training seeds."""
+MEMORISER = "seed-finder"
+"""It looks the test seed up: what memory of the seeds can reach. Its figure is published, and it is
+nothing to beat.
+"""
+_BLIND = ("history", "random")
+
+
+def validation_study(
+    scenario: str,
+    levels: Sequence[Parameters],
+    budgets: Sequence[float],
+    test: Sequence[int],
+    trained: int,
+) -> list[EpisodeConfig]:
+    """Every level of a world: camera policies and controls on the first `trained` training seeds,
+    and all policies on the `test` seeds.
+
+    Raises InvalidInput for a test seed that is no seed of the benchmark.
+    """
+    check_benchmark_seeds(test)
+    # The memoriser may look up every seed of the benchmark, and asks for what it knows first.
+    known = (
+        ("learned-place.seeds", trained),
+        ("history-learned-place.seeds", trained),
+        (f"{MEMORISER}.seeds", VALIDATION),
+        (f"{MEMORISER}.hidden_first", True),
+    )
+    chosen = (*CAMERA_POLICIES, *CONTROLS)
+    return [
+        config
+        for level in levels
+        for policies, seeds in (
+            (chosen, training_seeds(trained)),
+            ((FULL, MEMORISER, *_BLIND, *chosen), test),
+        )
+        for config in grid(
+            [scenario],
+            policies,
+            budgets,
+            seeds,
+            scenario_parameters=level,
+            policy_parameters=known,
+        )
+    ]
+
+
+def levels_of(base: Parameters, factors: Sequence[Parameters]) -> list[Parameters]:
+    """The parameters of every world: the base, then the base with each of `factors` changed."""
+    changed = (tuple((dict(base) | dict(factor)).items()) for factor in factors)
+    return list(dict.fromkeys([base, *changed]))
+
+
+def is_training(row: Row) -> bool:
+    """Whether an episode is of a training seed."""
+    return int(row["seed"]) >= TRAINING

@@ -1,0 +1,35 @@
+"""`care-sim validate`, from its arguments to a folder of results."""
+
+import pytest
+
+from care_sim.cli import main
+from care_sim.study.rows.parquet import read_rows
+
+SHORT = (
+    "validate dartout --seeds 1 --training-seeds 1 --budgets 0.1 --workers 1 "
+    "--scenario-parameters duration_s=0.1 occluder=truck --factors occluder_reported=True"
+)
+
+
+def run(capsys, command, out):
+    with pytest.raises(SystemExit) as end:
+        main([*command.split(), *map(str, out)])
+    return end.value.code, capsys.readouterr().out
+
+
+def test_it_plays_every_world_and_its_report_is_made_again_of_the_rows(capsys, tmp_path):
+    code, out = run(capsys, SHORT, ["--out", tmp_path])
+    assert code == 0
+    rows = read_rows(tmp_path / "episodes.parquet")
+    # Twelve policies are chosen from; four more, and the full scan at its budget, are tested.
+    assert len(rows) == 2 * (12 + 12 + 4)
+    assert {row["scenario.occluder_reported"] for row in rows} == {None, True}
+    assert {row["seed"] for row in rows} == {0, 10_000}
+    assert "dartout, duration s 0.1, occluder truck, occluder reported True: does not" in out
+    assert (tmp_path / "validation.png").is_file()
+    assert run(capsys, "report", [tmp_path])[1] == out.replace(f"Results are in {tmp_path}\n", "")
+
+
+def test_a_folder_that_another_study_holds_is_refused(capsys, tmp_path):
+    (tmp_path / "plays.parquet").touch()
+    assert run(capsys, SHORT, ["--out", tmp_path])[0] == 2
