@@ -130,7 +130,8 @@ def test_an_episode_at_the_bounds_of_any_range_stays_in_its_space(name, extreme)
         env = gymnasium.make(
             f"care_sim:CARE-{name}-v0".replace("dartout", "Dartout")
             .replace("dense", "Dense")
-            .replace("cutin", "CutIn"),
+            .replace("cutin", "CutIn")
+            .replace("ncap", "NCAP"),
             disable_env_checker=True,
             duration_s=0.2,
             **{field.name: (end, end)},
