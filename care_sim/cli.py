@@ -28,7 +28,9 @@ _LONGEST = 2000
 _NARROWEST = 20
 """Columns of a terminal for which help is laid out, at the least."""
 
-_STUDIES = ("reproduce", "sweep", "ablate", "order", "faults", "crowding", "protocol", "mechanism")
+_STUDIES = (
+    "reproduce", "sweep", "ncap", "ablate", "order", "faults", "crowding", "protocol", "mechanism",
+)  # fmt: skip
 _AGENTS = ("train ppo", "train sac", "train recurrent-ppo")
 _KEPT = {
     **dict.fromkeys(_STUDIES, "; what is finished is kept, the same command goes on from there"),

@@ -79,3 +79,15 @@ MECHANISM_CAPTION = (
     "for a miss are explained in care_sim.evaluation.miss_reasons: every miss has one, and they "
     "add up to the misses."
 )
+NCAP_CAPTION = (
+    "Avoided: no contact; mitigated: an impact slower than that of a car that does not brake; hit: "
+    "at its speed. Score: 5 without a contact, else 4 max(0, 1 - v_impact / v_reference), where "
+    "v_reference is the speed at which a car hits that does not brake (Ljungbergh et al. 2024, "
+    "NeuroNCAP); on a target that goes ahead at an even speed both are speeds of closing. A target "
+    "that was never detected counts by what came of it. In all: the mean of the tests' scores, "
+    "each the mean over its speeds and seeds. Reported, unreported: whether perception reports the "
+    "cars that hide the target; the same seeds play both. Differences are paired by seed (common "
+    "random numbers), with 95% percentile bootstrap intervals of 10,000 resamples; positive "
+    "favours the policy named. Bold: the interval excludes zero, on five or more seeds. No "
+    "correction is made for the number of differences."
+)
