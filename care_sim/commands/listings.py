@@ -9,6 +9,10 @@ from care_sim.perception.detectors import detector_lines
 from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import SCENARIOS
 from care_sim.scenarios.crossing import OCCLUDERS
+from care_sim.scenarios.ncap.table import TESTS
+
+_NAMES = {"occluder": OCCLUDERS, "test": TESTS}
+"""Parameters that are names, and what they may be."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,8 @@ class Scenarios:
 
 def _choices(field: Field[Any]) -> str:
     """The values that a parameter may have, in brackets; empty where nothing bounds them."""
-    if field.name == "occluder":
-        return f" (of {', '.join(OCCLUDERS)})"
+    if field.name in _NAMES:
+        return f" (of {', '.join(_NAMES[field.name])})"
     return f" ({allowed(field)})" if allowed(field) else ""
 
 

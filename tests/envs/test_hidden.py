@@ -97,7 +97,9 @@ def same(one, other):
     return all(np.array_equal(one[key], other[key]) for key in one)
 
 
-@pytest.mark.parametrize("name", ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0"])
+@pytest.mark.parametrize(
+    "name", ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-NCAP-v0"]
+)
 def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, name):
     public, secret, again, other = (
         begins(make(name, budget=1.0, secret=text), 0)

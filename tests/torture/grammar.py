@@ -158,6 +158,7 @@ LONG = (
     "certify",
     "train",
     "sweep",
+    "ncap",
     "report",
     "export",
 )
