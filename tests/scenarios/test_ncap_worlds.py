@@ -247,7 +247,8 @@ def test_a_bend_turns_by_what_it_says(radius, clothoid, right):
         ({"test": "CPNC"}, "test of ncap 'CPNC'"),
         ({"test": "CPTAfs-50"}, "speed_kph of CPTAfs-50 must be one of 10, 15, 20"),
         ({"test": "CCFtap", "speed_kph": 30.0}, "speed_kph of CCFtap must be one of 10, 15, 20"),
-        ({"speed_kph": 0.0}, r"speed_kph of ncap must lie in \[1, 200\]"),
+        ({"speed_kph": 0.0}, r"speed_kph of ncap must lie in \[1, 140\]"),
+        ({"target_kph": 0.5}, "target_kph of ncap must be 0 or at least 1, got 0.5"),
         ({"test": 5}, "test of ncap must be a name"),
     ],
 )

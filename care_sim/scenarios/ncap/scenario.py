@@ -62,14 +62,14 @@ class Ncap(Scenario):
     duration_s: float = bounded(20.0, 0.05, LONGEST_EPISODE_S)
     test: str = "CPNCO-50"
     """One of `care_sim.scenarios.ncap.table.TESTS`."""
-    speed_kph: float = bounded(40.0, 1, 200)
+    speed_kph: float = bounded(40.0, 1, 140)
     """The ego's, km/h. Tests in which it turns have a line for each of the protocol's speeds and
     take no other."""
-    target_kph: float = bounded(0.0, 0, 200)
+    target_kph: float = bounded(0.0, 0, 140)
     """The target's, km/h. 0 stands for the protocol's at the ego's speed: the first where it has
     several."""
     occluder_reported: bool = True
-    excess_kph: Range = bounded((0.0, 1.0), -1, 1)
+    excess_kph: Range = bounded((0.0, 1.0), 0, 4)
     """By how much the ego is faster than the test's speed: the protocol's tolerance."""
     phase_s: Range = bounded((0.0, 0.1), 0, 2)
     """How much earlier the episode begins: anywhere within a keyframe."""
@@ -82,6 +82,10 @@ class Ncap(Scenario):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_known("test of ncap", self.test, TESTS)
+        if 0 < self.target_kph < 1:
+            raise InvalidInput(
+                f"target_kph of ncap must be 0 or at least 1, got {self.target_kph:g}"
+            )
         way = TESTS[self.test].way
         if isinstance(way, AcrossExit | Oncoming) and self.speed_kph not in way.bends:
             raise InvalidInput(
@@ -106,18 +110,24 @@ class Ncap(Scenario):
         meeting = _meeting(test, self._variation(), Ego(speed, length, width, start_s))
         traffic = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, speed, _mirrored_route(meeting.route, side))
-        target_width = CATALOGUE[test.target.body].size[1]
-        far = isinstance(test.way, Across) and test.way.far
-        for number, car in enumerate(
-            standing_cars(test.obstruction, sizes, meeting.line_x, target_width, width)
-        ):
-            pose = _mirrored(car.pose, -side if far else side)
-            world.add(f"obstruction {number}", car.kind, pose, reported=self.occluder_reported)
+        self._add_cars(world, meeting, sizes, side)
         world.first_sighting = world.add(
             "target", test.target.body, lambda time: _mirrored(meeting.motion(time), side)
         )
         world.is_over = partial(meeting.end.is_over, world)
         return world
+
+    def _add_cars(self, world: World, meeting: Meeting, sizes: Sizes, side: float) -> None:
+        """Add the cars that hide the target, if there are any."""
+        test = TESTS[self.test]
+        target_width = CATALOGUE[test.target.body].size[1]
+        ego_width = world.ego_kind.size[1]
+        # They are reckoned for a target from the right, and stand on the side that it comes from.
+        far = isinstance(test.way, Across) and test.way.far
+        cars = standing_cars(test.obstruction, sizes, meeting.line_x, target_width, ego_width)
+        for number, car in enumerate(cars):
+            pose = _mirrored(car.pose, -side if far else side)
+            world.add(f"obstruction {number}", car.kind, pose, reported=self.occluder_reported)
 
     def _variation(self) -> Variation:
         """The speeds of this episode, and the line of a turn."""
