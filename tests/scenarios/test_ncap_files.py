@@ -154,6 +154,10 @@ def test_pedestrians_cross_the_exit_as_in_the_files(files, name):
         assert way.right == (case["Ego_turningDirection"] == -1)
         assert way.along == (case["VRU_trajectoryDirection"] == -1)
         assert TESTS[name].start_s == case["Ego_initTTC"]
+        # The middle of the dummy, from the middle of the road; the lane is half its width aside.
+        lane = case["Ego_turningDirection"] * case["Road_laneWidth"] / 2
+        starts = abs(case["_Trajectory_tStart"] - lane)
+        assert starts == pytest.approx(way.distance_m - TESTS[name].target.point_m)
 
 
 @pytest.mark.parametrize("name", [name for name in TESTS if TESTS[name].start_s == 4.0])

@@ -124,6 +124,22 @@ def test_a_pedestrian_is_at_full_speed_after_the_run_up():
     assert paces[gone > 1.6] == pytest.approx(8.0 / 3.6, abs=1e-6)
 
 
+@pytest.mark.parametrize("name", [name for name in TESTS if name.startswith("CPTA")])
+def test_the_pedestrian_starts_beside_the_lane_that_the_ego_turns_into(name):
+    way = TESTS[name].way
+    for speeds in ends_of(name):
+        world = built(name, speeds, seed=RIGHT_HAND)
+        exit_x, _, exit_heading = world.route.pose(world.route.length)
+        x, y, heading = world.first_sighting.pose_at(-10.0)
+        world.close()
+        assert exit_heading == pytest.approx(-np.pi / 2 if way.right else np.pi / 2, abs=1e-3)
+        assert np.cos(heading) == pytest.approx(1.0 if way.along else -1.0)
+        hip = x - np.cos(heading) * TESTS[name].target.point_m
+        assert (exit_x - hip) * np.cos(heading) == pytest.approx(way.distance_m)
+        # The road that the ego comes from has its middle half a lane to the left.
+        assert y == pytest.approx(1.75 - 9.5 if way.right else 1.75 + 9.5)
+
+
 @every_test
 def test_half_of_the_seeds_are_mirrored_and_nothing_else_is(name):
     speeds = ends_of(name)[0]

@@ -80,9 +80,9 @@ class AcrossExit:
     """The ego turns, to the left or the `right`. The target crosses the road that it turns into,
     `offset_m` from the middle line of the road that it comes from.
 
-    The target starts `distance_m` from the middle of the ego's new lane, walks against the ego's
-    first direction or `along` it, gains its speed over `run_up_m`, and is met by the middle of the
-    ego's front. The ego has a bend for each of its speeds in km/h.
+    The target's point starts `distance_m` from the middle of the ego's new lane. The target walks
+    against the ego's first direction or `along` it, gains its speed over `run_up_m`, and is met by
+    the middle of the ego's front. The ego has a bend for each of its speeds in km/h.
     """
 
     offset_m: float

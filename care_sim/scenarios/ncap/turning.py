@@ -47,13 +47,13 @@ def across_exit(way: AcrossExit, target: Target, speed: float, bend: Bend, ego: 
     side = -1.0 if way.right else 1.0
     line_y = LANE_WIDTH_M / 2 + side * way.offset_m
     hit_y = line_y - side * width / 2
-    route = _timed(bend, way.right, ego, lambda on: _front(on, ego)[1] * side - hit_y * side)
+    route = _timed(bend, way.right, ego, lambda on, m: side * (_front(on, m, ego)[1] - hit_y))
     hit_m = ego.speed * ego.hit_s
-    hit_x = _front((route, hit_m), ego)[0]
+    hit_x = _front(route, hit_m, ego)[0]
 
     exit_x = route.pose(route.length)[0]
     sign = 1.0 if way.along else -1.0
-    start_x = exit_x - sign * way.distance_m
+    start_x = exit_x - sign * (way.distance_m - target.point_m)
     heading = 0.0 if way.along else float(np.pi)
     walk = run_up((start_x, line_y), heading, speed, way.run_up_m)
     gone = sign * (hit_x - start_x) + target.point_m
@@ -71,39 +71,39 @@ def oncoming(target: Target, speed: float, bend: Bend, ego: Ego) -> Meeting:
     # seen at 45 degrees.
     short_m = ego.length / 2 + width / np.sqrt(2)
     lane_y = LANE_WIDTH_M
-    route = _timed(bend, False, ego, lambda on: on[0].pose(on[1] + short_m)[1] - lane_y)
+    route = _timed(bend, False, ego, lambda on, m: on.pose(m + short_m)[1] - lane_y)
     hit_m = ego.speed * ego.hit_s
     crossing_x = route.pose(hit_m + short_m)[0]
     motion = StraightWay((crossing_x + length / 2, lane_y), float(np.pi), speed, ego.hit_s)
     # Either is off the other's way when it has gone on by both lengths and the ego's width.
     further = length + ego.length + ego.width
     reach = (width + ego.width) / 2
-    enter_m = _where(route, lambda on: _front(on, ego)[1] - (lane_y - reach))
-    leave_m = _where(route, lambda on: on[0].pose(on[1])[1] - (lane_y + reach)) + ego.length
+    enter_m = _where(route, lambda on, m: _front(on, m, ego)[1] - (lane_y - reach))
+    leave_m = _where(route, lambda on, m: on.pose(m)[1] - (lane_y + reach)) + ego.length
     return Meeting(
         motion.pose, Crossing(enter_m, leave_m, ego.hit_s + further / speed), route=route
     )
 
 
-_OnRoute = tuple[Route, float]
-"""A route and metres along it."""
+_Distance = Callable[[Route, float], float]
+"""A distance that grows with the metres along a route."""
 
 
-def _timed(bend: Bend, right: bool, ego: Ego, short_of: Callable[[_OnRoute], float]) -> Route:
-    """The route on which `short_of` is 0 when an ego that does not brake is due to hit."""
+def _timed(bend: Bend, right: bool, ego: Ego, beyond: _Distance) -> Route:
+    """The route on which `beyond` is 0 when an ego that does not brake is due to hit."""
     # Tried with a straight of any length; the real one is as much shorter or longer.
     before_m = ego.length
     tried = bend_route(bend, right, before_m)
-    return bend_route(bend, right, before_m + ego.speed * ego.hit_s - _where(tried, short_of))
+    return bend_route(bend, right, before_m + ego.speed * ego.hit_s - _where(tried, beyond))
 
 
-def _where(route: Route, short_of: Callable[[_OnRoute], float]) -> float:
-    """Where along a route a distance that grows comes to 0."""
-    return float(brentq(lambda along: short_of((route, along)), 0.0, route.length + _BEYOND_M))
+def _where(route: Route, beyond: _Distance) -> float:
+    """Where along a route a distance comes to 0."""
+    return float(brentq(lambda along: beyond(route, along), 0.0, route.length + _BEYOND_M))
 
 
-def _front(on: _OnRoute, ego: Ego) -> tuple[float, float]:
-    """The middle of the front of an ego whose centre is there."""
-    x, y, heading = on[0].pose(on[1])
+def _front(route: Route, along: float, ego: Ego) -> tuple[float, float]:
+    """The middle of the front of an ego whose centre is `along` metres down a route."""
+    x, y, heading = route.pose(along)
     reach = ego.length / 2
     return x + reach * float(np.cos(heading)), y + reach * float(np.sin(heading))
