@@ -1,8 +1,8 @@
 """CARE-Sim: a closed-loop benchmark for adaptive LiDAR sensing.
 
 Importing the package registers the environments of the closed loop, `CARE-Dartout-v0`,
-`CARE-Dense-v0`, `CARE-CutIn-v0` and `CARE-R157-v0`, and of the open loop, `CARE-Street-v0` and
-`CARE-Replay-v0`.
+`CARE-Dense-v0`, `CARE-CutIn-v0`, `CARE-NCAP-v0` and `CARE-R157-v0`, and of the open loop,
+`CARE-Street-v0` and `CARE-Replay-v0`.
 """
 
 # First of all: an interrupt may come while the rest is imported.

@@ -35,6 +35,7 @@ _STUDIES = (
     "order",
     "faults",
     "crowding",
+    "ncap",
     "r157",
     "validate",
     "protocol",

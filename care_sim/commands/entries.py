@@ -48,6 +48,11 @@ COMMANDS = {
         "Sweep",
         "Play every combination of scenarios, policies, budgets, faults and seeds.",
     ),
+    "ncap": CommandEntry(
+        "ncap",
+        "Ncap",
+        "Play the Euro NCAP tests of emergency braking: avoided, mitigated or hit, and a score.",
+    ),
     "ablate": CommandEntry(
         "ablate",
         "Ablate",

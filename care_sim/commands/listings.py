@@ -10,6 +10,7 @@ from care_sim.policies.listing import policy_paragraphs
 from care_sim.scenarios import SCENARIOS
 from care_sim.scenarios.crossing import OCCLUDERS
 from care_sim.scenarios.mirroring import MIRRORED
+from care_sim.scenarios.ncap.table import TESTS
 from care_sim.scenarios.r157.grid import KINDS, SIDES
 
 
@@ -33,7 +34,7 @@ class Detectors:
         return 0
 
 
-_NAMED = {"occluder": OCCLUDERS, "mirrored": MIRRORED, "kind": KINDS, "side": SIDES}
+_NAMED = {"occluder": OCCLUDERS, "mirrored": MIRRORED, "kind": KINDS, "side": SIDES, "test": TESTS}
 """The choices of the parameters of scenarios that are names."""
 
 

@@ -7,6 +7,7 @@ CLOSED_LOOP = {
     "CARE-Dense-v0": "care_sim.envs.scenarios:DenseEnv",
     "CARE-CutIn-v0": "care_sim.envs.scenarios:CutInEnv",
     "CARE-R157-v0": "care_sim.envs.scenarios:R157Env",
+    "CARE-NCAP-v0": "care_sim.envs.scenarios:NcapEnv",
 }
 OPEN_LOOP = {
     "CARE-Street-v0": "care_sim.envs.scenes:StreetEnv",

@@ -63,7 +63,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     no observation shows. A learner may learn from it; no policy may read it while it plays.
 
     ### Episode end
-    Terminated at a collision, truncated after the scenario's duration (6 s, 60 keyframes).
+    Terminated at a collision, and where the scenario knows that nothing can happen any more;
+    truncated after the scenario's duration (6 s, 60 keyframes, unless it states another).
 
     ### Info
     What is for scoring alone must never become a policy's input: it tells of the world what no
@@ -231,7 +232,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         detectable = self._detectable()
         record = loop.keyframe(fired)
         self.keyframes.append(record)
-        terminated = record.impact_speed_mps is not None
+        terminated = record.impact_speed_mps is not None or loop.world.is_over()
         truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
         terms = self._terms(record, detectable)

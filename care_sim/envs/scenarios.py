@@ -47,3 +47,18 @@ class R157Env(ClosedLoopEnv):
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "r157"
+
+
+class NcapEnv(ClosedLoopEnv):
+    """`CARE-NCAP-v0`: a test of Euro NCAP's protocols of emergency braking.
+
+    `test`, `speed_kph` and `target_kph` say which: a child who steps out from behind two parked
+    cars (`CPNCO-50`, the default), pedestrians, bicyclists and cars that cross, go ahead, brake or
+    come towards the ego, which turns in some. An ego that does not brake hits the target. The seed
+    draws what the protocol leaves open, and the side. The test is over, and the episode terminated,
+    when the ego stands before the target's way, the ways have parted, or the ego is no faster than
+    the target ahead.
+    """
+
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
+    scenario_name = "ncap"

@@ -10,6 +10,7 @@ from care_sim.base.errors import unknown
 from care_sim.reports.captions import (
     EPISODES_CAPTION,
     MECHANISM_CAPTION,
+    NCAP_CAPTION,
     PROTOCOL_CAPTION,
     R157_CAPTION,
     VALIDATION_CAPTION,
@@ -18,6 +19,7 @@ from care_sim.reports.captions import (
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
+from care_sim.reports.figures.ncap import NCAP_FIGURE, ncap_figures
 from care_sim.reports.figures.order import (
     OPEN_ORDER_FIGURE,
     ORDER_FIGURE,
@@ -36,17 +38,24 @@ from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
+from care_sim.reports.tables.ncap import ncap_tables
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.reports.tables.paper_statements import statements
 from care_sim.reports.tables.r157 import r157_tables
 from care_sim.reports.tables.sweep import sweep_tables
 from care_sim.reports.tables.validate import validation_closing, validation_tables
 from care_sim.study.designs.crowding import VEHICLES_COLUMN
+from care_sim.study.designs.ncap import (
+    REPORTED_COLUMN,
+    SPEED_COLUMN,
+    TARGET_COLUMN,
+    TEST_COLUMN,
+)
 from care_sim.study.designs.paper import NO_COLLISION
 from care_sim.study.designs.r157 import CASE_COLUMNS
 from care_sim.study.results_formats import EPISODES, MECHANISM, PLAYS, ResultsFormat
 from care_sim.study.rows.parquet import read_notes
-from care_sim.study.rows.schema import COUNT, SUM, TEXT, Column, Schema
+from care_sim.study.rows.schema import COUNT, FLAG, SUM, TEXT, Column, Schema, as_optional
 from care_sim.study.run_config import Row
 
 
@@ -103,6 +112,12 @@ def _order_closing(rows: Sequence[Row]) -> list[str]:
 
 _ORDER_COLUMNS = {"cell_order": TEXT}
 _CASE_COLUMNS = {name: TEXT if name.endswith(("kind", "side")) else SUM for name in CASE_COLUMNS}
+_NCAP_COLUMNS = {
+    TEST_COLUMN: TEXT,
+    SPEED_COLUMN: SUM,
+    TARGET_COLUMN: SUM,
+    REPORTED_COLUMN: as_optional(FLAG),
+}
 
 
 _ALL = (
@@ -156,6 +171,16 @@ _ALL = (
         fault_figures,
         _sweep_closing,
         FAULT_FIGURES,
+    ),
+    Study(
+        "ncap",
+        "Euro NCAP tests",
+        ncap_tables,
+        ncap_figures,
+        _sweep_closing,
+        (NCAP_FIGURE,),
+        NCAP_CAPTION,
+        columns=_NCAP_COLUMNS,
     ),
     Study(
         "order",

@@ -7,6 +7,7 @@ from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout
 from care_sim.scenarios.dense import Dense
+from care_sim.scenarios.ncap import Ncap
 from care_sim.scenarios.r157.scenario import R157
 
 SCENARIOS: dict[str, type[Scenario]] = {
@@ -14,6 +15,7 @@ SCENARIOS: dict[str, type[Scenario]] = {
     "dense": Dense,
     "cutin": CutIn,
     "r157": R157,
+    "ncap": Ncap,
 }
 
 

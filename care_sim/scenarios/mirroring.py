@@ -7,6 +7,7 @@ import numpy as np
 from care_sim.base.checks import check_known
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import Scenario
+from care_sim.world.bodies import BodyKind
 from care_sim.world.traffic import RoadVehicle, Traffic
 from care_sim.world.world import Actor, Motion, World
 
@@ -48,7 +49,7 @@ class MirroredWorld(World):
     def add(
         self,
         name: str,
-        kind: str,
+        kind: str | BodyKind,
         pose: Pose | Motion | RoadVehicle,
         *,
         reported: bool = True,

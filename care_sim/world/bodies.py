@@ -139,6 +139,13 @@ CATALOGUE = {
         # a bicycle, the one class of two-wheelers; the recordings leave motorcycles out.
         _motorcycle("motorcycle", (2.11, 0.77, 1.47)),
         _person("pedestrian", (0.73, 0.66, 1.76), (0.85, 0.15, 0.2)),
+        # The targets of Euro NCAP's tests: adult, seven-year-old child and car as in the public
+        # OpenSCENARIO files of the protocols (vectorgrp/OSC-NCAP-scenarios), the bicycle as there
+        # with a rider up to 1.86 m (ACEA, bicyclist target).
+        _person("adult", (0.60, 0.50, 1.80), (0.2, 0.25, 0.5)),
+        _person("child", (0.711, 0.298, 1.154), (0.9, 0.5, 0.1)),
+        _cyclist("bicyclist", (1.89, 0.50, 1.86)),
+        _two_box("target car", "car", (4.023, 1.712, 1.427), 0.85, (0.1, 0.72), (0.6, 0.6, 0.65)),
         # Bodies that the five reported classes do not hold. A box trailer on its legs, side skirts
         # down: length and height of nuScenes, the width that European roads allow (Directive
         # 96/53/EC: 2.55 m).

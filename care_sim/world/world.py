@@ -73,6 +73,8 @@ class World:
     """The actor whom the episode is about; its scenario sets it."""
     route: Route | None
     """The way that the ego is to go, as its navigation knows it; None is straight ahead."""
+    is_over: Callable[[], bool]
+    """Whether nothing can happen any more that the episode is about; its scenario may set it."""
 
     def __init__(self, traffic: Traffic, ego_speed: float, route: Route | None = None):
         self.bullet = BulletWorld()
@@ -90,6 +92,7 @@ class World:
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
         self.first_sighting = None
+        self.is_over = lambda: False
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._ego_motion = Ego(ego_speed)
@@ -98,7 +101,7 @@ class World:
     def add(
         self,
         name: str,
-        kind: str,
+        kind: str | BodyKind,
         pose: Pose | Motion | RoadVehicle,
         *,
         reported: bool = True,
@@ -106,17 +109,19 @@ class World:
     ) -> Actor:
         """Add a body that stands at a pose, follows a function of time, or drives in the traffic.
 
-        `reported=False` keeps perception silent about it, whatever its kind. A `backdrop` stands
-        behind all that perception reports, so that the camera need not render it. Raises
-        InvalidInput for an unknown kind.
+        Its kind is one of the catalogue, by name, or any other. `reported=False` keeps perception
+        silent about it, whatever its kind. A `backdrop` stands behind all that perception reports,
+        so that the camera need not render it. Raises InvalidInput for an unknown name.
         """
         # Only what may move is asked for its pose at every step.
         pose_at = _motion(pose)
         place = pose_at(self.time)
-        check_known("kind of body", kind, CATALOGUE)
-        body = self.bullet.add(CATALOGUE[kind], place, backdrop=backdrop)
-        self._footprints.add(body, CATALOGUE[kind].size, place)
-        actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
+        if isinstance(kind, str):
+            check_known("kind of body", kind, CATALOGUE)
+            kind = CATALOGUE[kind]
+        body = self.bullet.add(kind, place, backdrop=backdrop)
+        self._footprints.add(body, kind.size, place)
+        actor = Actor(name, kind, body, pose_at, reported)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)

@@ -98,7 +98,8 @@ def same(one, other):
 
 
 @pytest.mark.parametrize(
-    "name", ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-R157-v0"]
+    "name",
+    ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-NCAP-v0", "CARE-R157-v0"],
 )
 def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, name):
     public, secret, again, other = (

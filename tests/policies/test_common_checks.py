@@ -19,6 +19,7 @@ BEFORE = {
     "CARE-Dartout-v0": 24,
     "CARE-Dense-v0": 24,
     "CARE-CutIn-v0": 24,
+    "CARE-NCAP-v0": 20,
     "CARE-Street-v0": 2,
     "CARE-Replay-v0": 2,
 }

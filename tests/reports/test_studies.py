@@ -10,7 +10,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import StudyReport, print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
-from care_sim.study.designs import ablations, crowding, faults, order, paper, validate
+from care_sim.study.designs import ablations, crowding, faults, ncap, order, paper, validate
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
@@ -36,8 +36,8 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
     with pytest.raises(
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
-        "known: ablate, ablate-open-loop, crowding, faults, mechanism, order, order-open-loop, "
-        "paper, protocol, r157, sweep, validate",
+        "known: ablate, ablate-open-loop, crowding, faults, mechanism, ncap, order, "
+        "order-open-loop, paper, protocol, r157, sweep, validate",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -50,6 +50,9 @@ EPISODES = {
     "faults": STUDY,
     "r157": [each for each in CUT_INS if not each["collision"]],
     "validate": made_worlds.world(made_worlds.SATURATED, {"care": (15.0, 0), "fan": (14.0, 0)}),
+    "ncap": [
+        row(config, 9.0) for config in ncap.ncap_study([0, 1], ["care", "full"], ["CPNCO-50"])
+    ],
     "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
 }
 
@@ -90,6 +93,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         "faults": faults.fault_study(range(2)),
         "order": order.order_study(range(2)),
         "crowding": crowding.crowding_study(range(2)),
+        "ncap": ncap.ncap_study(range(2), ["care", "fan", "full"], ["CPNA-25", "CCRs"]),
         "paper": paper.paper_study(range(2)),
         "validate": validate.validation_study("cutin", [(("mirrored", "drawn"),)], [0.1], [0], 1),
     }

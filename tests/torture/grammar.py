@@ -160,6 +160,7 @@ LONG = (
     "certify",
     "train",
     "sweep",
+    "ncap",
     "report",
     "export",
 )

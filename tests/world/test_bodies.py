@@ -46,7 +46,7 @@ def test_no_part_floats_apart_from_the_rest(kind):
         ]
         left = [b for b in left if not any(b is n for n in near)]
         joined += near
-    assert kind.name == "bicycle" or not left
+    assert kind.label == "bicycle" or not left
 
 
 @kinds

@@ -1,0 +1,185 @@
+"""The rows of a study of the Euro NCAP tests: how each ended, and scores of tests and in all."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from care_sim.base.checks import check_known
+from care_sim.evaluation.censoring import Reading, difference
+from care_sim.evaluation.ncap_score import Ending, ending, score
+from care_sim.reports.contrasts import Contrast, Measure
+from care_sim.reports.controls import best_control, is_control
+from care_sim.reports.formatting import marked, tag_notes
+from care_sim.scenarios.ncap.forms import Ahead
+from care_sim.scenarios.ncap.table import TESTS
+from care_sim.study.designs.ncap import (
+    REPORTED_COLUMN,
+    SPEED_COLUMN,
+    TARGET_COLUMN,
+    TEST_COLUMN,
+)
+from care_sim.study.rows.reading import policy_of, tags_of_row
+from care_sim.study.run_config import FULL, Row
+
+READINGS = {True: "reported", False: "unreported"}
+"""Whether perception reports the cars that hide the target, in words."""
+_SCORE = Measure("Score", "points", 2, math.inf, lambda row: Reading(score(*impact_of(row))))
+
+
+@dataclass(frozen=True)
+class Line:
+    """A test in one reading; `reported` is None where no cars hide the target."""
+
+    test: str
+    reported: bool | None
+
+    @property
+    def label(self) -> str:
+        """A name for people."""
+        return self.test if self.reported is None else f"{self.test} {READINGS[self.reported]}"
+
+    def holds(self, reading: bool) -> bool:
+        """Whether it counts where the cars are reported, or are not."""
+        return self.reported is None or self.reported == reading
+
+
+Case = tuple[Line, float, float]
+"""Line, speed of the ego and of the target in km/h."""
+Scores = Mapping[tuple[int, Case], float]
+"""By seed and case."""
+Contender = tuple[str, float]
+"""Policy and budget."""
+
+
+def impact_of(row: Row) -> tuple[float | None, float]:
+    """The speed of a row's impact (None without one), and that of a car that does not brake, m/s.
+
+    On a target that goes ahead at an even speed it is the speed of closing, else the ego's own.
+    """
+    check_known("test", row[TEST_COLUMN], TESTS)
+    ahead = isinstance(TESTS[row[TEST_COLUMN]].way, Ahead)
+    lead = row[TARGET_COLUMN] / 3.6 if ahead else 0.0
+    reference = row[SPEED_COLUMN] / 3.6 - lead
+    impact = row["impact_speed_mps"]
+    return (None if impact is None else impact - lead), reference
+
+
+class NcapRows:
+    """The rows of a study, by policy and budget."""
+
+    def __init__(self, rows: Sequence[Row]):
+        self.rows = rows
+        self.tags = {policy_of(row): tags_of_row(row) for row in rows}
+        self.budgets = sorted({row["budget"] for row in rows if row["policy"] != FULL})
+        lines = {_line(row) for row in rows}
+        order = {name: number for number, name in enumerate(TESTS)}
+        self.lines = sorted(lines, key=lambda line: (order[line.test], line.reported is False))
+
+    @property
+    def policies(self) -> list[str]:
+        """Their names, the full scan first."""
+        return sorted(self.tags, key=lambda name: name != FULL)
+
+    @property
+    def speeds(self) -> list[float]:
+        """The ego's speeds, km/h."""
+        return sorted({row[SPEED_COLUMN] for row in self.rows})
+
+    def contender(self, policy: str, budget: float) -> Contender:
+        """What was played of a policy beside others at a budget: the full scan has one of its
+        own.
+        """
+        return policy, 1.0 if policy == FULL else budget
+
+    def endings(self, contender: Contender, lines: Iterable[Line]) -> Counter[Ending]:
+        """How the episodes of some lines ended."""
+        held = set(lines)
+        own = self._rows.get(contender, [])
+        return Counter(ending(*impact_of(row)) for row in own if _line(row) in held)
+
+    def scores(self, contender: Contender, lines: Iterable[Line]) -> Scores:
+        """The scores of some lines."""
+        held = set(lines)
+        own = self._scores.get(contender, {})
+        return {key: value for key, value in own.items() if key[1][0] in held}
+
+    def reading(self, reported: bool) -> list[Line]:
+        """The lines of a reading, with those without cars that hide."""
+        return [line for line in self.lines if line.holds(reported)]
+
+    @property
+    def readings(self) -> list[bool]:
+        """Which readings were played; one where no test has cars that hide."""
+        played = {line.reported for line in self.lines} - {None}
+        return [reading for reading in READINGS if reading in played] or [True]
+
+    def best_control(self, budget: float, lines: Iterable[Line]) -> str | None:
+        """The control of the best score at a budget."""
+        held = list(lines)
+        controls = [name for name in self.policies if is_control(self.tags[name])]
+        scores = {name: self.scores((name, budget), held) for name in controls}
+        return best_control({n: overall(own) for n, own in scores.items() if own})
+
+    def difference(
+        self, ours: Contender, theirs: Contender, lines: Iterable[Line]
+    ) -> Contrast | None:
+        """The score of one contender less that of another, paired by seed; None without shared
+        seeds.
+        """
+        held = list(lines)
+        a, b = self.scores(ours, held), self.scores(theirs, held)
+        # In the order of the rows, so that sums have the same last bits.
+        shared = [key for key in a if key in b]
+        seeds = sorted({seed for seed, _ in shared})
+        if not seeds:
+            return None
+        pairs = [
+            [
+                Reading(overall({key: one[key] for key in shared if key[0] == seed}))
+                for seed in seeds
+            ]
+            for one in (a, b)
+        ]
+        return Contrast(_SCORE, difference(*pairs))
+
+    def marked(self, policy: str) -> str:
+        """A policy's name, with a mark when no car can have it."""
+        return marked(policy, self.tags[policy])
+
+    def notes(self) -> tuple[str, ...]:
+        """What the marks mean."""
+        return tag_notes(self.tags.values())
+
+    @cached_property
+    def _rows(self) -> dict[Contender, list[Row]]:
+        groups: dict[Contender, list[Row]] = {}
+        for row in self.rows:
+            groups.setdefault((policy_of(row), row["budget"]), []).append(row)
+        return groups
+
+    @cached_property
+    def _scores(self) -> dict[Contender, Scores]:
+        return {
+            contender: {(row["seed"], _case(row)): score(*impact_of(row)) for row in rows}
+            for contender, rows in self._rows.items()
+        }
+
+
+def overall(scores: Scores) -> float:
+    """The mean over tests of the means over their speeds and seeds: every test weighs the same."""
+    by_line: dict[Line, list[float]] = {}
+    for (_, (line, _, _)), value in scores.items():
+        by_line.setdefault(line, []).append(value)
+    return float(np.mean([np.mean(own) for own in by_line.values()]))
+
+
+def _line(row: Row) -> Line:
+    return Line(row[TEST_COLUMN], row.get(REPORTED_COLUMN))
+
+
+def _case(row: Row) -> Case:
+    return _line(row), row[SPEED_COLUMN], row[TARGET_COLUMN]

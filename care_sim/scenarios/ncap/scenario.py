@@ -1,0 +1,164 @@
+"""A Euro NCAP test as a scenario: test and speeds are arguments, the seed draws the rest."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from care_sim.base.bounds import bounded
+from care_sim.base.checks import check_known
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Pose
+from care_sim.scenarios.base import (
+    LANE_WIDTH_M,
+    LONGEST_EPISODE_S,
+    NO_LIMIT_MPS,
+    Range,
+    Scenario,
+    draw,
+)
+from care_sim.scenarios.ncap.approach import across, ahead, braking_ahead
+from care_sim.scenarios.ncap.forms import (
+    Across,
+    AcrossExit,
+    Ahead,
+    BrakingAhead,
+    NcapTest,
+    Oncoming,
+    Variation,
+)
+from care_sim.scenarios.ncap.meeting import Ego, Meeting
+from care_sim.scenarios.ncap.obstructions import Sizes, standing_cars
+from care_sim.scenarios.ncap.table import (
+    LARGE_HEIGHT_M,
+    LARGE_LENGTH_M,
+    LARGE_WIDTH_M,
+    SMALL_HEIGHT_M,
+    SMALL_LENGTH_M,
+    SMALL_WIDTH_M,
+    TESTS,
+)
+from care_sim.scenarios.ncap.turning import across_exit, oncoming
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.route import Route
+from care_sim.world.traffic import Traffic
+from care_sim.world.world import World
+
+
+@dataclass(frozen=True)
+class Ncap(Scenario):
+    """A test of Euro NCAP's protocols on an empty proving ground: the ego at the test's speed, the
+    target, and the cars that hide it where the test has them.
+
+    An ego that does not brake hits the target as the protocol wants it. The seed draws only what
+    the protocol leaves open: within its tolerance the ego's speed, when the sensor begins, the
+    sizes of the cars that stand there, and the side: half of the episodes are mirrored, as in
+    left-hand traffic.
+
+    These cars are of one of the five classes. With `occluder_reported=False` perception does not
+    report them. Ranges are drawn uniformly by the seed.
+    """
+
+    duration_s: float = bounded(20.0, 0.05, LONGEST_EPISODE_S)
+    test: str = "CPNCO-50"
+    """One of `care_sim.scenarios.ncap.table.TESTS`."""
+    speed_kph: float = bounded(40.0, 1, 140)
+    """The ego's, km/h. Tests in which it turns have a line for each of the protocol's speeds and
+    take no other."""
+    target_kph: float = bounded(0.0, 0, 140)
+    """The target's, km/h. 0 stands for the protocol's at the ego's speed: the first where it has
+    several."""
+    occluder_reported: bool = True
+    excess_kph: Range = bounded((0.0, 1.0), 0, 4)
+    """By how much the ego is faster than the test's speed: the protocol's tolerance."""
+    phase_s: Range = bounded((0.0, 0.1), 0, 2)
+    """How much earlier the episode begins: anywhere within a keyframe."""
+    small_length_m: Range = bounded(SMALL_LENGTH_M, 3, 6)
+    small_width_m: Range = bounded(SMALL_WIDTH_M, 1.5, 2.5)
+    large_length_m: Range = bounded(LARGE_LENGTH_M, 3, 6)
+    large_width_m: Range = bounded(LARGE_WIDTH_M, 1.5, 2.5)
+    """Of the cars that hide the target: the protocol's ranges."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_known("test of ncap", self.test, TESTS)
+        if 0 < self.target_kph < 1:
+            raise InvalidInput(
+                f"target_kph of ncap must be 0 or at least 1, got {self.target_kph:g}"
+            )
+        way = TESTS[self.test].way
+        if isinstance(way, AcrossExit | Oncoming) and self.speed_kph not in way.bends:
+            raise InvalidInput(
+                f"speed_kph of {self.test} must be one of "
+                f"{', '.join(f'{speed:g}' for speed in way.bends)}, the only ones for which the "
+                f"protocol has a turn, got {self.speed_kph:g}"
+            )
+
+    def build(self, rng: np.random.Generator) -> World:
+        """A fresh world at time zero."""
+        # The order of the draws is part of what a seed means. All are made for every test.
+        test = TESTS[self.test]
+        speed = (self.speed_kph + draw(rng, self.excess_kph)) / 3.6
+        start_s = test.start_s + draw(rng, self.phase_s)
+        side = 1.0 if rng.random() < 0.5 else -1.0
+        sizes = Sizes(
+            (draw(rng, self.small_length_m), draw(rng, self.small_width_m), SMALL_HEIGHT_M),
+            (draw(rng, self.large_length_m), draw(rng, self.large_width_m), LARGE_HEIGHT_M),
+        )
+
+        length, width, _ = CATALOGUE["ego"].size
+        meeting = _meeting(test, self._variation(), Ego(speed, length, width, start_s))
+        traffic = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
+        world = World(traffic, speed, _mirrored_route(meeting.route, side))
+        self._add_cars(world, meeting, sizes, side)
+        world.first_sighting = world.add(
+            "target", test.target.body, lambda time: _mirrored(meeting.motion(time), side)
+        )
+        world.is_over = partial(meeting.end.is_over, world)
+        return world
+
+    def _add_cars(self, world: World, meeting: Meeting, sizes: Sizes, side: float) -> None:
+        """Add the cars that hide the target, if there are any."""
+        test = TESTS[self.test]
+        target_width = CATALOGUE[test.target.body].size[1]
+        ego_width = world.ego_kind.size[1]
+        # They are reckoned for a target from the right, and stand on the side that it comes from.
+        far = isinstance(test.way, Across) and test.way.far
+        cars = standing_cars(test.obstruction, sizes, meeting.line_x, target_width, ego_width)
+        for number, car in enumerate(cars):
+            pose = _mirrored(car.pose, -side if far else side)
+            world.add(f"obstruction {number}", car.kind, pose, reported=self.occluder_reported)
+
+    def _variation(self) -> Variation:
+        """The speeds of this episode, and the line of a turn."""
+        known = TESTS[self.test].variations
+        own = next((each for each in known if each.ego_kph == self.speed_kph), known[0])
+        return Variation(self.speed_kph, self.target_kph or own.target_kph)
+
+
+def _meeting(test: NcapTest, speeds: Variation, ego: Ego) -> Meeting:
+    """How the ego and the target of a test meet."""
+    way, target, speed = test.way, test.target, speeds.target_kph / 3.6
+    match way:
+        case Across():
+            return across(way, target, speed, ego)
+        case Ahead():
+            return ahead(way, target, speed, ego)
+        case BrakingAhead():
+            return braking_ahead(way, target, ego)
+        case AcrossExit():
+            return across_exit(way, target, speed, way.bends[speeds.ego_kph], ego)
+        case Oncoming():
+            return oncoming(target, speed, way.bends[speeds.ego_kph], ego)
+
+
+def _mirrored(pose: Pose, side: float) -> Pose:
+    """A pose as it is, or with `side` -1 on the other side of the ego's way."""
+    x, y, heading = pose
+    return x, side * y, side * heading
+
+
+def _mirrored_route(route: Route | None, side: float) -> Route | None:
+    return route and Route(
+        _mirrored(route.start, side), tuple((length, side * bend) for length, bend in route.legs)
+    )

@@ -1,0 +1,109 @@
+"""How the ego and its target come to meet in the tests in which the ego turns at a junction of two
+roads with two lanes of 3.5 m each.
+
+The ego's first lane is along x with its middle at y = 0. The middle of the car follows the
+protocol's line; the protocol leads the middle of the front axle along it. Right-hand traffic.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from care_sim.scenarios.base import LANE_WIDTH_M
+from care_sim.scenarios.ncap.approach import run_up
+from care_sim.scenarios.ncap.forms import AcrossExit, Bend, Target
+from care_sim.scenarios.ncap.meeting import CLEAR_M, Crossing, Ego, Meeting
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.route import Leg, Route
+from care_sim.world.straight_way import StraightWay
+
+_SLACKEST_M = 1500.0
+"""Radius at which the clothoids begin."""
+_ARCS = 16
+"""Arcs that stand for a clothoid."""
+_BEYOND_M = 50.0
+"""So far behind the bend a car has come to any line that is asked for."""
+
+
+def bend_route(bend: Bend, right: bool, before_m: float) -> Route:
+    """The ego's route: `before_m` straight on, then a quarter turn."""
+    sign = -1.0 if right else 1.0
+    tight, slack = 1 / bend.radius_m, 1 / _SLACKEST_M
+    length = 2 * float(np.deg2rad(bend.clothoid_deg)) / (tight + slack)
+    # The curvature of a clothoid grows evenly: each arc has that of its middle, and so turns as
+    # much as its part of the clothoid.
+    shares = (np.arange(_ARCS) + 0.5) / _ARCS
+    entry: list[Leg] = [
+        (length / _ARCS, sign * float(slack + share * (tight - slack))) for share in shares
+    ]
+    arc = (float(np.deg2rad(bend.arc_deg)) * bend.radius_m, sign * tight)
+    return Route((0.0, 0.0, 0.0), ((before_m, 0.0), *entry, arc, *reversed(entry)))
+
+
+def across_exit(way: AcrossExit, target: Target, speed: float, bend: Bend, ego: Ego) -> Meeting:
+    """A pedestrian who crosses the road that the ego turns into at `speed` m/s."""
+    length, width, _ = CATALOGUE[target.body].size
+    side = -1.0 if way.right else 1.0
+    line_y = LANE_WIDTH_M / 2 + side * way.offset_m
+    hit_y = line_y - side * width / 2
+    route = _timed(bend, way.right, ego, lambda on, m: side * (_front(on, m, ego)[1] - hit_y))
+    hit_m = ego.speed * ego.hit_s
+    hit_x = _front(route, hit_m, ego)[0]
+
+    exit_x = route.pose(route.length)[0]
+    sign = 1.0 if way.along else -1.0
+    start_x = exit_x - sign * (way.distance_m - target.point_m)
+    heading = 0.0 if way.along else float(np.pi)
+    walk = run_up((start_x, line_y), heading, speed, way.run_up_m)
+    gone = sign * (hit_x - start_x) + target.point_m
+    walk = walk.setting_off(ego.hit_s - walk.duration_to(gone))
+    # The ego may still turn when it is there, so that both wait for a width of it more.
+    clear_s = walk.starts_s + walk.duration_to(gone + length / 2 + 1.5 * ego.width + CLEAR_M)
+    leave_m = hit_m + ego.length + width + ego.width + CLEAR_M
+    return Meeting(walk.pose, Crossing(hit_m - ego.width / 2, leave_m, clear_s), route=route)
+
+
+def oncoming(target: Target, speed: float, bend: Bend, ego: Ego) -> Meeting:
+    """A car that comes towards the ego, which turns left before it, at `speed` m/s."""
+    length, width, _ = CATALOGUE[target.body].size
+    # The ego's front has come to the target's side: half its width before the middle of its lane,
+    # seen at 45 degrees.
+    short_m = ego.length / 2 + width / np.sqrt(2)
+    lane_y = LANE_WIDTH_M
+    route = _timed(bend, False, ego, lambda on, m: on.pose(m + short_m)[1] - lane_y)
+    hit_m = ego.speed * ego.hit_s
+    crossing_x = route.pose(hit_m + short_m)[0]
+    motion = StraightWay((crossing_x + length / 2, lane_y), float(np.pi), speed, ego.hit_s)
+    # Either is off the other's way when it has gone on by both lengths and the ego's width.
+    further = length + ego.length + ego.width
+    reach = (width + ego.width) / 2
+    enter_m = _where(route, lambda on, m: _front(on, m, ego)[1] - (lane_y - reach))
+    leave_m = _where(route, lambda on, m: on.pose(m)[1] - (lane_y + reach)) + ego.length
+    return Meeting(
+        motion.pose, Crossing(enter_m, leave_m, ego.hit_s + further / speed), route=route
+    )
+
+
+_Distance = Callable[[Route, float], float]
+"""A distance that grows with the metres along a route."""
+
+
+def _timed(bend: Bend, right: bool, ego: Ego, beyond: _Distance) -> Route:
+    """The route on which `beyond` is 0 when an ego that does not brake is due to hit."""
+    # Tried with a straight of any length; the real one is as much shorter or longer.
+    before_m = ego.length
+    tried = bend_route(bend, right, before_m)
+    return bend_route(bend, right, before_m + ego.speed * ego.hit_s - _where(tried, beyond))
+
+
+def _where(route: Route, beyond: _Distance) -> float:
+    """Where along a route a distance comes to 0."""
+    return float(brentq(lambda along: beyond(route, along), 0.0, route.length + _BEYOND_M))
+
+
+def _front(route: Route, along: float, ego: Ego) -> tuple[float, float]:
+    """The middle of the front of an ego whose centre is `along` metres down a route."""
+    x, y, heading = route.pose(along)
+    reach = ego.length / 2
+    return x + reach * float(np.cos(heading)), y + reach * float(np.sin(heading))

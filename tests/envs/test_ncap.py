@@ -1,0 +1,65 @@
+"""The environment of the Euro NCAP tests, with its real parts."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.scenarios.ncap.table import TESTS
+
+NOTHING = np.zeros((32, 512), np.float32)
+
+
+def make(**arguments):
+    return gymnasium.make("CARE-NCAP-v0", disable_env_checker=True, **arguments)
+
+
+def outcome(policy, seed=0, **arguments):
+    """How an episode ends under a policy, None for one that fires nothing."""
+    with make(budget=1.0 if policy == "full" else 0.03, **arguments) as env:
+        play = care_sim.make_policy(policy, env) if policy else None
+        observation, _ = env.reset(seed=seed)
+        steps, ended = 0, False
+        while not ended:
+            action = play(observation) if play else NOTHING
+            observation, _, terminated, truncated, info = env.step(action)
+            steps, ended = steps + 1, terminated or truncated
+        return info["outcome"], steps, terminated
+
+
+@pytest.mark.parametrize("name", ["CPNCO-50", "CPLA-50", "CBFA-50", "CPTAns-50", "CCRb"])
+def test_the_full_scan_avoids_the_slowest_test(name):
+    speeds = TESTS[name].variations[0]
+    ended, steps, terminated = outcome(
+        "full", test=name, speed_kph=speeds.ego_kph, target_kph=speeds.target_kph
+    )
+    assert not ended["collision"]
+    assert ended["braked"]
+    assert terminated
+    assert steps < 100
+
+
+def test_a_car_that_sees_nothing_hits():
+    ended, steps, terminated = outcome(None, floor=False)
+    assert ended["impact_speed_mps"] == pytest.approx(41 / 3.6, abs=1 / 3.6)
+    assert terminated
+    assert steps in (40, 41)
+
+
+def test_the_readings_differ_in_what_is_known_of_the_cars_alone():
+    seen = []
+    for reported in (True, False):
+        with make(budget=0.03, occluder_reported=reported) as env:
+            observation, _ = env.reset(seed=0)
+            world = env.unwrapped.loop.world
+            seen.append(([actor.pose_at(0.0) for actor in world.actors], observation))
+    (poses, with_cars), (same, without) = seen
+    assert poses == same
+    # One of the two cars stands behind the other.
+    assert np.sum(with_cars["detections"][:, 0] >= 0) == 1
+    assert np.sum(without["detections"][:, 0] >= 0) == 0
+
+
+def test_a_speed_without_a_turn_is_refused_when_the_environment_is_made():
+    with pytest.raises(care_sim.InvalidInput, match="speed_kph of CPTAfo-50 must be one of"):
+        make(test="CPTAfo-50")
