@@ -7,13 +7,15 @@ import numpy as np
 from care_sim.base.bounds import bounded
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
+    USUAL_EGO_SPEED_MPS,
+    Scenario,
+    line_with_terraces,
+)
+from care_sim.streets.dimensions import (
     LANE_WIDTH_M,
     SPEED_LIMIT_MPS,
-    USUAL_EGO_SPEED_MPS,
     Range,
-    Scenario,
     draw,
-    line_with_terraces,
 )
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic

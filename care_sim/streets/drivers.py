@@ -12,10 +12,15 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
-from care_sim.scenarios.base import LANE_WIDTH_M, SPEED_LIMIT_MPS, Range, draw
-from care_sim.sources.streets.curve import Curve
-from care_sim.sources.streets.draft import STEP_S, TIMES, Draft
-from care_sim.sources.streets.layouts import Joining, Plan, Road
+from care_sim.streets.curve import Curve
+from care_sim.streets.dimensions import (
+    LANE_WIDTH_M,
+    SPEED_LIMIT_MPS,
+    Range,
+    draw,
+)
+from care_sim.streets.draft import STEP_S, TIMES, Draft
+from care_sim.streets.layouts import Joining, Plan, Road
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import RoadVehicle, Traffic
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.scenarios.base import Range, draw
-from care_sim.sources.streets.curve import Walked
-from care_sim.sources.streets.draft import TIMES, Draft
-from care_sim.sources.streets.furniture import Span
-from care_sim.sources.streets.layouts import EVEN_CHANCE, Road, Side
+from care_sim.streets.curve import Walked
+from care_sim.streets.dimensions import Range, draw
+from care_sim.streets.draft import TIMES, Draft
+from care_sim.streets.furniture import Span
+from care_sim.streets.layouts import EVEN_CHANCE, Road, Side
 
 WALKING_MPS = 1.34
 WALKING_SPREAD_MPS = 0.26
