@@ -6,6 +6,7 @@ CLOSED_LOOP = {
     "CARE-Dartout-v0": "care_sim.envs.scenarios:DartoutEnv",
     "CARE-Dense-v0": "care_sim.envs.scenarios:DenseEnv",
     "CARE-CutIn-v0": "care_sim.envs.scenarios:CutInEnv",
+    "CARE-Drive-v0": "care_sim.envs.scenarios:DriveEnv",
 }
 OPEN_LOOP = {
     "CARE-Street-v0": "care_sim.envs.scenes:StreetEnv",

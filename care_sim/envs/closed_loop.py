@@ -215,7 +215,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         detectable = self._detectable()
         record = loop.keyframe(fired)
         self.keyframes.append(record)
-        terminated = record.impact_speed_mps is not None
+        terminated = record.impact_speed_mps is not None or loop.world.along_m >= loop.world.goal_m
         truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
         terms = self._terms(record, detectable)

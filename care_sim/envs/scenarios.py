@@ -35,3 +35,10 @@ class CutInEnv(ClosedLoopEnv):
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "cutin"
+
+
+class DriveEnv(ClosedLoopEnv):
+    """`CARE-Drive-v0`: a drive through a generated street, with bends, traffic and conflicts."""
+
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
+    scenario_name = "drive"

@@ -13,8 +13,10 @@ from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
+from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.corridor import along_route
+from care_sim.driving.cruising import Cruising
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.records import Keyframe
 from care_sim.loops.seeds import SensorSeeds
@@ -84,9 +86,12 @@ class ClosedLoop:
         # The controller steers by the sensor, which sits behind the middle of the car: the front
         # bumper is farther from it than half a length.
         length, width, _ = world.ego_kind.size
+        front = length / 2 - LIDAR_POSITION[0]
         self._controller = BrakingController(
-            world.ego_motion.speed, length / 2 - LIDAR_POSITION[0], width / 2, rig.keyframe_s
+            world.ego_motion.speed, front, width / 2, rig.keyframe_s
         )
+        plan = world.speed_plan
+        self._cruising = Cruising(plan, front, width / 2, rig.keyframe_s) if plan else None
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -106,7 +111,7 @@ class ClosedLoop:
         detections, behind, found = self._detect(scan, bodies)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
-        command = self._controller.command(self._tracks_ahead(sensor), self.belief.ego)
+        command = self._command(sensor)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
@@ -184,6 +189,15 @@ class ClosedLoop:
         detections, behind = self._detector.detect(cloud, present)
         found = found_objects(present, detections) & np.isin(self._reported, behind)
         return detections, behind, self._reported[found]
+
+    def _command(self, sensor: Frame) -> Command:
+        """What the car's software asks for, from the tracks of this keyframe."""
+        ahead = self._tracks_ahead(sensor)
+        ego = self.belief.ego
+        command = self._controller.command(ahead, ego)
+        if self._cruising is None:
+            return command
+        return self._cruising.eased(command, ahead, ego.speed, self.world.along_m)
 
     def _tracks_ahead(self, sensor: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""

@@ -7,8 +7,14 @@ from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout
 from care_sim.scenarios.dense import Dense
+from care_sim.scenarios.drive import DriveScenario
 
-SCENARIOS: dict[str, type[Scenario]] = {"dartout": Dartout, "dense": Dense, "cutin": CutIn}
+SCENARIOS: dict[str, type[Scenario]] = {
+    "dartout": Dartout,
+    "dense": Dense,
+    "cutin": CutIn,
+    "drive": DriveScenario,
+}
 
 
 def make_scenario(name: str, /, **parameters: object) -> Scenario:

@@ -123,6 +123,9 @@ CATALOGUE = {
         _block("bus", "bus", (11.19, 2.94, 3.47), (0.9, 0.75, 0.1)),
         _cyclist("bicycle", (1.68, 0.60, 1.27)),
         _person("pedestrian", (0.73, 0.66, 1.76), (0.85, 0.15, 0.2)),
+        # A target of Euro NCAP's tests: a seven-year-old child as in the public OpenSCENARIO files
+        # of the protocols (vectorgrp/OSC-NCAP-scenarios).
+        _person("child", (0.711, 0.298, 1.154), (0.9, 0.5, 0.1)),
         # Bodies that the five reported classes do not hold. A box trailer on its legs, side skirts
         # down: length and height of nuScenes, the width that European roads allow (Directive
         # 96/53/EC: 2.55 m).
@@ -132,6 +135,11 @@ CATALOGUE = {
         # A piece of garden hedge as high as a person: below the 2 m that German neighbour law
         # allows near a boundary.
         _block("hedge", None, (6.0, 0.8, 1.8), (0.2, 0.42, 0.2)),
+        # A garden wall of two metres, the highest beside a pavement that most German building codes
+        # allow without a permit.
+        _block("wall", None, (6.0, 0.24, 2.0), (0.6, 0.5, 0.42)),
+        # A skip for rubble, 7 cubic metres (DIN 30720).
+        _block("skip", None, (3.6, 1.75, 1.5), (0.8, 0.5, 0.1)),
         # A detached house of two storeys.
         _block("house", None, (11.0, 9.0, 6.5), (0.72, 0.6, 0.5)),
         _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),

@@ -14,8 +14,10 @@ from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.crosser import Meeting
 from care_sim.world.route import Route
 from care_sim.world.route_car import RouteCar
+from care_sim.world.speed_plan import SpeedPlan
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
@@ -73,6 +75,12 @@ class World:
     """The actor whom the episode is about; its scenario sets it."""
     route: Route | None
     """The way that the ego is to go, as its navigation knows it; None is straight ahead."""
+    speed_plan: SpeedPlan | None
+    """How fast it means to go there; None is as fast as it starts. Its scenario sets it."""
+    goal_m: float
+    """Where on the route the episode ends; its scenario sets it."""
+    meetings: list[Meeting]
+    """Whom the scenario lets the ego meet, in the order of the way."""
 
     def __init__(self, traffic: Traffic, ego_speed: float, route: Route | None = None):
         self.bullet = BulletWorld()
@@ -90,8 +98,12 @@ class World:
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
         self.first_sighting = None
+        self.speed_plan = None
+        self.goal_m = np.inf
+        self.meetings = []
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
+        self._every_step: list[Callable[[], None]] = []
         self._ego_motion = Ego(ego_speed)
         self._steps = 0
 
@@ -125,6 +137,15 @@ class World:
     def at(self, time: float, event: Callable[[], None]) -> None:
         """Call `event` once, at the first world step at or after `time`."""
         self._events.append((time, event))
+
+    def at_every_step(self, event: Callable[[], None]) -> None:
+        """Call `event` at every world step, when the ego has moved and the clock with it."""
+        self._every_step.append(event)
+
+    @property
+    def along_m(self) -> float:
+        """How far the ego's middle is along its route, or straight ahead."""
+        return self.ego.along if isinstance(self.ego, RouteCar) else self.ego.pose[0]
 
     @property
     def ego_motion(self) -> Ego:
@@ -174,7 +195,7 @@ class World:
         # which has its turn at the next step if it is due already.
         due = [event for start, event in self._events if start <= self.time]
         self._events = [(start, event) for start, event in self._events if start > self.time]
-        for event in due:
+        for event in (*due, *self._every_step):
             event()
         self._ego_motion = Ego(
             self.ego.speed, self.ego.yaw_rate, (self.ego.speed - before) / WORLD_STEP_S
