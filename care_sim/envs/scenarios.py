@@ -1,6 +1,8 @@
 """The environments of the closed loop by id: one per scenario."""
 
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.evaluation.drives import drive_outcome
+from care_sim.loops.records import DriveOutcome
 
 
 class DartoutEnv(ClosedLoopEnv):
@@ -42,3 +44,8 @@ class DriveEnv(ClosedLoopEnv):
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "drive"
+
+    def _outcome(self) -> DriveOutcome:
+        world = self.loop.world
+        kinds = {actor.body: actor.kind.name for actor in world.actors}
+        return drive_outcome(self.keyframes, world.meetings, kinds, world.along_m / world.goal_m)

@@ -14,11 +14,12 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.core.types import Command, Scan, Tracks
-from care_sim.driving.braking import BrakingController
+from care_sim.driving.braking import BrakingController, BrakingRules
 from care_sim.driving.corridor import along_route
 from care_sim.driving.cruising import Cruising
 from care_sim.driving.odometry import Odometry
-from care_sim.loops.records import Keyframe
+from care_sim.loops.needless import NeedlessBraking
+from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
@@ -87,11 +88,13 @@ class ClosedLoop:
         # bumper is farther from it than half a length.
         length, width, _ = world.ego_kind.size
         front = length / 2 - LIDAR_POSITION[0]
+        rules = BrakingRules()
         self._controller = BrakingController(
-            world.ego_motion.speed, front, width / 2, rig.keyframe_s
+            world.ego_motion.speed, front, width / 2, rig.keyframe_s, rules
         )
         plan = world.speed_plan
         self._cruising = Cruising(plan, front, width / 2, rig.keyframe_s) if plan else None
+        self._needless = NeedlessBraking(front, width / 2, rules)
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -112,6 +115,8 @@ class ClosedLoop:
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
         command = self._command(sensor)
+        needless = self._needless.judge(world, sensor, command.braking)
+        sights = self._sights(detected)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
@@ -132,7 +137,10 @@ class ClosedLoop:
             distance_m=distance,
             nearest_m=passage.nearest_m,
             clearance_m=passage.clearance_m,
-            impact_speed_mps=passage.impact_speed_mps,
+            impact_speed_mps=passage.impact.speed_mps if passage.impact else None,
+            impact=passage.impact,
+            sights=sights,
+            needless=needless,
         )
 
     def true_boxes(self, tracks: Tracks) -> Floats:
@@ -243,6 +251,15 @@ class ClosedLoop:
 
     def _local_boxes(self, bodies: Integers) -> Floats:
         return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
+
+    def _sights(self, detected: Integers) -> tuple[Sight, ...]:
+        """Whom the scenario lets the ego meet, at this scan."""
+        bodies = [one.body for one in self.world.meetings]
+        ranges = planar_ranges(self._local_boxes(np.array(bodies, np.int64)))
+        return tuple(
+            Sight(distance, self.shows(body), body in detected)
+            for body, distance in zip(bodies, ranges.tolist(), strict=True)
+        )
 
     def _in_view(self) -> bool:
         target = self.world.first_sighting

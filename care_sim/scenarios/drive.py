@@ -132,7 +132,7 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
         side = "left" if one.side > 0 else "right"
         occluder = one.occluder, one.occluder_reported
         world.meetings.append(
-            Meeting(actor.body, one.who, side, along, one.course, *occluder, crosser)
+            Meeting(actor.body, one.who, side, along, one.course.value, *occluder, crosser)
         )
         if world.first_sighting is None:
             world.first_sighting = actor

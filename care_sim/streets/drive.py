@@ -71,8 +71,7 @@ class Drive:
 
     `goal_m` is how far along its `route` the ego goes. `kinds` (n,) stand or walk on `ways`
     (n, t, 3), sampled every SAMPLE_S seconds. `encounters` come with where on the route their lines
-    are. `stretches` say which road the ego drives on. The ego's own lane of each comes first in
-    `lanes`.
+    are. `stretches` say which road the ego drives on.
     """
 
     route: Route
@@ -101,8 +100,8 @@ def draw_drive(rng: np.random.Generator, duration_s: float) -> Drive:
     times = SAMPLE_S * np.arange(round(duration_s / SAMPLE_S) + 1, dtype=np.float64)
     draft = Draft(furniture, times)
     encounters = _encounters(meeting, draft, plan, stretches, goal)
-    last = stretches[0].to_m + BEYOND_M
-    side_m = goal + BEYOND_M - stretches[-1].from_m if turned_into else BEYOND_M
+    last = min(goal, stretches[0].to_m) + BEYOND_M
+    side_m = BEYOND_M + (goal - stretches[-1].offset_m if turned_into else 0.0)
     furnish(draft, plan, (-BEYOND_M, last), side_m)
     keep_walkers_off(draft, plan, turned_into, [one for _, one in encounters], (-BEYOND_M, last))
     draft.rng = people
@@ -166,7 +165,7 @@ def _encounters(
             s = places[number] - stretch.offset_m
             if len(found) < wanted and _is_open(plan, stretch, places[number], s):
                 encounter = draw_encounter(rng, stretch.road, s)
-                if keep_room(draft, stretch.road, encounter):
+                if encounter and keep_room(draft, stretch.road, encounter):
                     found.append((places[number], encounter))
     return tuple(sorted(found, key=lambda one: one[0]))
 
@@ -191,8 +190,8 @@ def _lanes(
     last: float,
     duration_s: float,
 ) -> tuple[DrivenLane, ...]:
-    """All lanes, the ego's own of every stretch first. Where the ego turns left, nobody comes
-    towards it: giving way is not asked of it.
+    """All lanes that somebody drives in. Where the ego turns left, nobody comes towards it: giving
+    way is not asked of it.
     """
     sides = {joining.sign: drive_side_street(rng, plan, joining) for joining in plan.joinings}
     own = [drive_own_lane(rng, plan, last)]
@@ -204,4 +203,4 @@ def _lanes(
     to_the_left = turned_into is not None and turned_into.sign > 0
     if len(plan.main.directions) > 1 and not to_the_left:
         others.append(drive_oncoming_lane(rng, plan, last + SPEED_LIMIT_MPS * duration_s))
-    return (*own, *others)
+    return tuple(lane for lane in (*own, *others) if lane.kinds)

@@ -5,10 +5,12 @@ drives on as it means to: a conflict, a near miss, or a stop at the edge of the 
 waits sets off when the ego is a drawn time away, so that a conflict stays one after earlier
 braking.
 
-The speed is drawn so that who comes is in sight for `SIGHT_S` before an ego that drives on would
-hit them, reckoned from the occluder's edge. An ego at 30 km/h that brakes with 5 m/s^2 stands 1.13
-s after it begins, 0.3 s of that until the brake acts; a track needs two keyframes to have a
-velocity, 0.2 s. So a full scan can prevent what is in sight for 1.33 s: by the range, five of six.
+Who comes is in sight for `SIGHT_S` before an ego that drives on would hit them, reckoned from the
+edge of what hides them. An ego that brakes at once, as a full scan lets it, needs 0.2 s (two
+keyframes, the second of which tells a velocity), 0.3 s until the brake acts and v / b to stand, of
+which it drives half: 1.2 s of its way at 25 km/h and 1.33 s at 30 km/h, with b = 5 m/s^2. Nobody is
+in sight for less than the former, so that nearly all can be prevented; and a second more is what
+sensing may lose.
 """
 
 from dataclasses import dataclass
@@ -22,7 +24,8 @@ from care_sim.streets.layouts import EVEN_CHANCE, Road, Side
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.walker import Walk
 
-SIGHT_S: Range = (1.0, 3.0)
+SIGHT_S: Range = (1.2, 2.5)
+TRIES = 50
 SHOWN_M = 0.3
 """Of who comes out, what must stick out for three returns at 15 m, where columns are 0.18 m apart.
 """
@@ -121,16 +124,20 @@ class Encounter:
         return CATALOGUE[self.who].size[1] / 2
 
 
-def draw_encounter(rng: np.random.Generator, road: Road, s: float) -> Encounter:
-    """An encounter at `s` on a road, redrawn until who comes is in sight for `SIGHT_S`."""
-    while True:
-        drawn = _drawn(rng, road, s)
+def draw_encounter(rng: np.random.Generator, road: Road, s: float) -> Encounter | None:
+    """An encounter at `s` on a road from either side, redrawn until who comes is in sight for
+    `SIGHT_S`; None where nobody would be after `TRIES`.
+    """
+    # The side is drawn once: redrawn, it would be the near one more often.
+    side = road.sides[int(rng.integers(2))]
+    for _ in range(TRIES):
+        drawn = _drawn(rng, road, s, side)
         if SIGHT_S[0] <= drawn.sight_s <= SIGHT_S[1]:
             return drawn
+    return None
 
 
-def _drawn(rng: np.random.Generator, road: Road, s: float) -> Encounter:
-    side = road.sides[int(rng.integers(2))]
+def _drawn(rng: np.random.Generator, road: Road, s: float, side: Side) -> Encounter:
     who = str(rng.choice(list(COMERS)))
     at_kerb = who in AT_KERB and rng.random() < EVEN_CHANCE
     beyond = AT_GARDEN if side.garden_m else AT_YARD

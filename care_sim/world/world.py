@@ -9,7 +9,8 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.frames import Pose
+from care_sim.core.boxes import half_extents
+from care_sim.core.frames import Frame, Pose
 from care_sim.core.types import CLASSES, Ego
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
@@ -25,6 +26,11 @@ WORLD_STEP_S = 0.05
 CONTACT_REACH_M = 0.5
 """Contact is looked for among bodies this close: far more than the centimetres by which hulls are
 padded.
+"""
+
+INTO_FRONT_M = 0.5
+"""What the ego runs into may be this far behind its bumper when it is noticed: what it drives in a
+world step at 36 km/h.
 """
 
 Motion = Callable[[float], Pose]
@@ -48,16 +54,29 @@ class Actor:
 
 
 @dataclass(frozen=True)
+class Impact:
+    """The ego's first contact with a `body`, at its own speed `speed_mps`.
+
+    `at_front` says whether that body lay ahead of the ego: the ego ran into it. Else it ran into
+    the ego, from the side or from behind.
+    """
+
+    body: int
+    speed_mps: float
+    at_front: bool
+
+
+@dataclass(frozen=True)
 class ClosestApproach:
     """How close the ego came to the first-sighting actor while the world advanced.
 
     `nearest_m` is from centre to centre and `clearance_m` from hull to hull, inf without such an
-    actor. `impact_speed_mps` is the ego's speed at its first contact with any body, else None.
+    actor. `impact` is the ego's first contact with any body, else None.
     """
 
     nearest_m: float
     clearance_m: float
-    impact_speed_mps: float | None
+    impact: Impact | None
 
 
 class World:
@@ -128,6 +147,7 @@ class World:
         check_known("kind of body", kind, CATALOGUE)
         body = self.bullet.add(CATALOGUE[kind], place, backdrop=backdrop)
         self._footprints.add(body, CATALOGUE[kind].size, place)
+        self._before = self._footprints.boxes[:, :2].copy()
         actor = Actor(name, CATALOGUE[kind], body, pose_at, reported)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
@@ -164,6 +184,11 @@ class World:
         """(n, 7) boxes of bodies (n,) in the world frame."""
         return self._footprints.boxes[bodies]
 
+    def velocities_of(self, bodies: Integers) -> Floats:
+        """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
+        moved = self._footprints.boxes[bodies, :2] - self._before[bodies]
+        return np.asarray(moved / WORLD_STEP_S)
+
     def advance(self, acceleration: float, duration: float) -> ClosestApproach:
         """Move everything by `duration` seconds, a whole number of world steps. The ego holds
         `acceleration` (m/s^2) meanwhile.
@@ -171,7 +196,7 @@ class World:
         # Looked at after every step: between two keyframes the car may hit something and be past
         # it, or come closest to it.
         steps = [self._step(acceleration) for _ in range(whole_steps(duration))]
-        impacts = (step.impact_speed_mps for step in steps if step.impact_speed_mps is not None)
+        impacts = (step.impact for step in steps if step.impact is not None)
         return ClosestApproach(
             min(step.nearest_m for step in steps),
             min(step.clearance_m for step in steps),
@@ -204,6 +229,7 @@ class World:
         # Poses are read after events, which may change who moves.
         bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
+        self._before = self._footprints.boxes[:, :2].copy()
         self.bullet.move_all(bodies, poses)
         self._footprints.move_all(bodies, poses)
         return self._approach()
@@ -211,16 +237,26 @@ class World:
     def _approach(self) -> ClosestApproach:
         # The exact distance is PyBullet's; asking it about every body would take most of a step.
         near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
-        touched = any(
-            self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0 for body in near
-        )
+        touched = [
+            body
+            for body in near
+            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0
+        ]
         nearest = clearance = np.inf
         if self.first_sighting is not None:
             x, y, _ = self.first_sighting.pose_at(self.time)
             ego_x, ego_y, _ = self.ego.pose
             nearest = float(np.hypot(x - ego_x, y - ego_y))
             clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
-        return ClosestApproach(nearest, clearance, self.ego.speed if touched else None)
+        return ClosestApproach(nearest, clearance, self._impact(touched[0]) if touched else None)
+
+    def _impact(self, body: int) -> Impact:
+        box = Frame.mounted(self.ego.pose, (0.0, 0.0, 0.0)).boxes_to_local(
+            self.boxes_of(np.array([body]))
+        )
+        (half_x,), _ = half_extents(box)
+        front = self.ego_kind.size[0] / 2 - INTO_FRONT_M
+        return Impact(body, self.ego.speed, bool(box[0, 0] - half_x >= front))
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:
