@@ -12,8 +12,7 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
-from care_sim.core.types import Detections, Scan, Tracks
-from care_sim.core.types import Command, Scan, Tracks
+from care_sim.core.types import Command, Detections, Scan, Tracks
 from care_sim.driving.braking import BrakingController, BrakingRules
 from care_sim.driving.corridor import along_route
 from care_sim.driving.cruising import Cruising
@@ -116,7 +115,7 @@ class ClosedLoop:
         self._track_objects.note(tracks, behind)
         command = self._command(sensor)
         needless = self._needless.judge(world, sensor, command.braking)
-        sights = self._sights(detected)
+        sights = self._sights(found)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
