@@ -136,7 +136,7 @@ class ClosedLoop:
             distance_m=distance,
             nearest_m=passage.nearest_m,
             clearance_m=passage.clearance_m,
-            impact_speed_mps=passage.impact.speed_mps if passage.impact else None,
+            impact_speed_mps=passage.impact_speed_mps,
             impact=passage.impact,
             sights=sights,
             needless=needless,

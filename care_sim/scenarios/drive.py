@@ -127,7 +127,7 @@ def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
             _seconds_left(world, along - one.half_width - EGO_LENGTH_M / 2),
             _may_go(drive, traffic, CATALOGUE[one.who].size[:2]),
         )
-        actor = world.add(f"{one.who} who comes out", one.who, crosser.pose)
+        actor = world.add(one.who, one.who, crosser.pose)
         world.at_every_step(_looking(world, crosser))
         side = "left" if one.side > 0 else "right"
         occluder = one.occluder, one.occluder_reported

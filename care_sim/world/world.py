@@ -78,6 +78,11 @@ class ClosestApproach:
     clearance_m: float
     impact: Impact | None
 
+    @property
+    def impact_speed_mps(self) -> float | None:
+        """The ego's speed at that contact, None without one."""
+        return self.impact.speed_mps if self.impact else None
+
 
 class World:
     """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
