@@ -51,7 +51,7 @@ class DriveScenario(Scenario):
     """
 
     cameras = SURROUND_CAMERAS
-    duration_s: float = bounded(45.0, 0.05, LONGEST_EPISODE_S)
+    duration_s: float = bounded(LONGEST_EPISODE_S, 0.05, LONGEST_EPISODE_S)
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
@@ -61,11 +61,12 @@ class DriveScenario(Scenario):
         nobody = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
         world = World(nobody, drive.cruise_mps, drive.route)
         world.goal_m = drive.goal_m
-        world.speed_plan = SpeedPlan(drive.route, drive.cruise_mps, SIDEWAYS_MPS2, COMFORT_MPS2)
+        plan = SpeedPlan(drive.route, drive.cruise_mps, SIDEWAYS_MPS2, COMFORT_MPS2)
+        world.speed_plan = plan
         traffic = StreetTraffic([_flowing(drive, lane) for lane in drive.lanes])
         _add_bodies(world, drive)
         _add_vehicles(world, drive, traffic)
-        _add_encounters(world, drive, traffic)
+        _add_encounters(world, drive, plan, traffic)
         return world
 
 
@@ -118,13 +119,13 @@ def _driving(traffic: StreetTraffic, lane: int, number: int) -> Motion:
     return lambda _time: traffic.pose(lane, number)
 
 
-def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
+def _add_encounters(world: World, drive: Drive, plan: SpeedPlan, traffic: StreetTraffic) -> None:
     """Who comes out. The episode is about the first who would be hit, else the first of all."""
     for along, one in drive.encounters:
         crosser = Crosser(
             one.walk,
             one.lead_s,
-            _seconds_left(world, along - one.half_width - EGO_LENGTH_M / 2),
+            _seconds_left(world, plan, along - one.half_width - EGO_LENGTH_M / 2),
             _may_go(drive, traffic, CATALOGUE[one.who].size[:2]),
         )
         actor = world.add(one.who, one.who, crosser.pose)
@@ -145,12 +146,12 @@ def _looking(world: World, crosser: Crosser) -> Callable[[], None]:
     return lambda: crosser.look(world.time)
 
 
-def _seconds_left(world: World, line_m: float) -> Callable[[], float]:
-    """The ego's time until its middle is `line_m` along the route."""
+def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> Callable[[], float]:
+    """The ego's time until its middle is `line_m` along the route, if it goes on as it does."""
 
     def seconds() -> float:
-        assert world.speed_plan is not None
-        return world.speed_plan.seconds_to(world.along_m, line_m, world.ego.speed)
+        gaining = max(world.ego_motion.acceleration, 0.0)
+        return plan.seconds_to(world.along_m, line_m, world.ego.speed, gaining)
 
     return seconds
 

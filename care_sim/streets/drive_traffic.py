@@ -1,6 +1,6 @@
 """Who drives in a drive: the lanes of its roads and their vehicles at the start."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,12 +15,18 @@ from care_sim.streets.drivers import (
     flow_places,
     traffic_kind,
 )
-from care_sim.streets.layouts import Joining, Plan
+from care_sim.streets.layouts import EVEN_CHANCE, Joining, Plan
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.lane_flow import STANDING_GAP_M
 
 FLOW_PER_H: Range = SIDE_FLOW_PER_H
 """Drives go through residential streets: the flow of the streets' side streets on every road."""
+
+SLOW_LEAD_M: Range = (22.0, 27.0)
+SLOW_LEAD_MPS: Range = (5.6, DRIVER_MPS[0])
+"""Somebody who looks for a place to park, at 20 to 25 km/h, starts as far ahead as IDM drivers keep
+at that speed, or a little more; nobody else starts that near.
+"""
 
 
 @dataclass(frozen=True)
@@ -49,10 +55,22 @@ class DrivenLane:
 
 
 def drive_own_lane(rng: np.random.Generator, plan: Plan, reach_m: float) -> DrivenLane:
-    """The ego's lane, which it drives for `reach_m`: who drives ahead of it, and behind."""
+    """The ego's lane, which it drives for `reach_m`: who drives ahead of it, and behind. In half of
+    the drives the one ahead is near, and slow.
+    """
+    slow_lead = draw(rng, SLOW_LEAD_M), draw(rng, SLOW_LEAD_MPS)
     ahead = flow_places(rng, FLOW_PER_H, draw(rng, LEAD_M), reach_m + BEYOND_M)
     behind = [-s for s in flow_places(rng, FLOW_PER_H, draw(rng, LEAD_M), BEYOND_M)]
-    return _lane(rng, plan.main.curve, 0.0, 1, [*behind[::-1], *ahead])
+    lane = _lane(rng, plan.main.curve, 0.0, 1, [*behind[::-1], *ahead])
+    if rng.random() >= EVEN_CHANCE:
+        return lane
+    at = len(behind)
+    return replace(
+        lane,
+        kinds=(*lane.kinds[:at], traffic_kind(rng), *lane.kinds[at:]),
+        places=(*lane.places[:at], slow_lead[0], *lane.places[at:]),
+        speeds=(*lane.speeds[:at], slow_lead[1], *lane.speeds[at:]),
+    )
 
 
 def drive_oncoming_lane(rng: np.random.Generator, plan: Plan, from_m: float) -> DrivenLane:

@@ -27,21 +27,21 @@ class SpeedPlan:
         """m/s that the car means to have at `s` metres along the route."""
         return float(np.interp(s, self._places, self._speeds))
 
-    def seconds_to(self, here: float, there: float, speed: float) -> float:
-        """Seconds from `here` to `there` for a car that has `speed` m/s now and drives by the plan;
-        0 where it is past.
-
-        Below the plan it gains speed; above it, it is taken to be on it.
+    def seconds_to(self, here: float, there: float, speed: float, gaining: float) -> float:
+        """Seconds from `here` to `there` for a car that has `speed` m/s now and goes on gaining
+        speed by `gaining` m/s^2, 0 or more, where the plan allows it; 0 where it is past, inf for a
+        car that stands and stays.
         """
         if there <= here:
             return 0.0
         places = np.linspace(here, there, max(int(np.ceil((there - here) / _SPACING_M)), 1) + 1)
         planned = np.interp(places, self._places, self._speeds)
-        gained = np.sqrt(speed**2 + 2 * self.comfort_mps2 * (places - here))
+        gained = np.sqrt(speed**2 + 2 * gaining * (places - here))
         driven = np.minimum(planned, gained)
         # Even acceleration from place to place: the mean of two speeds is that of the way between.
         means = (driven[1:] + driven[:-1]) / 2
-        return float(np.sum(np.diff(places) / means))
+        with np.errstate(divide="ignore"):
+            return float(np.sum(np.diff(places) / means))
 
     @cached_property
     def _places(self) -> Floats:
