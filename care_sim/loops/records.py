@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from care_sim.core.grid import Cells
-from care_sim.world.world import Impact
+from care_sim.world.approach import Impact
 
 
 @dataclass(frozen=True)

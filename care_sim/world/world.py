@@ -9,9 +9,9 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.boxes import half_extents
-from care_sim.core.frames import Frame, Pose
+from care_sim.core.frames import Pose
 from care_sim.core.types import CLASSES, Ego
+from care_sim.world.approach import ClosestApproach, Impact, lies_ahead
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
@@ -26,11 +26,6 @@ WORLD_STEP_S = 0.05
 CONTACT_REACH_M = 0.5
 """Contact is looked for among bodies this close: far more than the centimetres by which hulls are
 padded.
-"""
-
-INTO_FRONT_M = 0.5
-"""What the ego runs into may be this far behind its bumper when it is noticed: what it drives in a
-world step at 36 km/h.
 """
 
 Motion = Callable[[float], Pose]
@@ -51,37 +46,6 @@ class Actor:
     def label(self) -> int | None:
         """Index into CLASSES, None when perception does not report it."""
         return CLASSES.index(self.kind.label) if self.reported and self.kind.label else None
-
-
-@dataclass(frozen=True)
-class Impact:
-    """The ego's first contact with a `body`, at its own speed `speed_mps`.
-
-    `at_front` says whether that body lay ahead of the ego: the ego ran into it. Else it ran into
-    the ego, from the side or from behind.
-    """
-
-    body: int
-    speed_mps: float
-    at_front: bool
-
-
-@dataclass(frozen=True)
-class ClosestApproach:
-    """How close the ego came to the first-sighting actor while the world advanced.
-
-    `nearest_m` is from centre to centre and `clearance_m` from hull to hull, inf without such an
-    actor. `impact` is the ego's first contact with any body, else None.
-    """
-
-    nearest_m: float
-    clearance_m: float
-    impact: Impact | None
-
-    @property
-    def impact_speed_mps(self) -> float | None:
-        """The ego's speed at that contact, None without one."""
-        return self.impact.speed_mps if self.impact else None
 
 
 class World:
@@ -253,15 +217,12 @@ class World:
             ego_x, ego_y, _ = self.ego.pose
             nearest = float(np.hypot(x - ego_x, y - ego_y))
             clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
-        return ClosestApproach(nearest, clearance, self._impact(touched[0]) if touched else None)
-
-    def _impact(self, body: int) -> Impact:
-        box = Frame.mounted(self.ego.pose, (0.0, 0.0, 0.0)).boxes_to_local(
-            self.boxes_of(np.array([body]))
-        )
-        (half_x,), _ = half_extents(box)
-        front = self.ego_kind.size[0] / 2 - INTO_FRONT_M
-        return Impact(body, self.ego.speed, bool(box[0, 0] - half_x >= front))
+        impact = None
+        if touched:
+            (box,) = self.boxes_of(np.array(touched[:1]))
+            ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
+            impact = Impact(touched[0], self.ego.speed, ahead)
+        return ClosestApproach(nearest, clearance, impact)
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:

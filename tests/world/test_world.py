@@ -137,5 +137,5 @@ def test_what_comes_later_is_at_once_where_it_belongs(world):
 
 
 def test_an_unknown_kind_of_body_is_named(world):
-    with pytest.raises(InvalidInput, match=r"unknown kind of body 'child'; known: .*pedestrian"):
-        world.add("somebody", "child", (10.0, 0.0, 0.0))
+    with pytest.raises(InvalidInput, match=r"unknown kind of body 'unicorn'; known: .*pedestrian"):
+        world.add("somebody", "unicorn", (10.0, 0.0, 0.0))
