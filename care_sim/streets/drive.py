@@ -24,7 +24,7 @@ from care_sim.streets.encounters import Encounter, draw_encounter
 from care_sim.streets.furniture import furnish
 from care_sim.streets.layouts import LAYOUTS, Joining, Plan, Road
 from care_sim.streets.people import populate
-from care_sim.streets.room import keep_room, keep_walkers_off
+from care_sim.streets.room import VIEW_M, keep_room, keep_walkers_off
 from care_sim.world.route import Route, through
 
 CRUISE_MPS: Range = (7.0, SPEED_LIMIT_MPS)
@@ -171,8 +171,13 @@ def _encounters(
 
 
 def _is_open(plan: Plan, stretch: Stretch, along: float, s: float) -> bool:
-    """Whether there can be an encounter: not where the ego turns, nor at the mouth of a street."""
-    if not stretch.from_m <= along < stretch.to_m:
+    """Whether there can be an encounter: not in a bend, nor where the ego turns, nor at the mouth of
+    a street.
+    """
+    # Sight lines are reckoned for a straight road; no bend is shorter than these steps.
+    curve = stretch.road.curve
+    bends = any(curve.curvature_at(s - back) for back in (VIEW_M, VIEW_M / 2, 0.0))
+    if bends or not stretch.from_m <= along < stretch.to_m:
         return False
     # What the ego turns out of, or into, is a stretch that begins or ends within the way.
     before = AFTER_BEND_M if stretch.from_m > 0 else 0.0

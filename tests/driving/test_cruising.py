@@ -1,5 +1,7 @@
 """Comfortable driving: by the plan, and behind who drives ahead."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -22,13 +24,16 @@ def tracks(*rows):
     return Tracks(np.arange(count), none, boxes, velocities, none, none + 2)
 
 
-def cruising(route=Route(legs=((300.0, 0.0),))):
+STRAIGHT = Route(legs=((300.0, 0.0),))
+
+
+@cache
+def cruising(route):
     return Cruising(SpeedPlan(route, CRUISE, 2.0, 1.5), FRONT, HALF_WIDTH, KEYFRAME)
 
 
-def eased(*rows, speed=CRUISE, along=0.0, command=FREE, route=None):
-    driver = cruising(route) if route else cruising()
-    return driver.eased(command, tracks(*rows), speed, along)
+def eased(*rows, speed=CRUISE, along=0.0, command=FREE, route=STRAIGHT):
+    return cruising(route).eased(command, tracks(*rows), speed, along)
 
 
 def test_the_brake_is_left_alone():
