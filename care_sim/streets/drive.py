@@ -171,8 +171,8 @@ def _encounters(
 
 
 def _is_open(plan: Plan, stretch: Stretch, along: float, s: float) -> bool:
-    """Whether there can be an encounter: not in a bend, nor where the ego turns, nor at the mouth of
-    a street.
+    """Whether there can be an encounter: in no bend, nor where the ego turns, nor at the mouth of a
+    street.
     """
     # Sight lines are reckoned for a straight road; no bend is shorter than these steps.
     curve = stretch.road.curve
