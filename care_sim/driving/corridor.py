@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from care_sim.core.arrays import Floats
+from care_sim.core.arrays import Floats, Mask
+from care_sim.core.boxes import half_extents
 from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Tracks
 from care_sim.world.route import Route
@@ -19,9 +20,9 @@ def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     """
     if not len(tracks):
         return tracks
-    own = route.places(np.array([[sensor.x, sensor.y]]))[0]
     boxes = sensor.boxes_to_world(tracks.boxes)
-    s, d, heading = route.places(boxes[:, :2]).T
+    own, *theirs = route.places(np.vstack([[sensor.x, sensor.y], boxes[:, :2]]))
+    s, d, heading = np.array(theirs).T
     turn = heading - sensor.yaw
     straight: Floats = boxes.copy()
     straight[:, 0] = s - own[0]
@@ -29,3 +30,18 @@ def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     straight[:, 2] = tracks.boxes[:, 2]
     straight[:, 6] = boxes[:, 6] - heading
     return replace(tracks, boxes=straight, velocities=turned(tracks.velocities, -turn))
+
+
+def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float) -> Mask:
+    """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, or will
+    within `horizon_s` if they keep their velocities. Tracks as `along_route` gives them.
+    """
+    half_x, half_y = half_extents(ahead.boxes)
+    reach = reach_m + half_y
+    now = ahead.boxes[:, 1]
+    then = now + ahead.velocities[:, 1] * horizon_s
+    return (
+        (ahead.boxes[:, 0] + half_x > front_m)
+        & (np.minimum(now, then) <= reach)
+        & (np.maximum(now, then) >= -reach)
+    )

@@ -8,6 +8,7 @@ CLOSED_LOOP = {
     "CARE-CutIn-v0": "care_sim.envs.scenarios:CutInEnv",
     "CARE-R157-v0": "care_sim.envs.scenarios:R157Env",
     "CARE-NCAP-v0": "care_sim.envs.scenarios:NcapEnv",
+    "CARE-Drive-v0": "care_sim.envs.scenarios:DriveEnv",
 }
 OPEN_LOOP = {
     "CARE-Street-v0": "care_sim.envs.scenes:StreetEnv",

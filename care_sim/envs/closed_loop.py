@@ -18,7 +18,7 @@ from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_cond
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.false_box_pools import pool_of_another_drive
-from care_sim.loops.records import Keyframe
+from care_sim.loops.records import Keyframe, Outcome
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import SCENARIOS, make_scenario
@@ -238,7 +238,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         terms = self._terms(record, detectable)
         info = self._info(record, terms)
         if self._over:
-            info["outcome"] = asdict(outcome(self.keyframes))
+            info["outcome"] = asdict(self._outcome())
         reward = sum(self._weights[name] * value for name, value in terms.items())
         return self.observed(), reward, terminated, truncated, info
 
@@ -278,6 +278,10 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """
         needed = bool(self._weights["gain"]) and self._potential.bound_m is None
         return needed and self.loop.detectable()
+
+    def _outcome(self) -> Outcome:
+        """The result of the episode."""
+        return outcome(self.keyframes)
 
     def _terms(self, record: Keyframe, detectable: bool) -> dict[str, float]:
         self._in_view |= record.in_view

@@ -1,6 +1,8 @@
 """The environments of the closed loop by id: one per scenario."""
 
 from care_sim.envs.closed_loop import ClosedLoopEnv
+from care_sim.evaluation.drives import drive_outcome
+from care_sim.loops.records import DriveOutcome
 
 
 class DartoutEnv(ClosedLoopEnv):
@@ -62,3 +64,15 @@ class NcapEnv(ClosedLoopEnv):
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "ncap"
+
+
+class DriveEnv(ClosedLoopEnv):
+    """`CARE-Drive-v0`: a drive through a generated street, with bends, traffic and conflicts."""
+
+    __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
+    scenario_name = "drive"
+
+    def _outcome(self) -> DriveOutcome:
+        world = self.loop.world
+        kinds = {actor.body: actor.kind.name for actor in world.actors}
+        return drive_outcome(self.keyframes, world.meetings, kinds, world.along_m / world.goal_m)

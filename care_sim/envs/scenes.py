@@ -9,14 +9,14 @@ from care_sim.envs.sensing import Observed
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.recordings import film_of, recordings
-from care_sim.sources.streets.draft import STREET_KEYFRAME_S
-from care_sim.sources.streets.recording import street_film
+from care_sim.sources.street_films import street_film
+from care_sim.streets.draft import STREET_KEYFRAME_S
 
 
 class StreetEnv(OpenLoopEnv):
     """`CARE-Street-v0`: a generated urban street, 40 keyframes at 2 Hz, six cameras around the car.
 
-    The seed of `reset` draws the street (`care_sim.sources.streets`) and everything else that is
+    The seed of `reset` draws the street (`care_sim.streets`) and everything else that is
     random. Seeds 0 to 149 are the evaluation's: train on others. `learned-scorer` and `place`
     learned from the calibration's, 1000 to 1019. With a `secret` all streets are others, and none
     of them is in the published tables.

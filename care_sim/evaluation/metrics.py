@@ -17,14 +17,14 @@ def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
     # What a policy lets come near is counted from when it could have been seen, not while it was
     # hidden behind something.
     seen = keyframes[appeared:]
-    missed = [record.distance_m for record in seen or keyframes]
+    nearest = min(record.distance_m for record in seen or keyframes)
     impact = next(
         (record.impact_speed_mps for record in keyframes if record.impact_speed_mps is not None),
         None,
     )
     return Outcome(
         detection_distance_m=first,
-        undetected_to_m=min(missed) if first is None else None,
+        undetected_to_m=nearest if first is None and np.isfinite(nearest) else None,
         braked=any(record.braking for record in keyframes),
         min_distance_m=min((record.nearest_m for record in seen), default=None),
         clearance_m=min((record.clearance_m for record in seen), default=None),

@@ -12,11 +12,13 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
-from care_sim.core.types import Detections, Scan, Tracks
+from care_sim.core.types import Command, Detections, Scan, Tracks
 from care_sim.driving.corridor import along_route
+from care_sim.driving.cruising import Cruising
 from care_sim.driving.drivers import make_driver
 from care_sim.driving.odometry import Odometry
-from care_sim.loops.records import Keyframe
+from care_sim.loops.needless import NeedlessBraking
+from care_sim.loops.records import Keyframe, Sight
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
@@ -90,6 +92,9 @@ class ClosedLoop:
         cruise_mps = world.ego_motion.speed
         self._driver = make_driver(conditions, cruise_mps, front_m, width / 2, rig.keyframe_s)
         self.guarded_m = self._driver.guarded_m
+        plan = world.speed_plan
+        self._cruising = Cruising(plan, front_m, width / 2, rig.keyframe_s) if plan else None
+        self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions)
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -109,7 +114,9 @@ class ClosedLoop:
         detections, behind, found = self._detect(scan, bodies)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
-        command = self._driver.command(self._tracks_ahead(sensor), self.belief.ego)
+        command = self._command(sensor)
+        needless = self._needless.judge(world, sensor, command.braking)
+        sights = self._sights(found)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
         passage = world.advance(command.acceleration, self.rig.keyframe_s)
@@ -131,6 +138,9 @@ class ClosedLoop:
             nearest_m=passage.nearest_m,
             clearance_m=passage.clearance_m,
             impact_speed_mps=passage.impact_speed_mps,
+            impact=passage.impact,
+            sights=sights,
+            needless=needless,
         )
 
     def true_boxes(self, tracks: Tracks) -> Floats:
@@ -188,6 +198,15 @@ class ClosedLoop:
         found = found_objects(present, detections) & np.isin(self._reported, behind)
         return detections, behind, self._reported[found]
 
+    def _command(self, sensor: Frame) -> Command:
+        """What the car's software asks for, from the tracks of this keyframe."""
+        ahead = self._tracks_ahead(sensor)
+        ego = self.belief.ego
+        command = self._driver.command(ahead, ego)
+        if self._cruising is None:
+            return command
+        return self._cruising.eased(command, ahead, ego.speed, self.world.along_m)
+
     def _tracks_ahead(self, sensor: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""
         tracks = self._memory.tracks(sensor)
@@ -232,6 +251,15 @@ class ClosedLoop:
 
     def _local_boxes(self, bodies: Integers) -> Floats:
         return self.sensor.boxes_to_local(self.world.boxes_of(bodies))
+
+    def _sights(self, detected: Integers) -> tuple[Sight, ...]:
+        """Whom the scenario lets the ego meet, at this scan."""
+        bodies = [one.body for one in self.world.meetings]
+        ranges = planar_ranges(self._local_boxes(np.array(bodies, np.int64)))
+        return tuple(
+            Sight(distance, self.shows(body), body in detected)
+            for body, distance in zip(bodies, ranges.tolist(), strict=True)
+        )
 
     def _in_view(self) -> bool:
         target = self.world.first_sighting

@@ -3,6 +3,19 @@
 from dataclasses import dataclass
 
 from care_sim.core.grid import Cells
+from care_sim.world.approach import Impact
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One of the bodies that a drive lets the ego meet, at a scan."""
+
+    distance_m: float
+    """From the sensor to its centre, in the plane."""
+    in_view: bool
+    """Whether the unimpaired cameras show it."""
+    detected: bool
+    """Whether the detector reported it."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +48,12 @@ class Keyframe:
     """Least distance between their hulls until the next keyframe, below 0 where they overlap."""
     impact_speed_mps: float | None
     """The car's speed at its first contact with any body until the next keyframe, else None."""
+    impact: Impact | None = None
+    """That contact."""
+    sights: tuple[Sight, ...] = ()
+    """Of `World.meetings`, in their order."""
+    needless: bool = False
+    """Whether the brake was on with nothing to brake for; see `care_sim.loops.needless`."""
 
 
 @dataclass(frozen=True)
@@ -68,3 +87,52 @@ class Outcome:
     """The car's speed at its first contact with any body, None without a collision."""
     rays_fired: int
     """Cells fired in all."""
+
+
+@dataclass(frozen=True)
+class EncounterOutcome:
+    """What came of one planned encounter of a drive."""
+
+    who: str
+    """Its kind in the catalogue of bodies."""
+    side: str
+    """From which it comes, "left" or "right"."""
+    along_m: float
+    """Where on the route its line is."""
+    course: str
+    """"conflict", "near-miss" or "stop": what comes of it if the ego drives on as it means to."""
+    occluder: str
+    """The kind of what hides it."""
+    occluder_reported: bool
+    """Whether perception knows the occluder's class."""
+    set_off: bool
+    """Whether it came out at all; not where other traffic would have run it over, nor where the ego
+    never came near."""
+    view_keyframe: int | None
+    """The first keyframe at which the unimpaired cameras show it, None if never."""
+    detection_keyframe: int | None
+    """The first keyframe at which it is detected, None if never."""
+    detection_distance_m: float | None
+    """From the sensor to its centre, in the plane, at that keyframe."""
+    hit: bool
+    """Whether the episode ended with its contact."""
+
+
+@dataclass(frozen=True)
+class DriveOutcome(Outcome):
+    """The result of a drive. What `Outcome` says of the first-sighting actor is of the first
+    encounter that is a conflict, of the first encounter where none is, and None without any.
+    """
+
+    hit_kind: str | None
+    """The kind of the body that the car touched, None without a collision."""
+    hit_at_front: bool | None
+    """Whether the car ran into it. Else it ran into the car."""
+    hit_standing: bool | None
+    """Whether the car stood."""
+    needless_braking: int
+    """Keyframes with the brake on and nothing to brake for; see `care_sim.loops.needless`."""
+    progress: float
+    """Share of the way that was driven, 0 to 1."""
+    encounters: tuple[EncounterOutcome, ...]
+    """In the order of the way."""

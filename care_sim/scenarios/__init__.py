@@ -7,6 +7,7 @@ from care_sim.scenarios.base import Scenario
 from care_sim.scenarios.cutin import CutIn
 from care_sim.scenarios.dartout import Dartout
 from care_sim.scenarios.dense import Dense
+from care_sim.scenarios.drive import DriveScenario
 from care_sim.scenarios.ncap import Ncap
 from care_sim.scenarios.r157.scenario import R157
 
@@ -16,6 +17,7 @@ SCENARIOS: dict[str, type[Scenario]] = {
     "cutin": CutIn,
     "r157": R157,
     "ncap": Ncap,
+    "drive": DriveScenario,
 }
 
 

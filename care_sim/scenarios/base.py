@@ -1,4 +1,4 @@
-"""What the scenarios share: the street, and ranges that a seed draws from."""
+"""What the scenarios share: what a scenario is, and the street of the first three."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -9,11 +9,9 @@ import numpy as np
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.streets.dimensions import LANE_WIDTH_M, PARKING_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
-
-Range = tuple[float, float]
-"""Low and high. The seed draws uniformly between them."""
 
 LONGEST_EPISODE_S = 60.0
 """The longest episode: a car at 60 km/h then comes to the end of the road, and a delayed picture is
@@ -22,18 +20,10 @@ as old as an observation can say.
 EGO_SPEED_BOUNDS_MPS = (0.5, 60.0)
 """Bounds of the ego's speed: from a walk to far beyond any street's traffic."""
 
-SPEED_LIMIT_MPS = 30 / 3.6
-"""All scenarios take place in a 30 km/h zone, the residential default of many European cities."""
 NO_LIMIT_MPS = 2 * SPEED_LIMIT_MPS
 """The limit of lanes whose drivers keep the ego's speed: one below that would slow them."""
 USUAL_EGO_SPEED_MPS = (SPEED_LIMIT_MPS - 0.3, SPEED_LIMIT_MPS + 0.3)
 """30 km/h, give or take the 1 km/h by which a driver's speed varies."""
-LANE_WIDTH_M = 3.5
-"""Of a traffic lane (German RASt 06)."""
-PARKING_WIDTH_M = 2.5
-"""Of a parking lane that lorries may use (RASt 06)."""
-PAVEMENT_WIDTH_M = 2.5
-"""Between parking lane and houses (RASt 06)."""
 RIGHT_PARKING_Y = -(LANE_WIDTH_M + PARKING_WIDTH_M) / 2
 """Middle of the right parking lane of a two-lane street, from the middle of the ego's lane."""
 LEFT_PARKING_Y = LANE_WIDTH_M - RIGHT_PARKING_Y
@@ -56,11 +46,6 @@ class Scenario(ABC):
     @abstractmethod
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero. The caller closes it."""
-
-
-def draw(rng: np.random.Generator, values: Range) -> float:
-    """A uniform draw from a range (low, high)."""
-    return float(rng.uniform(*values))
 
 
 def line_with_terraces(world: World, right_y: float, left_y: float) -> None:

@@ -10,18 +10,20 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
-    LANE_WIDTH_M,
     LEFT_PARKING_Y,
     NO_LIMIT_MPS,
-    PARKING_WIDTH_M,
-    PAVEMENT_WIDTH_M,
     RIGHT_PARKING_Y,
     USUAL_EGO_SPEED_MPS,
-    Range,
-    draw,
     line_with_terraces,
 )
 from care_sim.scenarios.mirroring import MirrorableScenario
+from care_sim.streets.dimensions import (
+    LANE_WIDTH_M,
+    PARKING_WIDTH_M,
+    PAVEMENT_WIDTH_M,
+    Range,
+    draw,
+)
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk

@@ -7,14 +7,16 @@ import numpy as np
 from care_sim.base.bounds import bounded
 from care_sim.scenarios.base import (
     EGO_SPEED_BOUNDS_MPS,
-    LANE_WIDTH_M,
-    SPEED_LIMIT_MPS,
     USUAL_EGO_SPEED_MPS,
-    Range,
-    draw,
     line_with_terraces,
 )
 from care_sim.scenarios.mirroring import MirrorableScenario
+from care_sim.streets.dimensions import (
+    LANE_WIDTH_M,
+    SPEED_LIMIT_MPS,
+    Range,
+    draw,
+)
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World

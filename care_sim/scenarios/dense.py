@@ -22,8 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.base.bounds import bounded
-from care_sim.scenarios.base import LANE_WIDTH_M, LEFT_PARKING_Y, RIGHT_PARKING_Y, Range, draw
+from care_sim.scenarios.base import LEFT_PARKING_Y, RIGHT_PARKING_Y
 from care_sim.scenarios.crossing import CrossingScenario
+from care_sim.streets.dimensions import LANE_WIDTH_M, Range, draw
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.world import World
 

@@ -8,8 +8,8 @@ from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput, shortened
 from care_sim.loops.film import Film
 from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
-from care_sim.sources.streets.recording import record
-from care_sim.sources.streets.street import (
+from care_sim.sources.street_films import record
+from care_sim.streets.street import (
     CALIBRATION_SEEDS,
     EVALUATION_SEEDS,
     make_street,

@@ -17,8 +17,8 @@ from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.policies.paper.full import Full
-from care_sim.sources.streets.recording import street_film
-from care_sim.sources.streets.street import CALIBRATION_SEEDS
+from care_sim.sources.street_films import street_film
+from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
 
 

@@ -24,7 +24,7 @@ from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Arrays, Card, save_weights
-from care_sim.sources.streets.street import CALIBRATION_SEEDS
+from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.scorer_data import OTHER_CELLS, SCORER_BUDGETS, Examples, balanced, examples
 

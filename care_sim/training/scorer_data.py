@@ -33,7 +33,7 @@ from care_sim.loops.film import Film, Shot
 from care_sim.loops.open_loop import OpenLoop
 from care_sim.policies.learned.cell_inputs import CellInputs, Float32s
 from care_sim.policies.paper.history import History
-from care_sim.sources.streets.recording import street_film
+from care_sim.sources.street_films import street_film
 
 SCORER_BUDGETS = (0.03, 0.10, 0.35)
 """The paper's scarcest closed loop, the budget that both loops share, and its most generous open

@@ -155,6 +155,11 @@ CATALOGUE = {
         # A piece of garden hedge as high as a person: below the 2 m that German neighbour law
         # allows near a boundary.
         _block("hedge", None, (6.0, 0.8, 1.8), (0.2, 0.42, 0.2)),
+        # A garden wall of two metres, the highest beside a pavement that most German building codes
+        # allow without a permit.
+        _block("wall", None, (6.0, 0.24, 2.0), (0.6, 0.5, 0.42)),
+        # A skip for rubble, 7 cubic metres (DIN 30720).
+        _block("skip", None, (3.6, 1.75, 1.5), (0.8, 0.5, 0.1)),
         # A detached house of two storeys.
         _block("house", None, (11.0, 9.0, 6.5), (0.72, 0.6, 0.5)),
         _block("building", None, (18.0, 8.0, 9.0), (0.66, 0.6, 0.54)),

@@ -18,7 +18,7 @@ SAME_FACE = 9
 """Decimals to which two triangles of one face agree."""
 
 Mesh = tuple[Floats, Floats, Integers]
-Tables = tuple[Floats, Floats, Integers, Integers, Integers]
+Tables = tuple[Floats, Floats, Integers, Integers, Integers, Floats]
 
 _NOTHING: Mesh = np.empty((0, 3)), np.empty((0, 4)), np.empty((0, 2), np.int64)
 
@@ -42,14 +42,17 @@ class Polyhedra:
         """All k parts in one: corners (c, 3) in metres; faces (f, 4), outward unit normals and
         distances from the body's origin in metres; edges (e, 2), the two faces that meet in each,
         counted within the part. Then (k + 1, 3) where the rows of each part begin in these three,
-        and (k,) the body ids.
+        (k,) the body ids, and (k,) the distance of each part's farthest corner from the body's
+        origin in metres.
         """
         if self._tables is None:
             # An empty mesh first: then there is always one to join, and sums begin at 0.
             meshes = [_NOTHING, *map(_mesh, self._parts)]
             starts = np.cumsum([[len(column) for column in mesh] for mesh in meshes], axis=0)
             corners, faces, edges = (np.concatenate(column) for column in zip(*meshes, strict=True))
-            self._tables = corners, faces, edges, starts, np.array(self._owners, np.int64)
+            owners = np.array(self._owners, np.int64)
+            reaches = [np.linalg.norm(mesh[0], axis=1).max() for mesh in meshes[1:]]
+            self._tables = corners, faces, edges, starts, owners, np.array(reaches, np.float64)
         return self._tables
 
 

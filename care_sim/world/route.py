@@ -16,6 +16,8 @@ Leg = tuple[float, float]
 
 _SHARPEST_PER_M = 1.0
 """No road vehicle turns within a radius of a metre."""
+_STRAIGHT_PER_M = 1e-12
+"""A bend of less is a straight: its radius may be no number any more."""
 _FAR_M = 1e6
 """The straights before the first leg and after the last one are as good as endless."""
 
@@ -88,7 +90,7 @@ class _PlacedLeg:
     def places(self, points: Floats) -> Floats:
         """(n, 4) `s`, `d`, heading and squared distance of the nearest point of the leg."""
         x, y = turned(points - self.start[:2], -self.start[2]).T
-        if self.curvature == 0.0:
+        if abs(self.curvature) < _STRAIGHT_PER_M:
             along = np.clip(x, 0.0, self.length)
         else:
             # Seen from the centre of the circle, a point's direction says how far along the arc its

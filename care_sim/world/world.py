@@ -11,11 +11,14 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Pose
 from care_sim.core.types import CLASSES, Ego
+from care_sim.world.approach import ClosestApproach, Impact, lies_ahead
 from care_sim.world.bodies import CATALOGUE, BodyKind
 from care_sim.world.body_tables import Footprints
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.crosser import Meeting
 from care_sim.world.route import Route
 from care_sim.world.route_car import RouteCar
+from care_sim.world.speed_plan import SpeedPlan
 from care_sim.world.traffic import RoadVehicle, Traffic
 
 WORLD_STEP_S = 0.05
@@ -45,19 +48,6 @@ class Actor:
         return CLASSES.index(self.kind.label) if self.reported and self.kind.label else None
 
 
-@dataclass(frozen=True)
-class ClosestApproach:
-    """How close the ego came to the first-sighting actor while the world advanced.
-
-    `nearest_m` is from centre to centre and `clearance_m` from hull to hull, inf without such an
-    actor. `impact_speed_mps` is the ego's speed at its first contact with any body, else None.
-    """
-
-    nearest_m: float
-    clearance_m: float
-    impact_speed_mps: float | None
-
-
 class World:
     """Bodies in PyBullet, moved by highway-env, walks and events. Built by a scenario.
 
@@ -75,6 +65,12 @@ class World:
     """The way that the ego is to go, as its navigation knows it; None is straight ahead."""
     is_over: Callable[[], bool]
     """Whether nothing can happen any more that the episode is about; its scenario may set it."""
+    speed_plan: SpeedPlan | None
+    """How fast it means to go there; None is as fast as it starts. Its scenario sets it."""
+    goal_m: float
+    """Where on the route the episode ends; its scenario sets it."""
+    meetings: list[Meeting]
+    """Whom the scenario lets the ego meet, in the order of the way."""
 
     def __init__(self, traffic: Traffic, ego_speed: float, route: Route | None = None):
         self.bullet = BulletWorld()
@@ -93,8 +89,12 @@ class World:
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
         self.first_sighting = None
         self.is_over = lambda: False
+        self.speed_plan = None
+        self.goal_m = np.inf
+        self.meetings = []
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
+        self._every_step: list[Callable[[], None]] = []
         self._ego_motion = Ego(ego_speed)
         self._steps = 0
 
@@ -121,6 +121,7 @@ class World:
             kind = CATALOGUE[kind]
         body = self.bullet.add(kind, place, backdrop=backdrop)
         self._footprints.add(body, kind.size, place)
+        self._before = self._footprints.boxes[:, :2].copy()
         actor = Actor(name, kind, body, pose_at, reported)
         self.actors.append(actor)
         if not isinstance(pose, tuple):
@@ -130,6 +131,15 @@ class World:
     def at(self, time: float, event: Callable[[], None]) -> None:
         """Call `event` once, at the first world step at or after `time`."""
         self._events.append((time, event))
+
+    def at_every_step(self, event: Callable[[], None]) -> None:
+        """Call `event` at every world step, when the ego has moved and the clock with it."""
+        self._every_step.append(event)
+
+    @property
+    def along_m(self) -> float:
+        """How far the ego's middle is along its route, or straight ahead."""
+        return self.ego.along if isinstance(self.ego, RouteCar) else self.ego.pose[0]
 
     @property
     def ego_motion(self) -> Ego:
@@ -148,6 +158,11 @@ class World:
         """(n, 7) boxes of bodies (n,) in the world frame."""
         return self._footprints.boxes[bodies]
 
+    def velocities_of(self, bodies: Integers) -> Floats:
+        """(n, 2) velocities of bodies (n,) in the world frame, m/s, over the last world step."""
+        moved = self._footprints.boxes[bodies, :2] - self._before[bodies]
+        return np.asarray(moved / WORLD_STEP_S)
+
     def advance(self, acceleration: float, duration: float) -> ClosestApproach:
         """Move everything by `duration` seconds, a whole number of world steps. The ego holds
         `acceleration` (m/s^2) meanwhile.
@@ -155,7 +170,7 @@ class World:
         # Looked at after every step: between two keyframes the car may hit something and be past
         # it, or come closest to it.
         steps = [self._step(acceleration) for _ in range(whole_steps(duration))]
-        impacts = (step.impact_speed_mps for step in steps if step.impact_speed_mps is not None)
+        impacts = (step.impact for step in steps if step.impact is not None)
         return ClosestApproach(
             min(step.nearest_m for step in steps),
             min(step.clearance_m for step in steps),
@@ -179,7 +194,7 @@ class World:
         # which has its turn at the next step if it is due already.
         due = [event for start, event in self._events if start <= self.time]
         self._events = [(start, event) for start, event in self._events if start > self.time]
-        for event in due:
+        for event in (*due, *self._every_step):
             event()
         self._ego_motion = Ego(
             self.ego.speed, self.ego.yaw_rate, (self.ego.speed - before) / WORLD_STEP_S
@@ -188,6 +203,7 @@ class World:
         # Poses are read after events, which may change who moves.
         bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
+        self._before = self._footprints.boxes[:, :2].copy()
         self.bullet.move_all(bodies, poses)
         self._footprints.move_all(bodies, poses)
         return self._approach()
@@ -195,16 +211,23 @@ class World:
     def _approach(self) -> ClosestApproach:
         # The exact distance is PyBullet's; asking it about every body would take most of a step.
         near = self._footprints.near(self.ego_body, CONTACT_REACH_M).tolist()
-        touched = any(
-            self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0 for body in near
-        )
+        touched = [
+            body
+            for body in near
+            if self.bullet.clearance(self.ego_body, body, CONTACT_REACH_M) <= 0.0
+        ]
         nearest = clearance = np.inf
         if self.first_sighting is not None:
             x, y, _ = self.first_sighting.pose_at(self.time)
             ego_x, ego_y, _ = self.ego.pose
             nearest = float(np.hypot(x - ego_x, y - ego_y))
             clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
-        return ClosestApproach(nearest, clearance, self.ego.speed if touched else None)
+        impact = None
+        if touched:
+            (box,) = self.boxes_of(np.array(touched[:1]))
+            ahead = lies_ahead(box, self.ego.pose, self.ego_kind.size[0])
+            impact = Impact(touched[0], self.ego.speed, ahead)
+        return ClosestApproach(nearest, clearance, impact)
 
 
 def _motion(pose: Pose | Motion | RoadVehicle) -> Motion:

@@ -13,8 +13,8 @@ from hypothesis.extra.numpy import arrays
 
 from care_sim.base.portable_hash import STEP, portable_bytes
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations
-from care_sim.sources.streets.recording import record
-from care_sim.sources.streets.street import make_street
+from care_sim.sources.street_films import record
+from care_sim.streets.street import make_street
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode
 from care_sim.study.scene_play import film_hash

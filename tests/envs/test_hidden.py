@@ -11,7 +11,7 @@ import pytest
 from care_sim.base.errors import InvalidInput
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import OpenLoopEnv
-from care_sim.sources.streets.street import make_street
+from care_sim.streets.street import make_street
 
 OWN = {"CARE-Dense-v0": {"fired", "braking", "time_s"}, "CARE-Replay-v0": {"fired", "time_s"}}
 NOTHING = np.zeros((32, 512), np.float32)

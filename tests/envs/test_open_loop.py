@@ -17,8 +17,8 @@ from care_sim.envs.open_loop import FilmEnv
 from care_sim.evaluation.recall import score_scene
 from care_sim.evaluation.sightings import Sightings
 from care_sim.loops.film import Film
-from care_sim.sources.streets import recording
-from care_sim.sources.streets.recording import street_film
+from care_sim.sources import street_films
+from care_sim.sources.street_films import street_film
 from tests.helpers.av2_log import at, box, write
 
 EXPLAINED = ("symmetric and normalized Box action space", "unconventional shape")
@@ -217,15 +217,15 @@ def test_a_camera_one_keyframe_old_shows_the_keyframe_before(replay):
 def test_a_street_is_drawn_by_the_seed_and_filmed_once(monkeypatch, short_streets):
     drawn = []
     filmed = []
-    make_street = recording.make_street
-    record = recording.record
+    make_street = street_films.make_street
+    record = street_films.record
     monkeypatch.setattr(
-        recording, "make_street", lambda seed: drawn.append(seed) or make_street(seed)
+        street_films, "make_street", lambda seed: drawn.append(seed) or make_street(seed)
     )
     monkeypatch.setattr(
-        recording, "record", lambda street: filmed.append(street.name) or record(street)
+        street_films, "record", lambda street: filmed.append(street.name) or record(street)
     )
-    recording._street_film.cache_clear()
+    street_films._street_film.cache_clear()
     for budget in (0.1, 0.2):
         env = gymnasium.make("CARE-Street-v0", disable_env_checker=True, budget=budget)
         _, info = env.reset(seed=7)

@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import cache
 from unittest import mock
 
-from care_sim.sources.streets import recording
-from care_sim.sources.streets.layouts import LAYOUTS
-from care_sim.sources.streets.recording import record
-from care_sim.sources.streets.street import make_street
+from care_sim.sources import street_films
+from care_sim.sources.street_films import record
+from care_sim.streets.layouts import LAYOUTS
+from care_sim.streets.street import make_street
 
 KEYFRAMES = 10
 _films = {}
@@ -32,10 +32,10 @@ def few_and_short():
     ends after 10 keyframes in the place of 40. A whole film takes three seconds, and the checkers
     of Gymnasium and Stable-Baselines3 ask for ten to thirty of them.
     """
-    with mock.patch.multiple(recording, make_street=_short_street, record=_filmed):
-        recording._street_film.cache_clear()
+    with mock.patch.multiple(street_films, make_street=_short_street, record=_filmed):
+        street_films._street_film.cache_clear()
         yield
-    recording._street_film.cache_clear()
+    street_films._street_film.cache_clear()
 
 
 @cache

@@ -1,5 +1,5 @@
-"""The encounter of every scenario, seen by a full scan and the unimpaired camera of an ego that
-never brakes.
+"""The encounter of the paper's scenarios, seen by a full scan and the unimpaired camera of an ego
+that never brakes.
 """
 
 from dataclasses import dataclass

@@ -55,7 +55,7 @@ def prepare(name):
     """
     import care_sim.reports.page.build
     import care_sim.reports.report
-    import care_sim.sources.streets.recording
+    import care_sim.sources.street_films
     import care_sim.study.episode_play
     import care_sim.study.scene_play
 

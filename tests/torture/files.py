@@ -18,7 +18,7 @@ LIMIT_S = 10.0
 
 def prepare(_name):
     import care_sim.reports.page.build
-    import care_sim.sources.streets.recording
+    import care_sim.sources.street_films
     import care_sim.study.scene_play
     import care_sim.training.curves_figure  # noqa: F401
 

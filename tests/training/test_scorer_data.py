@@ -5,8 +5,8 @@ import pytest
 
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.policies.learned.cell_inputs import RIG_INPUTS, SCAN_INPUTS
-from care_sim.sources.streets.recording import street_film
-from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS
+from care_sim.sources.street_films import street_film
+from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS
 from care_sim.training.scorer import HELD_OUT
 from care_sim.training.scorer_data import (
     OTHER_CELLS,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from care_sim import InvalidInput
@@ -33,6 +33,7 @@ def test_curvature_is_that_of_the_leg():
 
 
 @given(LEGS, st.floats(-20.0, 150.0), st.floats(-3.0, 3.0))
+@example(((1.0, 2.2e-311),), 1.5, 1.0)
 def test_a_place_beside_the_line_is_found_again(legs, s, d):
     route = Route((3.0, -2.0, 0.7), legs)
     x, y, heading = route.pose(s)

@@ -9,14 +9,7 @@ from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.core.frames import Pose
-from care_sim.scenarios.base import (
-    LANE_WIDTH_M,
-    LONGEST_EPISODE_S,
-    NO_LIMIT_MPS,
-    Range,
-    Scenario,
-    draw,
-)
+from care_sim.scenarios.base import LONGEST_EPISODE_S, NO_LIMIT_MPS, Scenario
 from care_sim.scenarios.ncap.approach import across, ahead, braking_ahead
 from care_sim.scenarios.ncap.forms import (
     Across,
@@ -39,6 +32,7 @@ from care_sim.scenarios.ncap.table import (
     TESTS,
 )
 from care_sim.scenarios.ncap.turning import across_exit, oncoming
+from care_sim.streets.dimensions import LANE_WIDTH_M, Range, draw
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic

@@ -10,10 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
-from care_sim.scenarios.base import LANE_WIDTH_M
 from care_sim.scenarios.ncap.approach import run_up
 from care_sim.scenarios.ncap.forms import AcrossExit, Bend, Target
 from care_sim.scenarios.ncap.meeting import CLEAR_M, Crossing, Ego, Meeting
+from care_sim.streets.dimensions import LANE_WIDTH_M
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.route import Leg, Route
 from care_sim.world.straight_way import StraightWay

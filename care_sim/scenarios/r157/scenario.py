@@ -8,7 +8,7 @@ from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_known, check_number
 from care_sim.base.errors import InvalidInput
 from care_sim.driving.human_model import HUMAN_MODEL
-from care_sim.scenarios.base import LONGEST_EPISODE_S, Range, Scenario, draw
+from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.scenarios.r157.grid import (
     EGO_KPH,
     GAP_M,
@@ -23,6 +23,7 @@ from care_sim.scenarios.r157.grid import (
     cases,
 )
 from care_sim.scenarios.r157.preventable import preventable
+from care_sim.streets.dimensions import Range, draw
 from care_sim.world.lane_change import LaneChange
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World

@@ -38,7 +38,7 @@ class Meshes(NamedTuple):
     `care_sim.world.polyhedra.Polyhedra.tables`: `corners` (c, 3); `faces` (f, 4), outward normals
     and distances from the body's origin; `edges` (e, 2), the two faces that meet in each, counted
     within the part; `starts` (k + 1, 3), where the rows of a part begin in these three; `owners`
-    (k,) body ids.
+    (k,) body ids; `reaches` (k,) how far each part reaches from the body's origin.
     """
 
     corners: Floats
@@ -46,6 +46,7 @@ class Meshes(NamedTuple):
     edges: Integers
     starts: Integers
     owners: Integers
+    reaches: Floats
 
 
 class BodyInCamera(NamedTuple):
@@ -61,7 +62,7 @@ def render_bodies(
     lens: tuple[float, float, float],
     window: PixelWindow,
     depths: tuple[float, float],
-    meshes: tuple[Floats, Floats, Integers, Integers, Integers],
+    meshes: tuple[Floats, Floats, Integers, Integers, Integers, Floats],
     poses: Floats,
 ) -> Integers:
     """(height, width) body ids of the pixels of `window` (left, top, right, bottom), NO_BODY where
@@ -81,9 +82,13 @@ def render_bodies(
     ids = np.full((bottom - top, right - left), NO_BODY)
     inverse_depths = np.full(ids.shape, 1.0 / farthest)
 
-    # Part after part into one depth buffer. Its rows in the picture come first: a part above or
-    # below the window costs no more than its corners.
+    # Part after part into one depth buffer. Whether the ball that holds it meets the view comes
+    # first, then its rows in the picture: a part above or below the window costs no more than its
+    # corners.
+    view = nearest, farthest, left, right
     for part, owner in enumerate(table.owners):
+        if _is_outside(eye, poses[owner], table.reaches[part], optics, view):
+            continue
         begin, end = table.starts[part], table.starts[part + 1]
         body = _seen_from(eye, poses[owner])
         upper, lower = _rows(table.corners[begin[0] : end[0]], body, optics, nearest)
@@ -129,6 +134,32 @@ def visible_boxes(ids: Integers) -> Integers:
                 one[4] = row + 1
                 one[5] += 1
     return found[found[:, 5] > 0]
+
+
+@compiled()
+def _is_outside(
+    camera: PlacedCamera,
+    pose: Floats,
+    reach: float,
+    lens: Lens,
+    view: tuple[float, float, int, int],
+) -> bool:
+    """Whether a ball of radius `reach` about the position of `pose` (7,) lies wholly outside of a
+    view: nearer or farther than its first two numbers, or beside the columns of the other two.
+    """
+    nearest, farthest, first, last = view
+    place = camera.place
+    away = pose[0] - place[0], pose[1] - place[1], pose[2] - place[2]
+    depth = dot(camera.axes[0], away)
+    if depth + reach < nearest or depth - reach > farthest:
+        return True
+    # The plane of the eye and a column u is left * focal = (across - u) * depth. A column more on
+    # either side is room for rounding.
+    left = dot(camera.axes[1], away) * lens.focal
+    before, beyond = lens.across - first + 1.0, lens.across - last - 1.0
+    return left - before * depth > reach * math.hypot(
+        lens.focal, before
+    ) or beyond * depth - left > reach * math.hypot(lens.focal, beyond)
 
 
 @compiled()

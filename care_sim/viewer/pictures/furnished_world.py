@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from care_sim.core.frames import Pose
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.world.bodies import BodyKind, Part, Triple
 from care_sim.world.bullet import BulletWorld
@@ -21,6 +22,12 @@ CHASE_CAMERA = PinholeCamera(
 
 METRE_MARKS = (10.0, 20.0, 30.0, 40.0)
 """Distances ahead of the LiDAR at which the path carries a bar, metres."""
+
+BENDING_PIECES = 40
+OVERLAP = 1.3
+"""A path that may bend is laid in so many pieces, each longer by this factor than its share: no
+cracks show on the outside of a bend.
+"""
 
 _ASPHALT = (0.36, 0.36, 0.38)
 _PATH = (0.47, 0.47, 0.5)
@@ -48,14 +55,28 @@ def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float)
     metres.
     """
     # Path and bars stand 2 cm over what is below them, so that they are what is seen.
-    x, y, yaw = world.ego.pose
-    for kind, ahead in (
-        (_slab("path", (METRE_MARKS[-1], guarded_m, 0.02), 0.01, _PATH), METRE_MARKS[-1] / 2),
-        *((_slab("bar", (0.15, guarded_m, 0.04), 0.02, _BAR), mark) for mark in METRE_MARKS),
-    ):
-        reach = sensor_x + ahead
-        scene.add(kind, (x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw))
+    reach = METRE_MARKS[-1]
+    pieces = 1 if world.route is None else BENDING_PIECES
+    length = reach / pieces
+    size = length if pieces == 1 else length * OVERLAP, guarded_m, 0.02
+    path = _slab("path", size, 0.01, _PATH)
+    for piece in range(pieces):
+        scene.add(path, way_ahead(world, sensor_x, (piece + 0.5) * length))
+    for mark in METRE_MARKS:
+        bar = _slab("bar", (0.15, guarded_m, 0.04), 0.02, _BAR)
+        scene.add(bar, way_ahead(world, sensor_x, mark))
     scene.add(world.ego_kind, world.ego.pose)
+
+
+def way_ahead(world: World, sensor_x: float, ahead: float) -> Pose:
+    """World pose of the middle of the way `ahead` metres before the LiDAR, which is `sensor_x`
+    ahead of the car's centre.
+    """
+    if world.route is not None:
+        return world.route.pose(world.along_m + sensor_x + ahead)
+    x, y, yaw = world.ego.pose
+    reach = sensor_x + ahead
+    return x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw
 
 
 def _slab(name: str, size: Triple, middle_z: float, colour: Triple) -> BodyKind:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.residual import explained
@@ -27,6 +28,7 @@ from care_sim.viewer.pictures.furnished_world import (
     METRE_MARKS,
     add_car,
     furnished,
+    way_ahead,
 )
 
 PICTURE_WIDTH = 960
@@ -106,9 +108,10 @@ def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe |
 
 def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None) -> None:
     draw = ImageDraw.Draw(chase)
-    # Numbers stand beside the bars, 1.6 m to the left, on the ground below the LiDAR.
+    # Numbers stand beside the bars, 1.6 m to the left, on the ground.
     for metres in METRE_MARKS:
-        ground = np.array([metres, 1.6, -LIDAR_POSITION[2], 0.0, 0.0, 0.0, 0.0])
+        bar = Frame.mounted(way_ahead(loop.world, LIDAR_POSITION[0], metres), (0.0, 1.6, 0.0))
+        (ground,) = loop.sensor.boxes_to_local(np.array([[bar.x, bar.y, *[0.0] * 5]]))
         if at := drawing.point_above(CHASE_CAMERA, ground):
             draw.text(at, f"{metres:.0f} m", INK, drawing.font(12), anchor="rm")
     mark_tracks(draw, CHASE_CAMERA, loop.belief.tracks)
@@ -151,12 +154,13 @@ def mark_first_sighting(
 def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
     seen = loop.belief.detections
     known = explained(seen, loop.belief.tracks, loop.rig)
-    names = [CLASSES[number] for number in seen.classes]
+    # The picture is that of the first camera.
+    (own,) = np.nonzero(seen.cameras == 0)
     drawing.image_boxes(
         ImageDraw.Draw(camera),
-        seen.boxes,
-        names,
-        [TRACKED_COLOUR if is_known else _UNEXPLAINED_COLOUR for is_known in known],
+        seen.boxes[own],
+        [CLASSES[number] for number in seen.classes[own]],
+        [TRACKED_COLOUR if is_known else _UNEXPLAINED_COLOUR for is_known in known[own]],
     )
 
 

@@ -84,12 +84,17 @@ class PictureLog:
             f"false {name}" if false else name
             for name, false in zip(_names(seen), situation.false, strict=True)
         ]
-        for kind, chosen in (("explained", situation.known), ("residual", ~situation.known)):
+        # The picture is that of the first camera.
+        own = seen.cameras == 0
+        for kind, known in (("explained", situation.known), ("residual", ~situation.known)):
+            chosen = own & known
             self._log_named(kind, seen.boxes[chosen], list(compress(names, chosen)))
+        missed = situation.missed
+        own = missed.cameras == 0
         self._log_named(
             "missed",
-            situation.missed.boxes,
-            [f"missed {name}" for name in _names(situation.missed)],
+            missed.boxes[own],
+            list(compress([f"missed {name}" for name in _names(missed)], own)),
         )
 
     def _log_named(self, kind: str, boxes: Floats, names: list[str]) -> None:

@@ -63,7 +63,8 @@ def dense():
 @pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_it_has_one_size_before_and_after_the_first_scan(name):
     env, policy = make(name, render_mode="rgb_array")
-    observation, _ = env.reset(seed=1)
+    # A seed with which the drive has somebody who hides, too.
+    observation, _ = env.reset(seed=3)
     before = env.render()
     env.step(policy(observation))
     after = env.render()

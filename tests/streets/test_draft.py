@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from care_sim.sources.streets.draft import TIMES, Draft, footprints_meet
+from care_sim.streets.draft import TIMES, Draft, footprints_meet
 
 SQUARE = np.array([[2.0, 2.0]])
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
-from care_sim.sources.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
-from care_sim.sources.streets.drivers import BEYOND_M, drive_joining, drive_main
-from care_sim.sources.streets.furniture import JOINING_M, furnish
-from care_sim.sources.streets.layouts import LAYOUTS
-from care_sim.sources.streets.people import cross_and_emerge, populate
+from care_sim.streets.draft import STEP_S, STREET_KEYFRAME_S, Draft
+from care_sim.streets.drivers import BEYOND_M, drive_joining, drive_main
+from care_sim.streets.furniture import JOINING_M, furnish
+from care_sim.streets.layouts import LAYOUTS
+from care_sim.streets.people import cross_and_emerge, populate
 
 EVALUATION_SEEDS = tuple(range(150))
 """150 scenes, as many as the validation split of nuScenes has. They are the first: nobody chose

@@ -12,10 +12,15 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.types import Ego
-from care_sim.scenarios.base import LANE_WIDTH_M, SPEED_LIMIT_MPS, Range, draw
-from care_sim.sources.streets.curve import Curve
-from care_sim.sources.streets.draft import STEP_S, TIMES, Draft
-from care_sim.sources.streets.layouts import Joining, Plan, Road
+from care_sim.streets.curve import Curve
+from care_sim.streets.dimensions import (
+    LANE_WIDTH_M,
+    SPEED_LIMIT_MPS,
+    Range,
+    draw,
+)
+from care_sim.streets.draft import STEP_S, TIMES, Draft
+from care_sim.streets.layouts import Joining, Plan, Road
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.traffic import RoadVehicle, Traffic
 
@@ -116,8 +121,8 @@ def drive_joining(draft: Draft, joining: Joining, main: Road) -> None:
     traffic = Traffic(
         road.directions, ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS
     )
-    leaving = _places(draft, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
-    coming = _places(draft, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
+    leaving = flow_places(draft.rng, SIDE_FLOW_PER_H, nearest + 5.0, BEYOND_M)
+    coming = flow_places(draft.rng, SIDE_FLOW_PER_H, nearest + 25.0, 2 * BEYOND_M)
     drivers = [_driver(draft, traffic, s, 0) for s in leaving] + [
         _driver(draft, traffic, s, 1) for s in coming
     ]
@@ -136,35 +141,45 @@ Driver = tuple[str, RoadVehicle]
 
 def _queue(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
     """Those who drive along with the ego, ahead of it and behind."""
-    ahead = _places(draft, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
-    behind = [-s for s in _places(draft, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
+    ahead = flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), reach + BEYOND_M)
+    behind = [-s for s in flow_places(draft.rng, FLOW_PER_H, draw(draft.rng, LEAD_M), BEYOND_M)]
     return [_driver(draft, traffic, s, 0, SPEED_LIMIT_MPS) for s in ahead + behind]
 
 
 def _oncoming(draft: Draft, traffic: Traffic, reach: float) -> list[Driver]:
     """Those who come towards the ego, from as far as they can still meet it."""
     farthest = reach + BEYOND_M + SPEED_LIMIT_MPS * float(TIMES[-1])
-    return [_driver(draft, traffic, s, 1) for s in _places(draft, FLOW_PER_H, -BEYOND_M, farthest)]
+    return [
+        _driver(draft, traffic, s, 1)
+        for s in flow_places(draft.rng, FLOW_PER_H, -BEYOND_M, farthest)
+    ]
 
 
-def _places(draft: Draft, flow_per_h: Range, first: float, last: float) -> list[float]:
+def flow_places(
+    rng: np.random.Generator, flow_per_h: Range, first: float, last: float
+) -> list[float]:
     """Places along a lane, from `first` to `last`, of vehicles that flow at the speed limit."""
     # Cowan's headway: a least one, and an exponential rest with the mean that the flow asks for.
-    mean_s = 3600.0 / draw(draft.rng, flow_per_h)
+    mean_s = 3600.0 / draw(rng, flow_per_h)
     places = []
-    place = first + draft.rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
+    place = first + rng.exponential(mean_s - HEADWAY_S) * SPEED_LIMIT_MPS
     while place < last:
         places.append(float(place))
-        place += (HEADWAY_S + draft.rng.exponential(mean_s - HEADWAY_S)) * SPEED_LIMIT_MPS
+        place += (HEADWAY_S + rng.exponential(mean_s - HEADWAY_S)) * SPEED_LIMIT_MPS
     return places
 
 
 def _driver(
     draft: Draft, traffic: Traffic, s: float, lane: int, speed: float | None = None
 ) -> Driver:
-    kind = str(draft.rng.choice(list(TRAFFIC_KINDS), p=list(TRAFFIC_KINDS.values())))
+    kind = traffic_kind(draft.rng)
     wanted = draw(draft.rng, DRIVER_MPS) if speed is None else speed
     return kind, traffic.add_driver(s, lane, wanted, CATALOGUE[kind])
+
+
+def traffic_kind(rng: np.random.Generator) -> str:
+    """The kind of a vehicle that drives."""
+    return str(rng.choice(list(TRAFFIC_KINDS), p=list(TRAFFIC_KINDS.values())))
 
 
 def _run(traffic: Traffic, vehicles: list[RoadVehicle], ego_speeds: Floats | None = None) -> Floats:

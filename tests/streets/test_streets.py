@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from care_sim.evaluation.sightings import Sightings
-from care_sim.sources.streets.draft import STREET_KEYFRAME_S, footprints_meet
-from care_sim.sources.streets.layouts import LAYOUTS
-from care_sim.sources.streets.people import (
+from care_sim.sources.street_films import record
+from care_sim.streets.draft import STREET_KEYFRAME_S, footprints_meet
+from care_sim.streets.layouts import LAYOUTS
+from care_sim.streets.people import (
     CYCLING_MPS,
     CYCLING_SPREAD_MPS,
     WALKING_MPS,
     WALKING_SPREAD_MPS,
 )
-from care_sim.sources.streets.recording import record
-from care_sim.sources.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
+from care_sim.streets.street import CALIBRATION_SEEDS, EVALUATION_SEEDS, make_street
 from care_sim.world.bodies import CATALOGUE
 
 SEEDS = (0, 1, 2, 3, 6, 1001)

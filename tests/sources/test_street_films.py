@@ -8,8 +8,8 @@ from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.confidence import FULL_CONFIDENCE, MIN_PIXELS
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS
-from care_sim.sources.streets.recording import SIGHT_M, record
-from care_sim.sources.streets.street import Street, make_street
+from care_sim.sources.street_films import SIGHT_M, record
+from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from tests.helpers.short_streets import part_of
 

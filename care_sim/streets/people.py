@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from care_sim.core.arrays import Floats
-from care_sim.scenarios.base import Range, draw
-from care_sim.sources.streets.curve import Walked
-from care_sim.sources.streets.draft import TIMES, Draft
-from care_sim.sources.streets.furniture import Span
-from care_sim.sources.streets.layouts import EVEN_CHANCE, Road, Side
+from care_sim.streets.curve import Walked
+from care_sim.streets.dimensions import Range, draw
+from care_sim.streets.draft import Draft
+from care_sim.streets.furniture import Span
+from care_sim.streets.layouts import EVEN_CHANCE, Road, Side
 
 WALKING_MPS = 1.34
 WALKING_SPREAD_MPS = 0.26
@@ -101,8 +101,8 @@ def _walk(draft: Draft, road: Road, *corners: tuple[float, float], passes: float
     speed = _speed(draft.rng, WALKING_MPS, WALKING_SPREAD_MPS)
     # Back from the moment at which `passes` metres are done to that of the first one, which may lie
     # before the scene.
-    starts = draft.rng.uniform(0.0, float(TIMES[-1])) - passes / speed
-    return Walked(road.curve, corners, speed, float(starts)).poses(TIMES)
+    starts = draft.rng.uniform(0.0, float(draft.times[-1])) - passes / speed
+    return Walked(road.curve, corners, speed, float(starts)).poses(draft.times)
 
 
 def _waiting(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
@@ -115,8 +115,8 @@ def _strolling(draft: Draft, road: Road, side: Side, span: Span) -> Floats:
     """Along a pavement."""
     s = draft.rng.uniform(*span)
     d = _pavement_d(draft, side)
-    ahead = float(draft.rng.choice((-1, 1))) * _far()
-    return _walk(draft, road, (s - ahead, d), (s + ahead, d), passes=_far())
+    ahead = float(draft.rng.choice((-1, 1))) * _far(draft)
+    return _walk(draft, road, (s - ahead, d), (s + ahead, d), passes=_far(draft))
 
 
 def _crossing(draft: Draft, road: Road, span: Span) -> Floats:
@@ -124,9 +124,9 @@ def _crossing(draft: Draft, road: Road, span: Span) -> Floats:
     s = draft.rng.uniform(*span)
     sides = road.sides if draft.rng.random() < EVEN_CHANCE else road.sides[::-1]
     near, far = (_pavement_d(draft, side) for side in sides)
-    before, after = (float(way) * _far() for way in draft.rng.choice((-1, 1), 2))
+    before, after = (float(way) * _far(draft) for way in draft.rng.choice((-1, 1), 2))
     return _walk(
-        draft, road, (s + before, near), (s, near), (s, far), (s + after, far), passes=_far()
+        draft, road, (s + before, near), (s, near), (s, far), (s + after, far), passes=_far(draft)
     )
 
 
@@ -136,7 +136,7 @@ def _emerging(draft: Draft, road: Road, span: Span) -> Floats:
     s = draft.rng.uniform(*span)
     d = _pavement_d(draft, side)
     depth = side.sign * (side.front_m + 5.0)
-    after = float(draft.rng.choice((-1, 1))) * _far()
+    after = float(draft.rng.choice((-1, 1))) * _far(draft)
     return _walk(draft, road, (s, depth), (s, d), (s + after, d), passes=abs(depth - d))
 
 
@@ -154,13 +154,13 @@ def _cycle(draft: Draft, road: Road, side: Side, span: Span) -> None:
     """
     per_m = draw(draft.rng, CYCLISTS_PER_H) / 3600.0 / CYCLING_MPS
     along = -side.sign
-    reach = along * 2 * CYCLING_MPS * float(TIMES[-1])
+    reach = along * 2 * CYCLING_MPS * float(draft.times[-1])
     # Also those who come into the span during the scene: they start as far before it as they get.
     for _ in range(draft.rng.poisson(per_m * (span[1] - span[0] + abs(reach)))):
         s = draft.rng.uniform(min(span[0], span[0] - reach), max(span[1], span[1] - reach))
         speed = _speed(draft.rng, CYCLING_MPS, CYCLING_SPREAD_MPS)
         way = Walked(road.curve, ((s, side.cycle_d), (s + reach, side.cycle_d)), speed)
-        draft.move("bicycle", way.poses(TIMES), PERSON_BERTH_M)
+        draft.move("bicycle", way.poses(draft.times), PERSON_BERTH_M)
 
 
 def _pavement_d(draft: Draft, side: Side) -> float:
@@ -169,6 +169,6 @@ def _pavement_d(draft: Draft, side: Side) -> float:
     )
 
 
-def _far() -> float:
+def _far(draft: Draft) -> float:
     """Further than anybody walks in a scene."""
-    return (WALKING_MPS + 2 * WALKING_SPREAD_MPS) * float(TIMES[-1] + 1.0)
+    return (WALKING_MPS + 2 * WALKING_SPREAD_MPS) * float(draft.times[-1] + 1.0)

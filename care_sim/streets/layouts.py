@@ -2,7 +2,7 @@
 everything else is placed on them.
 
 A road's reference line (d = 0) is the middle of the lane that leads along it; traffic keeps right.
-Widths follow the German RASt 06 (directives for urban streets), as in `care_sim.scenarios.base`.
+Widths follow the German RASt 06 (directives for urban streets), see `care_sim.streets.dimensions`.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.frames import Pose
-from care_sim.scenarios.base import LANE_WIDTH_M, PARKING_WIDTH_M, PAVEMENT_WIDTH_M, Range, draw
-from care_sim.sources.streets.curve import Curve
+from care_sim.streets.curve import Curve
+from care_sim.streets.dimensions import (
+    LANE_WIDTH_M,
+    PARKING_WIDTH_M,
+    PAVEMENT_WIDTH_M,
+    Range,
+    draw,
+)
 
 PAVEMENT_M: Range = (PAVEMENT_WIDTH_M, 4.0)
 """From the least of RASt 06 to that of a shopping street."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_sim.scenarios.base import Range, draw
-from care_sim.sources.streets.draft import Draft
-from care_sim.sources.streets.layouts import Joining, Plan, Road, Side
+from care_sim.streets.dimensions import Range, draw
+from care_sim.streets.draft import Draft
+from care_sim.streets.layouts import Joining, Plan, Road, Side
 from care_sim.world.bodies import CATALOGUE
 
 OCCUPANCY: Range = (0.1, 0.85)
@@ -49,12 +49,12 @@ JOINING_M = 60.0
 Span = tuple[float, float]
 
 
-def furnish(draft: Draft, plan: Plan, span: Span) -> None:
-    """Fill the main road over `span` (metres along it), and its side streets."""
+def furnish(draft: Draft, plan: Plan, span: Span, joining_m: float = JOINING_M) -> None:
+    """Fill the main road over `span` (metres along it), and its side streets over `joining_m`."""
     # What must stay free comes first, then the bus, which is longer than most gaps between the
     # rest.
     for joining in plan.joinings:
-        _keep_mouth_clear(draft, joining, plan.main)
+        _keep_mouth_clear(draft, joining, plan.main, joining_m)
     if draft.rng.random() < BUS_STOP_CHANCE:
         _stop_bus(draft, plan.main, (0.0, span[1]))
     for side in plan.main.sides:
@@ -64,12 +64,12 @@ def furnish(draft: Draft, plan: Plan, span: Span) -> None:
         beside = plan.main.side(joining.sign)
         for side in joining.road.sides:
             _line_with_houses(
-                draft, joining.road, side, (beside.front_m, beside.front_m + JOINING_M)
+                draft, joining.road, side, (beside.front_m, beside.front_m + joining_m)
             )
-            _park(draft, joining.road, side, (beside.kerb_m + CORNER_M, beside.front_m + JOINING_M))
+            _park(draft, joining.road, side, (beside.kerb_m + CORNER_M, beside.front_m + joining_m))
 
 
-def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road) -> None:
+def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road, reach_m: float) -> None:
     """Keep a side street's carriageway free, and the main road's parking lane at its corners."""
     road = joining.road
     right, left = road.sides
@@ -80,8 +80,8 @@ def _keep_mouth_clear(draft: Draft, joining: Joining, main: Road) -> None:
     draft.reserve(road.curve.to_world(np.array([kerb / 2, road.middle_d, 0.0])), (kerb, corners))
     middle = (left.lane_edge_m - right.lane_edge_m) / 2
     draft.reserve(
-        road.curve.to_world(np.array([JOINING_M, middle, 0.0])),
-        (2 * JOINING_M, left.lane_edge_m + right.lane_edge_m),
+        road.curve.to_world(np.array([reach_m, middle, 0.0])),
+        (2 * reach_m, left.lane_edge_m + right.lane_edge_m),
     )
 
 

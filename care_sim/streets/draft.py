@@ -98,11 +98,12 @@ SQUEEZE_M = 0.15
 
 class Draft:
     """Bodies by kind with their ways, the ground that must stay free, and the generator that draws
-    them.
+    them. Ways are sampled at `times` (t,), seconds.
     """
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, times: Floats = TIMES) -> None:
         self.rng = rng
+        self.times = times
         self.kinds: list[str] = []
         self.ways: list[Floats] = []
         self._fixed = PlacedBodies()
@@ -128,7 +129,7 @@ class Draft:
         ):
             return False
         self._fixed.add(way, size, TOUCH_M)
-        self._keep(kind, np.repeat(way, len(TIMES), axis=0))
+        self._keep(kind, np.repeat(way, len(self.times), axis=0))
         return True
 
     def move(self, kind: str, way: Floats, berth: float) -> bool:

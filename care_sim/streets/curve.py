@@ -79,14 +79,12 @@ class Walked:
 
     def _points(self) -> Floats:
         """(n, 2) world points of the way, about a stride apart at most, to follow bends."""
-        places = [np.array([*self.corners[0], 0.0])]
+        places = [np.array([self.corners[0]])]
         for start, end in zip(self.corners, self.corners[1:], strict=False):
             pieces = max(
                 int(np.ceil(np.hypot(end[0] - start[0], end[1] - start[1]) / self.STRIDE_M)), 1
             )
             shares = np.arange(1, pieces + 1) / pieces
-            places += [
-                np.array([*(np.array(start) + share * (np.array(end) - start)), 0.0])
-                for share in shares
-            ]
-        return self.curve.to_world(np.array(places))[:, :2]
+            places.append(np.array(start) + shares[:, None] * (np.array(end) - start))
+        road = np.concatenate(places)
+        return self.curve.to_world(np.column_stack([road, np.zeros(len(road))]))[:, :2]

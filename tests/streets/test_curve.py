@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.sources.streets.curve import Curve, Walked
+from care_sim.streets.curve import Curve, Walked
 
 curves = st.builds(
     Curve,

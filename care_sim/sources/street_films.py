@@ -18,8 +18,8 @@ from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
-from care_sim.sources.streets.draft import STREET_KEYFRAME_S
-from care_sim.sources.streets.street import Street, make_street
+from care_sim.streets.draft import STREET_KEYFRAME_S
+from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
 

@@ -1,0 +1,53 @@
+"""The result of a drive, as a pure function of its keyframes and of what it was to meet."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+from care_sim.evaluation.metrics import outcome
+from care_sim.loops.records import DriveOutcome, EncounterOutcome, Keyframe, Sight
+from care_sim.world.crosser import Meeting
+
+
+def drive_outcome(
+    keyframes: Sequence[Keyframe],
+    meetings: Sequence[Meeting],
+    kinds: Mapping[int, str],
+    progress: float,
+) -> DriveOutcome:
+    """The result of a drive with `meetings`, after a share `progress` of its way. `kinds` names the
+    kind of every body that can be hit.
+    """
+    impact = keyframes[-1].impact
+    return DriveOutcome(
+        **asdict(outcome(keyframes)),
+        hit_kind=kinds[impact.body] if impact else None,
+        hit_at_front=impact.at_front if impact else None,
+        hit_standing=impact.speed_mps == 0.0 if impact else None,
+        needless_braking=sum(record.needless for record in keyframes),
+        progress=min(max(progress, 0.0), 1.0),
+        encounters=tuple(
+            _encounter(
+                one,
+                [record.sights[number] for record in keyframes],
+                impact is not None and impact.body == one.body,
+            )
+            for number, one in enumerate(meetings)
+        ),
+    )
+
+
+def _encounter(meeting: Meeting, sights: Sequence[Sight], hit: bool) -> EncounterOutcome:
+    found = next((n for n, sight in enumerate(sights) if sight.detected), None)
+    return EncounterOutcome(
+        who=meeting.who,
+        side=meeting.side,
+        along_m=meeting.along_m,
+        course=meeting.course,
+        occluder=meeting.occluder,
+        occluder_reported=meeting.occluder_reported,
+        set_off=bool(meeting.crosser.went),
+        view_keyframe=next((n for n, sight in enumerate(sights) if sight.in_view), None),
+        detection_keyframe=found,
+        detection_distance_m=None if found is None else sights[found].distance_m,
+        hit=hit,
+    )

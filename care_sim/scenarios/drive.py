@@ -1,0 +1,193 @@
+"""The drive: a way through a generated street, with traffic that reacts and people who come out.
+
+All that is drawn, and from which ranges, is in `care_sim.streets.drive` and
+`care_sim.streets.encounters`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_sim.base.bounds import bounded
+from care_sim.core.arrays import Floats
+from care_sim.core.frames import Pose
+from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
+from care_sim.sensors.surround import SURROUND_CAMERAS
+from care_sim.streets.dimensions import LANE_WIDTH_M, SPEED_LIMIT_MPS
+from care_sim.streets.draft import footprints_meet
+from care_sim.streets.drive import SAMPLE_S, Drive, draw_drive
+from care_sim.streets.drive_traffic import DrivenLane
+from care_sim.streets.encounters import EGO_LENGTH_M, Course
+from care_sim.world.bodies import CATALOGUE
+from care_sim.world.crosser import Crosser, Meeting
+from care_sim.world.lane_flow import LaneFlow
+from care_sim.world.speed_plan import SpeedPlan
+from care_sim.world.street_traffic import FlowingLane, StreetTraffic
+from care_sim.world.traffic import Traffic
+from care_sim.world.walker import Walk
+from care_sim.world.world import WORLD_STEP_S, Motion, World
+
+SIDEWAYS_MPS2 = 2.0
+"""Through a bend: two thirds of the 3 m/s^2 that UN Regulation 79 allows automated steering."""
+COMFORT_MPS2 = 1.5
+"""Slowing for a bend and gaining speed after it: as the controller gains speed after braking."""
+CLEAR_M = 0.5
+"""Who sets off expects to keep at least this much from other traffic."""
+LOOK_AHEAD_STEP_S = 0.1
+"""Between two times at which they look whether they will."""
+END_OF_TURN_M = 4.0
+"""The ego has left its lane when its middle is this far into a turn, and is in the next one this
+far before the turn's end."""
+
+
+@dataclass(frozen=True)
+class DriveScenario(Scenario):
+    """A drive of 160 to 260 m through a residential street, straight, round a bend or off into a
+    side street. The ego follows its route, slows for bends and follows who drives ahead.
+
+    Up to three times somebody comes out of hiding: an adult, a child, a cyclist or a car, from
+    either side. See `care_sim.streets.encounters` for who, whence and how it would end.
+    """
+
+    cameras = SURROUND_CAMERAS
+    duration_s: float = bounded(LONGEST_EPISODE_S, 0.05, LONGEST_EPISODE_S)
+
+    def build(self, rng: np.random.Generator) -> World:
+        """A fresh world at time zero."""
+        drive = draw_drive(rng, self.duration_s)
+        # Nobody drives on highway-env's straight road; the lanes of the street have their own
+        # flows.
+        nobody = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
+        world = World(nobody, drive.cruise_mps, drive.route)
+        world.goal_m = drive.goal_m
+        world.is_over = lambda: world.along_m >= drive.goal_m
+        plan = SpeedPlan(drive.route, drive.cruise_mps, SIDEWAYS_MPS2, COMFORT_MPS2)
+        world.speed_plan = plan
+        traffic = StreetTraffic([_flowing(drive, lane) for lane in drive.lanes])
+        _add_bodies(world, drive)
+        _add_vehicles(world, drive, traffic)
+        _add_encounters(world, drive, plan, traffic)
+        return world
+
+
+def _flowing(drive: Drive, lane: DrivenLane) -> FlowingLane:
+    """A lane with its drivers, and where the ego is in it."""
+    flow = LaneFlow(lane.places, lane.speeds)
+    # The ego's own lanes are those along its roads whose middle is its route.
+    for number, stretch in enumerate(drive.stretches):
+        if stretch.road.curve == lane.curve and lane.d == 0.0:
+            begins = -np.inf if number == 0 else stretch.from_m - END_OF_TURN_M
+            last = number == len(drive.stretches) - 1
+            ends = np.inf if last else stretch.to_m + END_OF_TURN_M
+            return FlowingLane(flow, lane.poses_at, lane.stop_m, begins, ends, -stretch.offset_m)
+    return FlowingLane(flow, lane.poses_at, lane.stop_m)
+
+
+def _add_bodies(world: World, drive: Drive) -> None:
+    """Everything that stands or walks on its own."""
+    for kind, way in zip(drive.kinds, drive.ways, strict=True):
+        stands = bool((way == way[0]).all())
+        x, y, heading = way[0].tolist()
+        world.add(kind, kind, (x, y, heading) if stands else _walking(way))
+
+
+def _walking(way: Floats) -> Motion:
+    """The motion along a way (t, 3) that is sampled every SAMPLE_S."""
+    # Between two samples evenly, heading as at the first. Looked up at every step: worked out once.
+    between = round(SAMPLE_S / WORLD_STEP_S)
+    shares = np.arange(between)[:, None] / between
+    moved = way[:-1, None, :2] + shares * np.diff(way[:, :2], axis=0)[:, None]
+    headings = np.repeat(way[:-1, 2], between)
+    poses = np.column_stack([moved.reshape(-1, 2), headings]).tolist()
+
+    def pose(time: float) -> Pose:
+        x, y, heading = poses[min(round(time / WORLD_STEP_S), len(poses) - 1)]
+        return x, y, heading
+
+    return pose
+
+
+def _add_vehicles(world: World, drive: Drive, traffic: StreetTraffic) -> None:
+    """The traffic, which sees the ego where it is at every step."""
+    for number, lane in enumerate(drive.lanes):
+        for place, kind in enumerate(lane.kinds):
+            world.add(f"driven {kind}", kind, _driving(traffic, number, place))
+    world.at_every_step(lambda: traffic.step(WORLD_STEP_S, world.along_m, world.ego.speed))
+
+
+def _driving(traffic: StreetTraffic, lane: int, number: int) -> Motion:
+    return lambda _time: traffic.pose(lane, number)
+
+
+def _add_encounters(world: World, drive: Drive, plan: SpeedPlan, traffic: StreetTraffic) -> None:
+    """Who comes out. The episode is about the first who would be hit, else the first of all."""
+    for along, one in drive.encounters:
+        crosser = Crosser(
+            one.walk,
+            one.lead_s,
+            _seconds_left(world, plan, along - one.half_width - EGO_LENGTH_M / 2),
+            _may_go(drive, traffic, CATALOGUE[one.who].size[:2]),
+        )
+        actor = world.add(one.who, one.who, crosser.pose)
+        world.at_every_step(_looking(world, crosser))
+        side = "left" if one.side > 0 else "right"
+        occluder = one.occluder, one.occluder_reported
+        world.meetings.append(
+            Meeting(actor.body, one.who, side, along, one.course.value, *occluder, crosser)
+        )
+        if world.first_sighting is None:
+            world.first_sighting = actor
+    hits = [one for one in world.meetings if one.course == Course.CONFLICT]
+    if hits:
+        world.first_sighting = next(a for a in world.actors if a.body == hits[0].body)
+
+
+def _looking(world: World, crosser: Crosser) -> Callable[[], None]:
+    return lambda: crosser.look(world.time)
+
+
+def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> Callable[[], float]:
+    """The ego's time until its middle is `line_m` along the route, if it goes on as it does."""
+
+    def seconds() -> float:
+        gaining = max(world.ego_motion.acceleration, 0.0)
+        return plan.seconds_to(world.along_m, line_m, world.ego.speed, gaining)
+
+    return seconds
+
+
+def _may_go(
+    drive: Drive, traffic: StreetTraffic, size: tuple[float, float]
+) -> Callable[[Walk], bool]:
+    """Whether somebody of a `size` keeps clear of all traffic that drives on evenly."""
+    lanes = [
+        (flowing, np.array([CATALOGUE[kind].size[:2] for kind in lane.kinds]))
+        for flowing, lane in zip(traffic.lanes, drive.lanes, strict=True)
+        if lane.kinds
+    ]
+
+    def free(walk: Walk) -> bool:
+        times = np.arange(0.0, walk.duration_to(walk.length_m), LOOK_AHEAD_STEP_S)
+        own = np.array([walk.pose(walk.starts_s + time) for time in times.tolist()])
+        return not any(_meet(lane, sizes, times, own, size) for lane, sizes in lanes)
+
+    return free
+
+
+def _meet(
+    lane: FlowingLane, sizes: Floats, times: Floats, own: Floats, size: tuple[float, float]
+) -> bool:
+    """Whether vehicles of `sizes` (n, 2) come close to `own` poses (t, 3) at `times` (t,)."""
+    places = lane.flow.places + lane.flow.speeds * times[:, None]
+    poses = lane.poses_at(places.ravel())
+    count = len(sizes)
+    return bool(
+        footprints_meet(
+            np.repeat(own, count, axis=0),
+            np.broadcast_to(size, (len(poses), 2)),
+            poses,
+            np.tile(sizes, (len(times), 1)),
+            np.full(len(poses), CLEAR_M),
+        ).any()
+    )

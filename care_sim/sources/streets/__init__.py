@@ -1,1 +1,0 @@
-"""Generated streets: seeded urban scenes for the open loop, and the films recorded in them."""
