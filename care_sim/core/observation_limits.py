@@ -85,16 +85,19 @@ class Limits:
         """(k,) the rows of `detections` that a belief shows, in its order: those that lie in the
         picture, and no more than the table holds.
         """
-        rows = detections.rows()
-        least, most = self._pictured
-        most = most[detections.cameras]
-        # Where nothing lies beyond the limits all are shown.
-        if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
-            return np.arange(len(rows))
+        return np.arange(len(detections)) if self._fit(detections) else self._shown(detections)
 
+    def _fit(self, detections: ImageDetections) -> bool:
+        """Whether nothing of the detections lies beyond the limits, so that all are shown."""
+        least, most = self._pictured
+        rows = detections.rows()
+        return len(rows) <= MAX_DETECTIONS and _within(rows, least, most[detections.cameras])
+
+    def _shown(self, detections: ImageDetections) -> Integers:
+        """The rows of those that lie in the picture, and no more than the table holds."""
         # Looked at before clipping, which would leave of a box wholly outside a line on the edge.
-        left, top, right, bottom = rows[:, ImageDetections.BOX].T
-        width, height = most[:, ImageDetections.BOX][:, 2:].T
+        left, top, right, bottom = detections.boxes.T
+        width, height = self._pictured[1][detections.cameras, ImageDetections.BOX][:, 2:].T
         shown = (left < width) & (top < height) & (right > 0) & (bottom > 0)
         return np.flatnonzero(shown)[:MAX_DETECTIONS]
 
@@ -115,17 +118,14 @@ class Limits:
 
     def _limited_detections(self, detections: ImageDetections) -> ImageDetections:
         # Where nothing lies beyond the limits the detections are handed on as they are.
-        rows = detections.rows()
-        least, most = self._pictured
-        most = most[detections.cameras]
-        if len(rows) <= MAX_DETECTIONS and _within(rows, least, most):
+        if self._fit(detections):
             return detections
-
-        rows = rows.copy()
+        least, most = self._pictured
+        rows = detections.rows().copy()
         yaw_change = ImageDetections.YAW_CHANGE
         rows[:, yaw_change] = _without_turns(rows[:, yaw_change])
-        kept = self.kept_detections(detections)
-        return ImageDetections.from_rows(np.clip(rows, least, most)[kept])
+        within = np.clip(rows, least, most[detections.cameras])
+        return ImageDetections.from_rows(within[self._shown(detections)])
 
     def _limited_tracks(self, tracks: Tracks) -> Tracks:
         rows = tracks.rows()

@@ -75,6 +75,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
         self._running: AnyLoop | None = None
+        self._floor: Cells | None = None
         self._over = False
 
     @property
@@ -128,7 +129,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self._running = loop
         self._over = False
         self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
-        self._floor = self._floors.next()
+        self._floor = None
         return self.observed()
 
     def observed(self) -> Observed:
@@ -146,8 +147,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         # A copy, since the caller may write into an action once it is taken.
         self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
         fired = self._fired(scores)
-        # Drawn at every keyframe, used or not: all policies then meet the same floor.
-        self._floor = self._floors.next()
+        self._floor = None
         return fired
 
     def would_fire(self, action: Action) -> Cells:
@@ -159,8 +159,10 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self._fired(checked_scores(action, self.rig.grid.shape))
 
     def _fired(self, scores: Action) -> Cells:
-        floor = self._floor if self.conditions.floor else None
-        return fired_cells(scores, self.rig.budget, floor)
+        # Drawn at every keyframe, used or not: all policies then meet the same floor.
+        if self.conditions.floor and self._floor is None:
+            self._floor = self._floors.next()
+        return fired_cells(scores, self.rig.budget, self._floor)
 
     def _fired_as_info(self, fired: Cells) -> Cells | list[int]:
         """The fired cells as `info` holds them, a copy.
