@@ -15,7 +15,8 @@ from care_sim.base.checks import check_number, check_whole, is_number
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Integers, Mask
-from care_sim.core.grid import Cells, cell_indices
+from care_sim.core.cell_sets import CellSets, cell_indices
+from care_sim.core.grid import Cells
 from care_sim.core.types import Demand
 
 RESERVE_FRACTION = 0.3
@@ -24,7 +25,6 @@ HIGHEST_CELL = 2**24
 """A thousand times the cells of the paper's grid."""
 
 _SETS = "a list of sets of cells"
-_NO_CELLS = np.empty(0, np.int64)
 
 
 def budget_cells(budget: float, cells: int) -> int:
@@ -123,22 +123,19 @@ def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
 
 def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     """Stage after stage, round-robin over its sets, up to its limit in all."""
-    # The sets of all stages lie in one array. Compiled code takes it at once, where a list of
-    # arrays would be converted one by one at every call. A stage of the sets [3, 5] and [5, 9] and
-    # a stage of the set [7] are cells [3, 5, 5, 9, 7], set_ends [2, 4, 5] and stage_ends [2, 3].
-    sets = [cell_indices(cells) for stage in stages for cells in stage]
-    cells = np.concatenate([_NO_CELLS, *sets], dtype=np.int64, casting="unsafe")
-    set_ends = np.array([*accumulate(map(len, sets))], np.int64)
+    # The sets of all stages lie in one array. A stage of the sets [3, 5] and [5, 9] and a stage of
+    # the set [7] are cells [3, 5, 5, 9, 7], sizes [2, 2, 1] and stage_ends [2, 3].
+    sets = CellSets.joined([CellSets.of(stage) for stage in stages])
     stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
 
     # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
-    lowest = cells.min(initial=0)
-    highest = cells.max(initial=0)
+    lowest = sets.cells.min(initial=0)
+    highest = sets.cells.max(initial=0)
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")
     most = np.array(limits, np.int64)
-    return _fill_stages(cells, set_ends, stage_ends, most, lowest, highest)
+    return _fill_stages(sets.cells, sets.sizes, stage_ends, most, lowest, highest)
 
 
 def _free(floor: Sequence[int] | Cells, chosen: Cells, count: int) -> Cells:
@@ -176,7 +173,7 @@ class _Selection(NamedTuple):
 @compiled()
 def _fill_stages(
     cells: Cells,
-    set_ends: Integers,
+    sizes: Integers,
     stage_ends: Integers,
     limits: Integers,
     lowest: int,
@@ -184,15 +181,13 @@ def _fill_stages(
 ) -> Cells:
     """The cells taken, in order of selection.
 
-    Sets lie one after the other in `cells`; set s ends at `set_ends[s]`. Stages of sets follow each
-    other likewise: stage k ends at set `stage_ends[k]` and fills up to `limits[k]` cells in all. No
-    cell is lower than `lowest` (at most 0) or higher than `highest`.
+    Sets of so many `sizes` lie one after the other in `cells`. Stages of sets follow each other
+    likewise: stage k ends at set `stage_ends[k]` and fills up to `limits[k]` cells in all. No cell
+    is lower than `lowest` (at most 0) or higher than `highest`.
     """
     # A set offers its cells from its own start, which is where the set before it ends.
-    next_places = np.empty(len(set_ends), np.int64)
-    next_places[:1] = 0
-    next_places[1:] = set_ends[:-1]
-    sets = _Sets(cells, next_places, set_ends)
+    ends = np.cumsum(sizes)
+    sets = _Sets(cells, ends - sizes, ends)
 
     # The grid is not known here: `care_sim.policies.base.Policy` refuses cells below 0 or beyond
     # the grid afterwards. The table of what is taken must hold them until then, hence the offset.

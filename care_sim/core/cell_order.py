@@ -8,7 +8,6 @@ top; these functions list the hulls and wedges of any policy in another order.
 
 from collections.abc import Sequence
 from functools import cache
-from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -16,7 +15,8 @@ from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
 from care_sim.core.cell_order_kernels import RANDOM, SetMargins, sort_sets
-from care_sim.core.grid import Cells, cell_indices
+from care_sim.core.cell_sets import CellSets
+from care_sim.core.grid import Cells
 from care_sim.core.grid_kernels import GridSpacing
 
 AS_DEMANDED = "as-demanded"
@@ -48,7 +48,7 @@ def reordered(
     spacing: GridSpacing,
     margins: SetMargins,
     most: int | None = None,
-) -> list[Cells]:
+) -> CellSets:
     """The same sets, the cells of each listed in an `order` of `CELL_ORDERS` but the first; only
     the first `most` of each, if it is given.
 
@@ -58,17 +58,14 @@ def reordered(
     for another order, and for a cell that the grid does not have.
     """
     check_known("order", order, CELL_ORDERS[1:])
-    arrays = [cell_indices(cells) for cells in sets]
+    given = CellSets.of(sets)
     size = spacing.columns * spacing.rows
-    cells = np.concatenate([np.empty(0, np.int64), *arrays], dtype=np.int64, casting="unsafe")
-    if len(cells) and not (cells.min() >= 0 and cells.max() < size):
+    if len(given.cells) and not (given.cells.min() >= 0 and given.cells.max() < size):
         raise InvalidInput(f"cells must lie in 0..{size - 1}")
-    ends = np.array([*accumulate(map(len, arrays))], np.int64)
     number = CELL_ORDERS.index(order) - 1
     ranks = _ranks(size if number == RANDOM else 0)
-    most = len(cells) if most is None else most
-    sort_sets(cells, ends, number, spacing, margins, ranks, most)
-    return [cells[start : min(end, start + most)] for start, end in pairwise([0, *ends.tolist()])]
+    most = len(given.cells) if most is None else most
+    return CellSets(*sort_sets(given.cells, given.sizes, number, spacing, margins, ranks, most))
 
 
 @cache

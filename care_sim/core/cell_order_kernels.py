@@ -7,6 +7,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Integers
+from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.grid_kernels import GridSpacing
 
 ROWS_DOWN, ROWS_UP, COLUMNS, RANDOM, SPREAD, CORE_SPREAD = range(6)
@@ -22,6 +23,15 @@ the most uneven of all windows at a corner, at any number of cells taken, is off
 average; 2.5 to 3.0 with the inverse powers of the plastic number, 2.6 to 3.3 with the golden ratio
 and another number, 5.5 at random.
 """
+
+
+_CELL_BITS = (MOST_COLUMNS * MOST_ROWS - 1).bit_length()
+_CELL_MASK = 2**_CELL_BITS - 1
+"""Of the number by which a cell is sorted, the low bits are the cell and the others its key. So one
+number is moved where there were two, and equal keys come by cell."""
+_SPARE = 4
+"""So many cells more than are wanted are looked for: a share of a low-discrepancy sequence is off
+by a few."""
 
 
 class SetMargins(NamedTuple):
@@ -42,37 +52,51 @@ class _Arc(NamedTuple):
     lower: int
 
 
+class _Room(NamedTuple):
+    """Room to work in, enough for the longest set: see where each is filled."""
+
+    keys: Integers
+    numbers: Integers
+    places: Integers
+    sorted_numbers: Integers
+
+
 @compiled()
 def sort_sets(
     cells: Integers,
-    ends: Integers,
+    sizes: Integers,
     order: int,
     grid: GridSpacing,
     margins: SetMargins,
     ranks: Integers,
     most: int,
-) -> None:
-    """Put the first `most` cells of every set in their order at its beginning; what follows them
-    there is of no use. Sets lie one after the other, up to their `ends`.
+) -> tuple[Integers, Integers]:
+    """The first `most` cells of every set in their order, and their sizes; sets are given and
+    returned as in `care_sim.core.cell_sets.CellSets`.
     """
-    longest = start = 0
-    for end in ends:
-        longest = max(longest, end - start)
-        start = end
-    keys = np.empty(longest, np.int64)
-    sorted_keys = np.empty(longest, np.int64)
-    sorted_cells = np.empty(longest, np.int64)
-    places = np.empty(longest + 1, np.int64)
-
-    # All keys are below this bound, which the buckets of the sort share evenly.
-    bound = grid.columns * grid.rows if order < SPREAD else 2 * _TURN
-    start = 0
-    for end in ends:
-        part = cells[start:end]
-        _write_keys(part, keys, order, grid, margins, ranks)
-        count, below = _keep_lowest(part, keys, bound, most, places)
-        _sort_by_keys(part[:count], keys, below, places, sorted_cells, sorted_keys)
-        start = end
+    longest = 0
+    for size in sizes:
+        longest = max(longest, size)
+    listed_sizes = np.minimum(sizes, most)
+    listed = np.empty(listed_sizes.sum(), np.int64)
+    room = _Room(
+        np.empty(longest, np.int64),
+        np.empty(longest + 1, np.int64),
+        np.empty(longest + 1, np.int64),
+        np.empty(longest, np.int64),
+    )
+    start = place = 0
+    for n, size in enumerate(sizes):
+        part = cells[start : start + size]
+        start += size
+        early = _write_keys(part, room.keys, order, grid, margins, ranks)
+        early_bound = grid.columns * grid.rows if order < SPREAD else _TURN
+        count, below = _keep_lowest(part, early, early_bound, most, room)
+        _sort(count, below, room)
+        for number in room.sorted_numbers[: listed_sizes[n]]:
+            listed[place] = number & _CELL_MASK
+            place += 1
+    return listed, listed_sizes
 
 
 @compiled()
@@ -83,23 +107,27 @@ def _write_keys(
     grid: GridSpacing,
     margins: SetMargins,
     ranks: Integers,
-) -> None:
-    """The number by which each cell of a set comes in its order."""
+) -> int:
+    """The number by which each cell of a set comes in its order. Returns how many come early: with
+    `core-spread` those of the core, else all.
+    """
     if order == ROWS_DOWN:
         keys[: len(cells)] = cells
-        return
+        return len(cells)
     if order == RANDOM:
         for n, cell in enumerate(cells):
             keys[n] = ranks[cell]
-        return
+        return len(cells)
     arc = _arc(cells, grid)
     left, right, upper, lower = _core(arc, grid, margins)
-    for n, cell in enumerate(cells):
-        row, column = _row_and_column(cell, grid.columns)
-        column -= arc.first
-        column += grid.columns if column < 0 else 0
+    early = len(cells)
+    columns, first = _short(grid.columns), _short(arc.first)
+    for n in range(len(cells)):
+        row, column = _row_and_column(cells[n], grid.columns)
+        column = _short(column - first)
+        column = _short(column + (columns if column < 0 else 0))
         if order == ROWS_UP:
-            keys[n] = cell + (grid.rows - 1 - 2 * row) * grid.columns
+            keys[n] = cells[n] + (grid.rows - 1 - 2 * row) * grid.columns
         elif order == COLUMNS:
             keys[n] = column * grid.rows + row
         else:
@@ -109,6 +137,16 @@ def _write_keys(
             if order == CORE_SPREAD:
                 in_core = right <= column < left and upper <= row < lower
                 keys[n] += 0 if in_core else _TURN
+                early -= not in_core
+    return early
+
+
+@compiled(inline="always")
+def _short(number: float) -> int:
+    """The whole part of a number, in 32 bits: they hold any cell, and more of them are computed at
+    once.
+    """
+    return np.int32(number)  # type: ignore[return-value]
 
 
 @compiled(inline="always")
@@ -116,31 +154,31 @@ def _row_and_column(cell: int, columns: int) -> tuple[int, int]:
     """Of a cell. A multiplication is faster than a division of whole numbers; half a cell more
     keeps its last bit from mattering.
     """
-    row = int((cell + 0.5) * (1.0 / columns))
-    return row, cell - row * columns
+    row = _short((_short(cell) + 0.5) * (1.0 / columns))
+    return row, _short(cell - row * columns)
 
 
 @compiled()
 def _arc(cells: Integers, grid: GridSpacing) -> _Arc:
     """Where a set lies."""
     columns = grid.columns
-    first, last, upper, lower = columns, -1, grid.rows, -1
-    for cell in cells:
-        row, column = _row_and_column(cell, columns)
+    first, last, upper, lower = _short(columns), _short(-1), _short(grid.rows), _short(-1)
+    for n in range(len(cells)):
+        row, column = _row_and_column(cells[n], columns)
         first, last = min(first, column), max(last, column)
         upper, lower = min(upper, row), max(lower, row)
-    if first > 0 or last < columns - 1:
-        return _Arc(first, last - first + 1, upper, lower)
+    begin, widest = first, columns - (last + 1 - first)
 
-    # The set touches the seam from both sides: it begins where its widest gap ends.
-    occupied = np.zeros(columns, np.bool_)
-    for cell in cells:
-        occupied[_row_and_column(cell, columns)[1]] = True
-    gap = widest = begin = 0
-    for column in range(columns):
-        gap = 0 if occupied[column] else gap + 1
-        if gap > widest:
-            widest, begin = gap, column + 1
+    # A set that touches the seam from both sides begins where its widest gap ends.
+    if first == 0 and last == columns - 1:
+        occupied = np.zeros(columns, np.bool_)
+        for cell in cells:
+            occupied[_row_and_column(cell, columns)[1]] = True
+        gap = widest = begin = 0
+        for column in range(columns):
+            gap = 0 if occupied[column] else gap + 1
+            if gap > widest:
+                widest, begin = gap, column + 1
     return _Arc(begin, columns - widest, upper, lower)
 
 
@@ -163,68 +201,50 @@ def _core(arc: _Arc, grid: GridSpacing, margins: SetMargins) -> tuple[int, int, 
 
 @compiled()
 def _keep_lowest(
-    cells: Integers, keys: Integers, bound: int, most: int, places: Integers
+    cells: Integers, early: int, early_bound: int, most: int, room: _Room
 ) -> tuple[int, int]:
-    """Move at least `most` cells of the lowest `keys` to the front, with their keys. Returns their
-    number, and a bound below which their keys lie; `places` is room to work in.
+    """Write the numbers of at least `most` cells, those of the lowest keys, or of all if there are
+    fewer. Returns how many they are, and a bound below which their keys lie.
+
+    The keys of the `early` cells lie below `early_bound`, all others between it and twice as much.
     """
-    count = len(cells)
-    if count <= 2 * most:
-        return count, bound
-
-    # The lowest buckets that hold enough cells: so few cells more are kept than are asked for.
-    share = count / bound
-    places[: count + 1] = 0
-    for n in range(count):
-        places[int(keys[n] * share)] += 1
-    bucket = kept = 0
-    while kept < most:
-        kept += places[bucket]
-        bucket += 1
-    below = min(int(bucket / share) + 1, bound)
-
-    # Every cell is written, and the next one over it if it is not kept, which needs no branch.
-    kept = 0
-    for n in range(count):
-        cells[kept] = cells[n]
-        keys[kept] = keys[n]
-        kept += keys[n] < below
-    return kept, below
+    # Keys of a low-discrepancy sequence fill the bound evenly, and a share of it holds the share of
+    # the cells. In another order the first guess can be too low, and is doubled.
+    wanted = min(most, len(cells))
+    below = 2 * early_bound
+    if wanted < early:
+        below = min(early_bound, int(early_bound * ((wanted + _SPARE) / early)) + 1)
+    while True:
+        # Every number is written, and the next one over it if it is not kept: that needs no branch.
+        kept = 0
+        for n, cell in enumerate(cells):
+            room.numbers[kept] = room.keys[n] << _CELL_BITS | cell
+            kept += room.keys[n] < below
+        if kept >= wanted:
+            return kept, below
+        below *= 2
 
 
 @compiled()
-def _sort_by_keys(
-    cells: Integers,
-    keys: Integers,
-    bound: int,
-    places: Integers,
-    sorted_cells: Integers,
-    sorted_keys: Integers,
-) -> None:
-    """Sort cells in place by their `keys` below `bound`; the rest is room to work in."""
+def _sort(count: int, bound: int, room: _Room) -> None:
+    """Sort the first `count` numbers, whose keys lie below `bound`."""
     # As many buckets as cells. Keys of a low-discrepancy sequence fill them evenly, so this takes
     # a time in proportion to the cells; `places[b]` counts, then tells where bucket b begins.
-    count = len(cells)
-    places[: count + 1] = 0
+    room.places[: count + 1] = 0
     share = count / bound
-    for n in range(count):
-        places[int(keys[n] * share) + 1] += 1
+    for number in room.numbers[:count]:
+        room.places[int((number >> _CELL_BITS) * share) + 1] += 1
     for bucket in range(count):
-        places[bucket + 1] += places[bucket]
-    for n in range(count):
-        bucket = int(keys[n] * share)
-        place = places[bucket]
-        places[bucket] += 1
-        sorted_keys[place] = keys[n]
-        sorted_cells[place] = cells[n]
+        room.places[bucket + 1] += room.places[bucket]
+    for number in room.numbers[:count]:
+        bucket = int((number >> _CELL_BITS) * share)
+        room.sorted_numbers[room.places[bucket]] = number
+        room.places[bucket] += 1
 
     # Within a bucket by insertion. No cell leaves its bucket, since those before it are smaller.
     for n in range(count):
-        key, cell, place = sorted_keys[n], sorted_cells[n], n
-        while place > 0 and sorted_keys[place - 1] > key:
-            sorted_keys[place] = sorted_keys[place - 1]
-            sorted_cells[place] = sorted_cells[place - 1]
+        number, place = room.sorted_numbers[n], n
+        while place > 0 and room.sorted_numbers[place - 1] > number:
+            room.sorted_numbers[place] = room.sorted_numbers[place - 1]
             place -= 1
-        sorted_keys[place] = key
-        sorted_cells[place] = cell
-    cells[:] = sorted_cells[:count]
+        room.sorted_numbers[place] = number

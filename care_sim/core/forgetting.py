@@ -10,6 +10,7 @@ import numpy as np
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.core.arrays import Floats, Integers, Mask
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego, Tracks
@@ -54,14 +55,14 @@ class Forgetting:
         self._rig = rig
         self._streaks: dict[int, int] = {}
 
-    def next_exploitation(self, tracks: Tracks, ego: Ego) -> list[Cells]:
+    def next_exploitation(self, tracks: Tracks, ego: Ego) -> CellSets:
         """Advance the streaks by one keyframe, and give the exploitation sets for Algorithm 1.
 
         Full hulls come first, shrunk hulls second, each in the order of the tracks.
         """
         margins, low = self.advance(tracks, ego)
         hulls = self._rig.hulls(tracks.boxes, margins)
-        return [hulls[row] for row in np.argsort(low, kind="stable")]
+        return hulls.take(np.argsort(low, kind="stable"))
 
     def advance(self, tracks: Tracks, ego: Ego) -> tuple[Integers, Mask]:
         """Advance the streaks by one keyframe, and say how far each hull shrinks.
@@ -112,11 +113,6 @@ def released_cells(hulls: Sequence[Cells], exploitation: Sequence[Cells], size: 
     and does not define it.
     """
     released = np.zeros(size, np.bool_)
-    released[_joined(hulls)] = True
-    released[_joined(exploitation)] = False
+    released[CellSets.of(hulls).cells] = True
+    released[CellSets.of(exploitation).cells] = False
     return int(np.count_nonzero(released))
-
-
-def _joined(sets: Sequence[Cells]) -> Cells:
-    # A set without cells may be of any type.
-    return np.concatenate([np.empty(0, np.int64), *sets], dtype=np.int64, casting="unsafe")

@@ -5,18 +5,16 @@ Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index
 [-pi + c * width, -pi + (c + 1) * width).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.checks import as_array
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid_kernels import GridSpacing, rectangle_cells, silhouettes
 
 Cells = NDArray[np.int64]
@@ -132,7 +130,7 @@ class AngularGrid:
         boxes: ArrayLike,
         azimuth_margin: int | Integers = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
-    ) -> list[Cells]:
+    ) -> CellSets:
         """The dilated angular rectangle of every box, as ascending cells.
 
         `boxes` is (n, 7): centre x, y, z, length, width, height, yaw. `azimuth_margin` is one
@@ -140,7 +138,7 @@ class AngularGrid:
         """
         boxes = np.ascontiguousarray(boxes, dtype=float).reshape(-1, 7)
         if not len(boxes):
-            return []
+            return CellSets.of([])
         # Angles are taken by NumPy here and not in the kernel: its arctangent differs from that of
         # compiled code in the last bits, and published cells were made with it.
         planar, upright, around = silhouettes(boxes)
@@ -154,14 +152,14 @@ class AngularGrid:
         bundles: ArrayLike,
         azimuth_margin: int = AZIMUTH_MARGIN,
         elevation_margin: int = ELEVATION_MARGIN,
-    ) -> list[Cells]:
+    ) -> CellSets:
         """The dilated angular rectangle of every bundle of rays (n, k, 3), as ascending cells.
 
         The first ray of a bundle is its middle; the others lie within half a turn of it.
         """
         bundles = np.asarray(bundles, dtype=float)
         if not len(bundles):
-            return []
+            return CellSets.of([])
         x, y, z = bundles[..., 0], bundles[..., 1], bundles[..., 2]
         azimuths = np.arctan2(y, x)
         elevations = np.arctan2(z, np.hypot(x, y))
@@ -174,18 +172,8 @@ class AngularGrid:
 
     def _rectangles(
         self, azimuths: Floats, elevations: Floats, margins: Integers, elevation_margin: int
-    ) -> list[Cells]:
+    ) -> CellSets:
         """The cells of every rectangle; see `care_sim.core.grid_kernels.rectangle_cells`."""
-        cells, ends = rectangle_cells(azimuths, elevations, margins, elevation_margin, self.spacing)
-        return [cells[start:end] for start, end in pairwise([0, *ends.tolist()])]
-
-
-def cell_indices(cells: Sequence[int] | Cells, name: str = "a set of cells") -> NDArray[np.integer]:
-    """`cells` as an array. Raises InvalidInput for what is no list of indices."""
-    array = as_array(name, cells)
-    if array.ndim != 1 or not (array.dtype.kind in "iu" or array.size == 0):
-        raise InvalidInput(
-            f"{name} must be a list of cell indices, got {array.dtype} of shape {array.shape}"
-            " (of a mask take np.flatnonzero)"
+        return CellSets(
+            *rectangle_cells(azimuths, elevations, margins, elevation_margin, self.spacing)
         )
-    return array

@@ -71,29 +71,28 @@ def rectangle_cells(
     elevation_margin: int,
     grid: GridSpacing,
 ) -> tuple[Integers, Integers]:
-    """The cells of n rectangles one after the other, each ascending, and (n,) where each ends.
+    """The cells of n rectangles, each ascending, and their sizes, as in
+    `care_sim.core.cell_sets.CellSets`.
 
     A rectangle holds the `azimuths` (n, j) of its row, which lie within half a turn of the first,
     and the `elevations` (n, k), dilated by `azimuth_margins` (n,) columns and `elevation_margin`
     rows.
     """
-    # Bounds first, so that the table of cells is made once and of the right size. A rectangle that
+    # Edges first, so that the table of cells is made once and of the right size. A rectangle that
     # misses the grid has no rows, and its cells end where they begin.
-    bounds = np.empty((len(azimuths), 4), np.int64)
-    ends = np.empty(len(azimuths), np.int64)
-    size = 0
+    edges = np.empty((len(azimuths), 4), np.int64)
+    sizes = np.empty(len(azimuths), np.int64)
     for n in range(len(azimuths)):
-        first, stop = bounds[n, 0], bounds[n, 1] = _columns(azimuths[n], azimuth_margins[n], grid)
-        upper, lower = bounds[n, 2], bounds[n, 3] = _rows(elevations[n], elevation_margin, grid)
-        size += (stop - first) * (lower - upper)
-        ends[n] = size
+        first, stop = edges[n, 0], edges[n, 1] = _columns(azimuths[n], azimuth_margins[n], grid)
+        upper, lower = edges[n, 2], edges[n, 3] = _rows(elevations[n], elevation_margin, grid)
+        sizes[n] = (stop - first) * (lower - upper)
 
     # Each rectangle is written where the one before it ended.
-    cells = np.empty(size, np.int64)
+    cells = np.empty(sizes.sum(), np.int64)
     place = 0
-    for bound in bounds:
-        place = _lay(cells, place, bound, grid.columns)
-    return cells, ends
+    for edge in edges:
+        place = _lay(cells, place, edge, grid.columns)
+    return cells, sizes
 
 
 @compiled()
@@ -125,12 +124,12 @@ def _rows(elevations: Floats, margin: int, grid: GridSpacing) -> tuple[int, int]
 
 
 @compiled()
-def _lay(cells: Integers, place: int, bounds: Integers, columns: int) -> int:
+def _lay(cells: Integers, place: int, edges: Integers, columns: int) -> int:
     """Write the cells of a rectangle from `place` on; the place after them.
 
     In every row those beyond the seam come first: their columns, and so their indices, are lower.
     """
-    first, stop, upper, lower = bounds
+    first, stop, upper, lower = edges
     for row in range(upper, lower):
         # What reaches beyond the last column goes on at column 0.
         for column in range(columns, stop):

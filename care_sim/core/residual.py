@@ -7,27 +7,21 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.frames import turned
-from care_sim.core.grid import Cells
 from care_sim.core.pinhole_kernels import CameraModels, box_rays, model_of, pixel
 from care_sim.core.rig import Rig
 from care_sim.core.types import ImageDetections, Tracks
 
 
-def camera_layers(belief: Belief, rig: Rig) -> tuple[list[Cells], list[Cells]]:
+def camera_layers(belief: Belief, rig: Rig) -> tuple[CellSets, CellSets]:
     """(U, M) of Algorithm 2: the wedges of unexplained and of explained detections.
 
     U is the reserve layer of CARE. Both are in the order of the detections.
     """
-    unexplained: list[Cells] = []
-    by_memory: list[Cells] = []
-    is_explained = explained(belief.detections, belief.tracks, rig).tolist()
-    for wedge, known in zip(wedges(belief.detections, rig), is_explained, strict=True):
-        if known:
-            by_memory.append(wedge)
-        else:
-            unexplained.append(wedge)
-    return unexplained, by_memory
+    every = wedges(belief.detections, rig)
+    known = explained(belief.detections, belief.tracks, rig)
+    return every.take(~known), every.take(known)
 
 
 def explained(detections: ImageDetections, tracks: Tracks, rig: Rig) -> Mask:
@@ -56,12 +50,12 @@ def explaining_tracks(detections: ImageDetections, tracks: Tracks, rig: Rig) -> 
     )
 
 
-def wedges(detections: ImageDetections, rig: Rig) -> list[Cells]:
+def wedges(detections: ImageDetections, rig: Rig) -> CellSets:
     """The depth-free wedge W(d) of every detection: the cells behind its image box, dilated by the
     margins of the rig.
     """
     if not len(detections):
-        return []
+        return CellSets.of([])
     rays = wedge_rays(detections, rig)
     return rig.grid.wedges(rays, rig.azimuth_margin, rig.elevation_margin)
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain, islice
 
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_known, check_whole
@@ -13,6 +12,7 @@ from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, reordered
 from care_sim.core.cell_order_kernels import SetMargins
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import (
     AZIMUTH_MARGIN,
     ELEVATION_MARGIN,
@@ -83,7 +83,7 @@ class Rig:
         """The cameras as one table."""
         return camera_models(self.cameras)
 
-    def hulls(self, boxes: Floats, azimuth_margins: Integers | None = None) -> list[Cells]:
+    def hulls(self, boxes: Floats, azimuth_margins: Integers | None = None) -> CellSets:
         """The cells of sensor-frame boxes (n, 7), one ascending array per box. They are dilated by
         the rig's margins, or by `azimuth_margins` (n,) columns and the rig's rows.
         """
@@ -98,22 +98,12 @@ class Rig:
         """
         if self.cell_order == AS_DEMANDED:
             return demand
-        exploitation, *layers = self.listed_groups(stages_of(demand))
+        exploitation, *layers = map(self.listed, stages_of(demand))
         return Demand(exploitation, layers)
-
-    def listed_groups(
-        self,
-        groups: Sequence[Sequence[Cells]],
-        usual: str = AS_DEMANDED,
-        most: int | None = None,
-    ) -> list[list[Cells]]:
-        """Groups of sets, each as `listed` gives it, in one call of compiled code."""
-        listed = iter(self.listed([*chain(*groups)], usual, most))
-        return [[*islice(listed, len(group))] for group in groups]
 
     def listed(
         self, sets: Sequence[Cells], usual: str = AS_DEMANDED, most: int | None = None
-    ) -> list[Cells]:
+    ) -> CellSets:
         """The sets, the cells of each listed in the rig's `cell_order`; in the `usual` one where
         the rig's is `as-demanded`. Only the first `most` cells of each, if it is given.
 
@@ -123,6 +113,7 @@ class Rig:
             check_whole("most", most, 0)
         order = usual if self.cell_order == AS_DEMANDED else self.cell_order
         if order == AS_DEMANDED:
-            return [cells[:most] for cells in sets]
+            given = CellSets.of(sets)
+            return given if most is None else given.part(0, most)
         margins = SetMargins(self.azimuth_margin, self.elevation_margin)
         return reordered(sets, order, self.grid.spacing, margins, most)

@@ -53,7 +53,7 @@ def new_objects(loop: OpenLoop, belief: Belief, sightings: Sightings) -> list[Ne
         cloud = loop.shot.cloud
         appearance = Appearance(
             returns=cloud.cells[cloud.objects == number],
-            wedges=tuple(own_wedges[box] for box in boxes),
+            wedges=tuple(own_wedges[box] for box in boxes.tolist()),
             explained=by_memory[boxes],
             tracked=number in tracked,
         )

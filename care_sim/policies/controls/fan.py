@@ -35,4 +35,4 @@ class Fan(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern]])
+        return Demand(layers=[[self._pattern[: belief.budget]]])

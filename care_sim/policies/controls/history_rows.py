@@ -24,4 +24,4 @@ class HistoryRows(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then rows."""
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
-        return Demand(hulls, [[self._rows]])
+        return Demand(hulls, [[self._rows[: belief.budget]]])

@@ -32,7 +32,7 @@ class Place(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern]])
+        return Demand(layers=[[self._pattern[: belief.budget]]])
 
 
 def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:

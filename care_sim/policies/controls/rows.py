@@ -33,7 +33,7 @@ class Rows(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern]])
+        return Demand(layers=[[self._pattern[: belief.budget]]])
 
 
 def nearest_rows(grid: AngularGrid, elevation_deg: float = RING_ELEVATION_DEG) -> Cells:

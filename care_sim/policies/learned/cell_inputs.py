@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from care_sim.core.arrays import Mask
 from care_sim.core.belief import Belief
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.residual import explained, wedges
 from care_sim.core.rig import Rig
@@ -120,7 +121,8 @@ class CellInputs:
         """
         detections = belief.detections
         known = explained(detections, belief.tracks, self.rig)
-        sets = [*hulls, *wedges(detections, self.rig), *wedges(detections, self._undilated)]
+        dilated, bare = (wedges(detections, rig) for rig in (self.rig, self._undilated))
+        sets = CellSets.joined([CellSets.of(hulls), dilated, bare])
         new = MARK_UNEXPLAINED + MARK_SMALL * _SMALL_CLASSES[detections.classes]
         marks = np.concatenate(
             [
@@ -129,9 +131,7 @@ class CellInputs:
                 np.where(known, 0, MARK_BOX),
             ]
         )
-        # The empty array gives a keyframe without any set its type.
-        cells = np.concatenate([np.empty(0, np.int64), *sets])
-        return cells, np.cumsum([*map(len, sets)], dtype=np.int64), marks.astype(np.uint8)
+        return sets.cells, np.cumsum(sets.sizes), marks.astype(np.uint8)
 
     def _covered(self) -> Mask:
         """(N,) whether a point at the end of a cell's ray lies in a picture. So far out the offset

@@ -5,13 +5,13 @@ The pictures hold values from 0 to 1, the motion values from -1 to 1.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief, Observation
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
@@ -71,8 +71,8 @@ class GridFeatures:
         # In the order of the first three channels; the marks of the first, the hulls, are read
         # again when the returns are drawn.
         groups = [self.rig.hulls(belief.tracks.boxes), *camera_layers(belief, self.rig)]
-        cells = np.concatenate([np.empty(0, np.int64), *chain(*groups)])
-        ends = np.cumsum([sum(map(len, group)) for group in groups])
+        cells = CellSets.joined(groups).cells
+        ends = np.cumsum([len(group.cells) for group in groups])
         add_object_shares(cells, ends, self._blocks, self._marks, out)
 
     def _draw_returns(self, ranges: NDArray[np.float32], out: NDArray[np.float32]) -> None:

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.belief import Belief
+from care_sim.core.cell_sets import CellSets
 from care_sim.core.conditions import MIN_RETURNS
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
@@ -15,7 +16,6 @@ from care_sim.policies.own.care_spread import (
     CORE_FIRST,
     HULL_CELLS_PER_RETURN,
     WEDGE_CELLS_PER_RETURN,
-    part,
 )
 from care_sim.policies.own.sight_lines import SightLines
 
@@ -75,7 +75,7 @@ class CareSightlines(Policy):
         self._watches = sight_lines
         pattern = nearest_rows(rig.grid)
         self._row = int(pattern[0]) // rig.grid.columns
-        self._rows = [pattern] if rows else []
+        self._rows = CellSets.of([pattern] if rows else [])
         self.reset()
 
     def reset(self) -> None:
@@ -85,25 +85,22 @@ class CareSightlines(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
         unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else ([], [])
-        rechecked = known if self._rechecks else []
-        hulls = self.rig.hulls(belief.tracks.boxes)
         few, more = self._hull_round, self._wedge_round
-        most = max(self._wedge_most, few + more)
-        wedges, rechecked, hulls = self.rig.listed_groups(
-            [unexplained, rechecked, hulls], CORE_FIRST, most
-        )
+        wedges = self.rig.listed(unexplained, CORE_FIRST, self._wedge_most)
+        rechecked = self.rig.listed(known if self._rechecks else [], CORE_FIRST, few)
+        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
         self._lines.update(belief)
         return Demand(
             layers=[
-                part(wedges, 0, more),
+                wedges.part(0, more),
                 [self._lines.ahead()] if self._looks_ahead else [],
-                part(hulls, 0, few),
-                part(rechecked, 0, few),
+                hulls.part(0, few),
+                rechecked,
                 [self._lines.cells()] if self._watches else [],
-                [] if self._is_late(belief) else part(wedges, more, self._wedge_most),
-                part(self._rows, 0, self.rig.grid.columns),
-                part(hulls, few, few + more),
-                self._rows,
+                [] if self._is_late(belief) else wedges.part(more, self._wedge_most),
+                self._rows.part(0, self.rig.grid.columns),
+                hulls.part(few, few + more),
+                self._rows.part(0, belief.budget),
             ]
         )
 

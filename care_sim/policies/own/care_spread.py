@@ -1,12 +1,11 @@
 """CARE whose sets give their best cells first, and whose first round serves every set."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar
 
 from care_sim.base.checks import check_whole
 from care_sim.core.belief import Belief
 from care_sim.core.conditions import MIN_RETURNS
-from care_sim.core.grid import Cells
 from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -49,18 +48,13 @@ class CareSpread(Policy):
         """Layers: a round of wedges, a round of hulls, and both again."""
         unexplained, _ = camera_layers(belief, self.rig)
         hulls = self.rig.hulls(belief.tracks.boxes)
-        most = 2 * max(self._wedge_round, self._hull_round)
-        wedges, hulls = self.rig.listed_groups([unexplained, hulls], CORE_FIRST, most)
+        wedges = self.rig.listed(unexplained, CORE_FIRST, 2 * self._wedge_round)
+        hulls = self.rig.listed(hulls, CORE_FIRST, 2 * self._hull_round)
         return Demand(
             layers=[
-                part(wedges, 0, self._wedge_round),
-                part(hulls, 0, self._hull_round),
-                part(wedges, self._wedge_round, 2 * self._wedge_round),
-                part(hulls, self._hull_round, 2 * self._hull_round),
+                wedges.part(0, self._wedge_round),
+                hulls.part(0, self._hull_round),
+                wedges.part(self._wedge_round, 2 * self._wedge_round),
+                hulls.part(self._hull_round, 2 * self._hull_round),
             ]
         )
-
-
-def part(sets: Sequence[Cells], first: int, last: int) -> list[Cells]:
-    """From every set its cells from place `first` up to, not including, `last`."""
-    return [cells[first:last] for cells in sets]

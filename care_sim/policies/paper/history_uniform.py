@@ -1,5 +1,7 @@
 """History with an undirected reserve: a fixed, evenly spread pattern."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from care_sim.core.belief import Belief
@@ -33,8 +35,10 @@ class HistoryUniform(Policy):
         return Demand(self.rig.hulls(belief.tracks.boxes), [[self._pattern]])
 
 
+@lru_cache(maxsize=8)
 def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
-    """`count` different cells, ascending: as many in every row, evenly spaced.
+    """`count` different cells, ascending: as many in every row, evenly spaced. Read-only, since the
+    pattern is kept for the next keyframe.
 
     Each row is shifted against the one above by the golden ratio of its spacing.
     """
@@ -47,4 +51,5 @@ def uniform_pattern(grid: AngularGrid, count: int) -> Cells:
     # one column, so no cell comes twice.
     column = np.floor((place + row * GOLDEN % 1) * grid.columns / in_row[row]).astype(np.int64)
     cells: Cells = row * grid.columns + column
+    cells.flags.writeable = False
     return cells

@@ -68,7 +68,7 @@ def test_tiles_that_do_not_divide_the_grid_are_refused(azimuths, elevations):
 
 def test_sectors_become_layers_behind_the_hulls():
     demand = reserve_demand(NOTHING, RIG, QUARTERS, SCORES)
-    assert demand.exploitation == []
+    assert len(demand.exploitation) == 0
     assert [[cells.tolist() for cells in layer] for layer in demand.layers] == [
         [[10, 11, 14, 15]],
         [[8, 9, 12, 13]],

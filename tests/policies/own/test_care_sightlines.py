@@ -76,7 +76,7 @@ def test_every_layer_gives_its_part_of_a_set(environment, encounter):
             5: [cells[9:36] for cells in wedges],
             6: [pattern[: rig.grid.columns]],
             7: [cells[6:15] for cells in hulls],
-            8: [pattern],
+            8: [pattern[: rig.budget]],
         }
         for number, sets in expected.items():
             for cells, wanted in zip(layers[number], sets, strict=True):
@@ -137,11 +137,11 @@ def test_one_round_of_wedges_leaves_hulls_their_second(environment, encounter):
     assert longest.tolist() == [0, 9]
 
 
-def test_the_last_layer_is_the_pattern_rows(environment, encounter):
+def test_the_last_layer_is_as_much_of_the_pattern_rows_as_may_fire(environment, encounter):
     policy = care_sim.make_policy("care-sightlines", environment)
     policy(encounter[0])
     ((cells,),) = policy.demanded.layers[-1:]
-    assert np.array_equal(cells, nearest_rows(policy.rig.grid))
+    assert np.array_equal(cells, nearest_rows(policy.rig.grid)[: policy.rig.budget])
 
 
 @pytest.mark.parametrize("idea", ["camera", "ahead", "explained", "sight_lines", "rows"])
