@@ -46,8 +46,8 @@ class ForgettingRules:
 class Forgetting:
     """Algorithm 3: streak counters of the tracks, and the hulls that follow from them.
 
-    One instance lives as long as an episode. Both `next_exploitation` and `advance` move the
-    streaks on: call one of them, once per keyframe.
+    One instance lives as long as an episode. `advance` moves the streaks on and is called once per
+    keyframe; the rest follows from them.
     """
 
     def __init__(self, rules: ForgettingRules, rig: Rig):
@@ -55,32 +55,35 @@ class Forgetting:
         self._rig = rig
         self._streaks: dict[int, int] = {}
 
-    def next_exploitation(self, tracks: Tracks, ego: Ego) -> CellSets:
-        """Advance the streaks by one keyframe, and give the exploitation sets for Algorithm 1.
+    def advance(self, tracks: Tracks, ego: Ego) -> None:
+        """Advance the streaks by one keyframe."""
+        low = self._low_criticality(tracks, ego).tolist()
+        # A track that is gone is no key any more: if its id came back, its streak would begin anew.
+        self._streaks = {
+            track: self._streaks.get(track, 0) + 1 if is_low else 0
+            for track, is_low in zip(tracks.ids.tolist(), low, strict=True)
+        }
 
-        Full hulls come first, shrunk hulls second, each in the order of the tracks.
+    def exploitation(self, tracks: Tracks) -> CellSets:
+        """The exploitation sets for Algorithm 1: full hulls first, shrunk hulls second, each in the
+        order of the tracks.
         """
-        margins, low = self.advance(tracks, ego)
+        margins, low = self.margins(tracks)
         hulls = self._rig.hulls(tracks.boxes, margins)
         return hulls.take(np.argsort(low, kind="stable"))
 
-    def advance(self, tracks: Tracks, ego: Ego) -> tuple[Integers, Mask]:
-        """Advance the streaks by one keyframe, and say how far each hull shrinks.
+    def margins(self, tracks: Tracks) -> tuple[Integers, Mask]:
+        """How far each hull shrinks.
 
         Returns (n,) azimuth margins in columns, and (n,) which tracks are of low criticality. The
         margin in elevation is never dropped.
         """
-        low = self._low_criticality(tracks, ego)
-        ids = tracks.ids.tolist()
-        # A track that is gone is no key any more: if its id came back, its streak would begin anew.
-        self._streaks = {
-            track: self._streaks.get(track, 0) + 1 if is_low else 0
-            for track, is_low in zip(ids, low.tolist(), strict=True)
-        }
+        # A streak is as long as a track has been of low criticality, and 0 where it is not.
+        streaks = np.array([self._streaks.get(track, 0) for track in tracks.ids.tolist()], float)
+        low = streaks > 0
 
         # The margin shrinks with the streak, but never below what the uncertainty of the position
         # needs (Eq. 4), and never beyond that of a full hull.
-        streaks = np.array([self._streaks[track] for track in ids], dtype=float)
         margin = self._rig.azimuth_margin
         decayed = np.ceil(margin - self.rules.decay_per_keyframe * streaks)
         shrunk = np.clip(np.maximum(decayed, self._uncertainty(tracks.ranges)), 0, margin)

@@ -23,7 +23,8 @@ by the generator of the scenes. "control": it is no contender, and `all` leaves 
 
 
 class Policy(ABC):
-    """A scripted policy. Subclasses state the idea and its source, and implement `demand`.
+    """A scripted policy. Subclasses state the idea and its source, and implement `demand`. Those
+    with a memory implement `remember` and `reset` too. To call the policy is both, once a keyframe.
 
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
@@ -47,9 +48,16 @@ class Policy(ABC):
     def reset(self) -> None:
         """Forget the episode; called before each one."""
 
+    def remember(self, belief: Belief) -> None:
+        """Take in the belief of the coming keyframe; called once for each, before `demand`. What a
+        policy carries from keyframe to keyframe changes here and in `reset` alone.
+        """
+
     @abstractmethod
     def demand(self, belief: Belief) -> Demand:
-        """What to ask of the allocator at this keyframe: the sets and layers of Algorithm 1."""
+        """What to ask of the allocator at this keyframe: the sets and layers of Algorithm 1. It
+        follows from the belief and from what was remembered: asked again, it is the same.
+        """
 
     def __call__(self, observation: Observation) -> Action:
         """The action (E, A) of the environments for an observation.
@@ -64,6 +72,7 @@ class Policy(ABC):
             raise InvalidInput(f"policy {self.name or type(self).__name__}: {error}") from error
 
     def _cells(self, belief: Belief) -> Cells:
+        self.remember(belief)
         demand = self.demand(belief)
         if not isinstance(demand, Demand):
             raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")

@@ -113,7 +113,8 @@ def test_forgetting_serves_full_hulls_before_shrunk_ones_and_keeps_the_elevation
     belief = belief_of([car(0, 10), car(1, 20, 5, vy=3.0), car(2, 30, -5)])
     sbf.reset()
     for _ in range(5):
-        demand = sbf.demand(belief)
+        sbf.remember(belief)
+    demand = sbf.demand(belief)
     near, moving, far = belief.tracks.boxes
     bare_near, bare_far = rig.grid.hulls([near, far], 0)
     (full_moving,) = rig.grid.hulls([moving])
@@ -136,8 +137,10 @@ def test_parameters_of_forgetting_reach_the_rules(environment, belief_of, car):
         care_sim.make_policy("care-sbf", environment, **p) for p in ({}, {"k_safe": 0.0})
     )
     for _ in range(5):
-        kept, dropped = guarded.demand(belief), unguarded.demand(belief)
-    assert len(kept.exploitation[0]) > len(dropped.exploitation[0])
+        guarded.remember(belief)
+        unguarded.remember(belief)
+    kept, dropped = (policy.demand(belief).exploitation for policy in (guarded, unguarded))
+    assert len(kept[0]) > len(dropped[0])
 
 
 @pytest.mark.parametrize(
@@ -178,5 +181,6 @@ def test_an_action_is_the_allocation_of_the_demand(policy, encounter, environmen
     rig: Rig = environment.unwrapped.rig
     for observation in encounter:
         belief = Belief.from_observation(observation)
+        asking.remember(belief)
         cells = allocate(asking.demand(belief), rig.budget, rig.reserve_fraction)
         assert set(np.flatnonzero(acting(observation)).tolist()) == set(cells.tolist())

@@ -102,6 +102,20 @@ def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
         read_only(observation)
 
 
+@pytest.mark.parametrize("name", ["care", "care-sbf", "care-sightlines", "sweep", "seed-finder"])
+def test_asking_again_changes_nothing(name, encounter, environment):
+    """Neither the answer at this keyframe nor those at the coming ones."""
+    asked, asked_again = (care_sim.make_policy(name, environment) for _ in range(2))
+    for observation in encounter:
+        action = asked(observation)
+        assert np.array_equal(asked_again(observation), action)
+        belief = asked_again.rig.read(observation)
+        for _ in range(2):
+            demand = asked_again.demand(belief)
+            cells = allocate(demand, belief.budget, asked_again.rig.reserve_fraction)
+            assert sorted(cells.tolist()) == np.flatnonzero(action).tolist()
+
+
 def test_a_policy_lists_its_sets_row_by_row_from_the_top(case):
     """As the paper has it: in ascending index. So naming that order changes no action."""
     env, name = case

@@ -12,7 +12,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief, Observation
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
-from care_sim.core.types import CLASSES, Ego, ImageDetections, Tracks
+from care_sim.core.types import CLASSES, Demand, Ego, ImageDetections, Tracks
 from care_sim.measure.bench.config import BenchConfig
 from care_sim.measure.bench.scanning.moving_bodies import SENSOR, moving_bodies
 from care_sim.measure.driven import driven
@@ -94,7 +94,7 @@ def _round(policy: Policy, observations: list[Observation], samples: int) -> dic
     shown = list(islice(cycle(observations), samples))
     whole = [_seconds(policy, observation) for observation in shown]
     beliefs = [policy.rig.read(observation) for observation in shown]
-    demand = [_seconds(policy.demand, belief) for belief in beliefs]
+    demand = [_seconds(_asked, policy, belief) for belief in beliefs]
     reserve = policy.rig.reserve_fraction
     allocation = [
         _seconds(allocate, policy.demand(belief), belief.budget, reserve) for belief in beliefs
@@ -106,6 +106,12 @@ def _round(policy: Policy, observations: list[Observation], samples: int) -> dic
         "demand": 1e3 * float(np.median(demand)),
         "allocation": 1e3 * float(np.median(allocation)),
     }
+
+
+def _asked(policy: Policy, belief: Belief) -> Demand:
+    """A policy's demand at a new keyframe."""
+    policy.remember(belief)
+    return policy.demand(belief)
 
 
 def _seconds(call: Callable[..., Any], *arguments: Any) -> float:

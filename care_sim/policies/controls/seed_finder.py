@@ -62,12 +62,9 @@ class SeedFinder(Policy):
         self._keyframe = 0
         self._x = 0.0
 
-    def demand(self, belief: Belief) -> Demand:
-        """Hulls, then that of the actor whom nobody has seen."""
-        self._follow(belief.ego.speed)
-        return Demand(self.rig.hulls(belief.tracks.boxes), [self.rig.hulls(self._expected())])
-
-    def _follow(self, speed: float) -> None:
+    def remember(self, belief: Belief) -> None:
+        """Find the seed by the first speed, then follow the car."""
+        speed = belief.ego.speed
         if self._speed is None:
             self.found = _first_speeds(self._scenario, self._seeds).get(speed)
             if self.found is not None:
@@ -77,6 +74,10 @@ class SeedFinder(Policy):
             self._keyframe += 1
             self._x += (self._speed + speed) / 2 * self.rig.keyframe_s
         self._speed = speed
+
+    def demand(self, belief: Belief) -> Demand:
+        """Hulls, then that of the actor whom nobody has seen."""
+        return Demand(self.rig.hulls(belief.tracks.boxes), [self.rig.hulls(self._expected())])
 
     def _expected(self) -> Floats:
         """(n, 7) the box of the hidden actor in the sensor frame, none if it is not known."""

@@ -26,10 +26,14 @@ class Sweep(Policy):
 
     def reset(self) -> None:
         """Begin straight behind."""
-        self._next = 0
+        self._first = self._next = 0
+
+    def remember(self, belief: Belief) -> None:
+        """Go on by the budget."""
+        self._first = self._next
+        self._next = (self._first + belief.budget) % len(self._turn)
 
     def demand(self, belief: Belief) -> Demand:
         """The budget's next cells."""
-        places = (self._next + np.arange(belief.budget)) % len(self._turn)
-        self._next = (self._next + belief.budget) % len(self._turn)
+        places = (self._first + np.arange(belief.budget)) % len(self._turn)
         return Demand(layers=[[self._turn[places]]])

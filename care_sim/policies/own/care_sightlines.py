@@ -82,6 +82,10 @@ class CareSightlines(Policy):
         """Forget what was seen."""
         self._lines = SightLines(self.rig, self._row)
 
+    def remember(self, belief: Belief) -> None:
+        """Take in the last scan."""
+        self._lines.update(belief)
+
     def demand(self, belief: Belief) -> Demand:
         """Layers in order of priority; see the class."""
         unexplained, known = camera_layers(belief, self.rig) if self._uses_camera else ([], [])
@@ -89,7 +93,6 @@ class CareSightlines(Policy):
         wedges = self.rig.listed(unexplained, CORE_FIRST, self._wedge_most)
         rechecked = self.rig.listed(known if self._rechecks else [], CORE_FIRST, few)
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes), CORE_FIRST, few + more)
-        self._lines.update(belief)
         return Demand(
             layers=[
                 wedges.part(0, more),

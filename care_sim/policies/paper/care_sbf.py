@@ -49,7 +49,11 @@ class CareSbf(Policy):
         """Forget the streaks."""
         self._forgetting = Forgetting(self._rules, self.rig)
 
+    def remember(self, belief: Belief) -> None:
+        """Advance the streaks."""
+        self._forgetting.advance(belief.tracks, belief.ego)
+
     def demand(self, belief: Belief) -> Demand:
         """Full hulls, shrunk hulls, then the layers (U, M)."""
-        hulls = self._forgetting.next_exploitation(belief.tracks, belief.ego)
+        hulls = self._forgetting.exploitation(belief.tracks)
         return Demand(hulls, camera_layers(belief, self.rig))

@@ -32,8 +32,10 @@ class BudgetAlone:
 
 
 def chosen(policy):
-    """The cells asked for at the first keyframe, best first."""
-    ((cells,),) = policy.demand(BudgetAlone(policy.rig.budget)).layers
+    """The cells asked for at the next keyframe, best first."""
+    belief = BudgetAlone(policy.rig.budget)
+    policy.remember(belief)
+    ((cells,),) = policy.demand(belief).layers
     return cells
 
 

@@ -109,7 +109,7 @@ def test_after_reset_it_looks_again(make):
     for seed in (2, 7):
         observation, _ = env.reset(seed=seed)
         finder.reset()
-        finder.demand(Belief.from_observation(observation))
+        finder.remember(Belief.from_observation(observation))
         assert finder.found == seed
 
 
