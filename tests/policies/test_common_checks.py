@@ -102,10 +102,19 @@ def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
         read_only(observation)
 
 
-@pytest.mark.parametrize("name", ["care", "care-sbf", "care-sightlines", "sweep", "seed-finder"])
-def test_asking_again_changes_nothing(name, encounter, environment):
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("care", {}),
+        ("care-sbf", {"k_safe": 0.0, "decay_per_keyframe": 0.25}),
+        ("care-sightlines", {}),
+        ("sweep", {}),
+        ("seed-finder", {}),
+    ],
+)
+def test_asking_again_changes_nothing(name, parameters, encounter, environment):
     """Neither the answer at this keyframe nor those at the coming ones."""
-    asked, asked_again = (care_sim.make_policy(name, environment) for _ in range(2))
+    asked, asked_again = (care_sim.make_policy(name, environment, **parameters) for _ in range(2))
     for observation in encounter:
         action = asked(observation)
         assert np.array_equal(asked_again(observation), action)
