@@ -62,11 +62,10 @@ class Compare:
 
     def __call__(self) -> int:
         """Run it."""
+        common = self.conditions.arguments(self.policies)
 
         def made(names: Sequence[str]) -> list[EpisodeConfig]:
-            return grid(
-                [self.scenario], names, [self.budget], [self.seed], **self.conditions.arguments()
-            )
+            return grid([self.scenario], names, [self.budget], [self.seed], **common)
 
         policies, left_out = playable(self.policies, lambda name: made([name]))
         if not policies:

@@ -66,7 +66,7 @@ class Export(PlayOptions):
 
         # One floor and one latency: results are of one way to play, whereas a study has several.
         source = self.scene_source()
-        common = self.common()
+        common = self.common([self.policy])
         floors = [common.pop("floor_seed")]
         latencies = [common.pop("camera_latency")]
         return play_grid(

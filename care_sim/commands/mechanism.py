@@ -34,7 +34,7 @@ class Mechanism(StudyCommand, PlayOptions):
     def __call__(self) -> int:
         """Run it."""
         source = self.scene_source()
-        common = self.common() | {"presence": self.presence}
+        common = self.common((*self.policies, self.driver)) | {"presence": self.presence}
         scenes = chosen_scenes(source.scenes(), self.scenes)
 
         def plays(scenes: Sequence[Scene], policies: Sequence[str]) -> list[MechanismConfig]:

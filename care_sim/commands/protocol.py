@@ -57,7 +57,7 @@ class Protocol(StudyCommand, PlayOptions):
         """Run it."""
         check_values(self, "policies", "budgets")
         source = self.scene_source()
-        common = self.common() | {"presence": self.presence}
+        common = self.common(self.policies) | {"presence": self.presence}
         scenes = chosen_scenes(source.scenes(), self.scenes)
         latencies = in_turn(self.camera_latencies, "camera_latency", common)
         # The floors of a scene have consecutive seeds, from --floor-seed on.

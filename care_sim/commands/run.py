@@ -48,7 +48,7 @@ class Run:
         """Run it."""
         # Made as a grid of one, the configuration gets what `full` needs, as in a study.
         axes = ([self.scenario], [self.policy], [self.budget], [self.seed])
-        (config,) = grid(*axes, **self.conditions.arguments())
+        (config,) = grid(*axes, **self.conditions.arguments([self.policy]))
         if config.budget != self.budget:
             print("full fires every cell, whatever the budget", file=sys.stderr)
         photographer = BrakePhoto(self.picture)

@@ -38,7 +38,7 @@ class Sweep(EpisodeStudy):
         """Run it."""
         check_values(self, "scenarios", "policies", "budgets", "seeds")
         scenarios = expanded(self.scenarios, SCENARIOS)
-        common = self.conditions.arguments()
+        common = self.conditions.arguments(self.policies)
         # A policy that cannot be made for one seed and budget is left out, and the others play.
         policies, left_out = playable(
             self.policies, lambda name: grid(scenarios, [name], self.budgets[:1], [0], **common)

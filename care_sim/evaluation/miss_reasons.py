@@ -17,7 +17,8 @@ Enough of them were asked for, and the budget ended before enough were fired. Wh
 set that owes most of them:
 
 - `starved`: it got fewer cells than a detection needs.
-- `rim`: it got as many or more, but elsewhere, for example in the margin by which it is dilated.
+- `elsewhere`: it got as many or more, but not these: for example the margin by which it is dilated,
+  or the first part of a pattern.
 
 Nothing more could be asked for:
 
@@ -41,10 +42,10 @@ MISS_REASONS = (
     "explained",
     "not demanded",
     "starved",
-    "rim",
+    "elsewhere",
     "too few returns",
 )
-NOT_IN_PICTURE, EXPLAINED, NOT_DEMANDED, STARVED, RIM, TOO_FEW_RETURNS = MISS_REASONS
+NOT_IN_PICTURE, EXPLAINED, NOT_DEMANDED, STARVED, ELSEWHERE, TOO_FEW_RETURNS = MISS_REASONS
 
 
 @dataclass(frozen=True)
@@ -93,4 +94,4 @@ def _of_budget(owed: Cells, served: ServedDemand, min_returns: int) -> str:
     # equals, is the one that would have found the object.
     debts = [int(np.isin(owed, cells).sum()) for cells in served.sets]
     debtor = served.sets[int(np.argmax(debts))]
-    return STARVED if np.isin(debtor, served.fired).sum() < min_returns else RIM
+    return STARVED if np.isin(debtor, served.fired).sum() < min_returns else ELSEWHERE

@@ -45,6 +45,7 @@ __all__ = [
     "POLICIES",
     "check_policy",
     "contenders",
+    "is_pattern",
     "make_policy",
     "policy_names",
     "tags_of",
@@ -111,6 +112,16 @@ def tags_of(name: str) -> tuple[str, ...]:
     except InvalidInput:
         return ()
     return tags
+
+
+def is_pattern(name: str) -> bool:
+    """Whether the policy fires the same under every `cell_order`, as it says itself; not of one
+    that cannot be loaded.
+    """
+    try:
+        return bool(getattr(maker(name), "is_pattern", Policy.is_pattern))
+    except InvalidInput:
+        return False
 
 
 def make_policy(name: str, env: gymnasium.Env, /, **parameters: object) -> Policy:

@@ -29,8 +29,9 @@ class Policy(ABC):
     `rig` is what is fixed about the sensing task: grid, cameras, budget, reserve fraction,
     keyframe. `tags` are some of `TAGS`, `source` is the citation in one line. `told` maps
     parameters to the attributes of the environment that `make_policy` fills them from, unless they
-    are given. `keeps_order` leaves the demand as it is whatever `cell_order` the rig has: the order
-    of its cells is the idea, or the policy asks `Rig.listed` for its hulls and wedges itself.
+    are given. Two flags leave the demand as it is whatever `cell_order` the rig has: `keeps_order`
+    of a policy that asks `Rig.listed` for its hulls and wedges itself, and `is_pattern` of one that
+    asks for neither and fires the same under every order.
     `demanded` is what `demand` last answered a call with, in the order in which it was served, for
     those who watch.
     """
@@ -40,6 +41,7 @@ class Policy(ABC):
     source: ClassVar[str] = ""
     told: ClassVar[Mapping[str, str]] = {}
     keeps_order: ClassVar[bool] = False
+    is_pattern: ClassVar[bool] = False
     demanded: Demand | None = None
 
     def __init__(self, rig: Rig):
@@ -76,7 +78,7 @@ class Policy(ABC):
         demand = self.demand(belief)
         if not isinstance(demand, Demand):
             raise InvalidInput(f"demand must return a Demand, got {type(demand).__name__}")
-        if not self.keeps_order:
+        if not (self.keeps_order or self.is_pattern):
             demand = self.rig.in_cell_order(demand)
         self.demanded = demand
         cells = allocate(demand, belief.budget, self.rig.reserve_fraction)

@@ -1,6 +1,6 @@
 """Which policies are the controls that a contender has to beat, and which of them is the best."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from care_sim.reports.formatting import MARKS
 
@@ -10,6 +10,11 @@ IN_HINDSIGHT = (
     "It is chosen anew at each budget, by the very results that are compared. Such a choice in "
     "hindsight favours the control, which is the strict reading."
 )
+
+
+def candidates(controls: Iterable[str]) -> str:
+    """Among which controls the best one is chosen, in a sentence."""
+    return f"Candidates: {', '.join(controls)}."
 
 
 def is_control(tags: tuple[str, ...]) -> bool:

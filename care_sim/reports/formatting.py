@@ -120,13 +120,18 @@ def ends(difference: ShownDifference | None) -> str:
 
 def signed(difference: ShownDifference) -> str:
     """A mean difference with its sign and the marks beside it."""
-    number = f"{difference.mean:+z.{difference.decimals}f}"
+    # Beside an interval of one sign, a mean that reads as zero has one decimal more, too.
+    hides = difference.excludes_zero and _reads_as_zero(difference.mean, difference.decimals)
+    number = f"{difference.mean:+z.{difference.decimals + hides}f}"
     return f"{difference.bound}{number}{difference.asterisk}"
 
 
 def emphasised(difference: ShownDifference, text: str) -> str:
     """The text, bold where the interval of the difference excludes zero."""
-    return Bold(text) if difference.excludes_zero else text
+    if not difference.excludes_zero:
+        return text
+    # A mean that reads as zero is no effect that should catch the eye.
+    return text if _reads_as_zero(difference.mean, difference.decimals + 1) else Bold(text)
 
 
 def bounds(interval: Interval, decimals: int) -> str:
@@ -136,5 +141,9 @@ def bounds(interval: Interval, decimals: int) -> str:
 
 def _end(end: float, decimals: int) -> str:
     # An end at 0.04 printed as 0.0 would look as if the interval held zero.
-    hidden = round(end, decimals) == 0 != round(end, decimals + 1)
+    hidden = _reads_as_zero(end, decimals) and not _reads_as_zero(end, decimals + 1)
     return f"{end:z.{decimals + hidden}f}"
+
+
+def _reads_as_zero(value: float, decimals: int) -> bool:
+    return round(value, decimals) == 0

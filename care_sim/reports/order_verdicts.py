@@ -21,9 +21,9 @@ Verdicts = Mapping[str, Mapping[str, Verdict]]
 _RULE = f"Bold: another verdict than under {BASE_ORDER}."
 
 
-def verdict_tables(title: str, verdicts: Verdicts) -> list[Table]:
+def verdict_tables(title: str, verdicts: Verdicts, played: str) -> list[Table]:
     """The verdict on every statement under every order, and what was measured; none without
-    statements.
+    statements. `played` says how much it rests on.
     """
     statements = list(dict.fromkeys(text for found in verdicts.values() for text in found))
     if not statements:
@@ -39,8 +39,8 @@ def verdict_tables(title: str, verdicts: Verdicts) -> list[Table]:
         for text in statements
     ]
     return [
-        Table(title, columns, tuple(words), (_RULE,), whole=tuple(verdicts)),
-        Table(f"{title}, what was measured", columns, tuple(measured), terminal=False),
+        Table(title, columns, tuple(words), (_RULE, played), whole=tuple(verdicts)),
+        Table(f"{title}, what was measured", columns, tuple(measured), (played,), terminal=False),
     ]
 
 

@@ -54,10 +54,10 @@ class StudyReport:
         """The report of a study that lacks what is `left_out`."""
         tables = study.tables(rows)
         closing = _closing(rows, study, left_out)
-        statements = "## Statements\n\n" + "".join(
-            f"- {unmarked(sentence)}\n" for sentence in closing
-        )
-        pages = [f"{study.caption}\n", *(table.markdown() for table in tables), statements]
+        pages = [f"{study.caption}\n", *(table.markdown() for table in tables)]
+        if closing:
+            sentences = "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
+            pages.append(f"## Statements\n\n{sentences}")
         texts = [PREAMBLE, paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
         return cls(
             {"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows)

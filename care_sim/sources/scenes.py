@@ -134,8 +134,8 @@ def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
     """
     if not names:
         return scenes
-    if len(names) == 1 and names[0].isdecimal():
-        count = int(names[0][:LONGEST_NUMBER])
+    if len(names) == 1 and _is_number(names[0]):
+        count = int(names[0][:LONGEST_NUMBER]) if names[0].isdecimal() else 0
         if not 1 <= count <= len(scenes):
             raise InvalidInput(
                 f"scenes must be a number from 1 to {len(scenes)} or names, got "
@@ -147,3 +147,12 @@ def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:
         check_known("scene", name, known)
     # Each once, in the order in which they were asked for.
     return [known[name] for name in dict.fromkeys(names)]
+
+
+def _is_number(text: str) -> bool:
+    """Whether it was meant as a number, be it of scenes or not."""
+    try:
+        float(text[:LONGEST_NUMBER])
+    except ValueError:
+        return False
+    return True

@@ -53,6 +53,12 @@ def test_another_driver_does_not_replace_what_is_there(drive, tmp_path, capsys):
             ["--driver", "care-sbf", "--policy-parameters", "care-sbf.k_safe=0"],
             "the driver care-sbf plays without parameters, got k_safe: give those of another",
         ),
+        (
+            ["--policy-parameters", "ppo.path=w.npz"],
+            "policy parameter ppo.path is of a policy that is not played; played are history, "
+            "all-camera, care",
+        ),
+        (["--scenes", "-1"], "scenes must be a number from 1 to 150 or names, got -1"),
     ],
 )
 def test_what_the_command_does_not_take_is_one_line(arguments, complaint, capsys, tmp_path):

@@ -323,6 +323,13 @@ def test_scenes_are_chosen_by_number_or_by_name():
     )
 
 
+@pytest.mark.parametrize("text", ["-1", "0", "151", "2.5", "1e2", "+3"])
+def test_a_number_of_scenes_that_there_is_not_is_one_short_line(text):
+    with pytest.raises(InvalidInput) as refused:
+        chosen_scenes(Streets().scenes(), (text,))
+    assert str(refused.value) == f"scenes must be a number from 1 to 150 or names, got {text}"
+
+
 def test_a_scene_without_an_event_has_a_row_too(tmp_path):
     far = box("REGULAR_VEHICLE", (70.0, 0.0, 0.42))
     write(tmp_path / "empty", [[far]] * 10, [at()] * 10)

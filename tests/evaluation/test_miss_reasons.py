@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from care_sim.core.allocation import allocate
 from care_sim.core.types import Demand
 from care_sim.evaluation.miss_reasons import (
+    ELSEWHERE,
     EXPLAINED,
     MISS_REASONS,
     NOT_DEMANDED,
     NOT_IN_PICTURE,
-    RIM,
     STARVED,
     TOO_FEW_RETURNS,
     Appearance,
@@ -47,8 +47,8 @@ CASES = {
     "two cells of the wedge": (
         seen(False), Demand([HULL], [[WEDGE, BESIDE]]), 7, STARVED,
     ),
-    "five cells, four of the margin": (seen(False), Demand([HULL], [[WEDGE]]), 8, RIM),
-    "three of the wedge, all of the margin": (seen(False), Demand([HULL], [[WEDGE]]), 6, RIM),
+    "five cells, four of the margin": (seen(False), Demand([HULL], [[WEDGE]]), 8, ELSEWHERE),
+    "three of the wedge, all of the margin": (seen(False), Demand([HULL], [[WEDGE]]), 6, ELSEWHERE),
     "exploitation is cut off, too": (seen(), Demand([OBJECT, HULL]), 2, STARVED),
     "the wedge lies beside it": (
         seen(False, wedge=BESIDE), Demand([HULL], [[BESIDE]]), 6, TOO_FEW_RETURNS,
@@ -76,7 +76,7 @@ def test_rows_of_a_pattern_that_the_budget_cuts_off_are_starved():
 def test_a_large_set_that_holds_one_cell_does_not_hide_that_its_own_wedge_starved():
     """A neighbour's hull got six cells, and owes one of the object's; the wedge owes six."""
     neighbour = np.array([40, 41, 42, 43, 44, 45, 10, 46])
-    assert reason(seen(False), Demand([neighbour], [[WEDGE]]), 9) == RIM
+    assert reason(seen(False), Demand([neighbour], [[WEDGE]]), 9) == ELSEWHERE
     assert reason(seen(False), Demand([neighbour], [[WEDGE]]), 7) == STARVED
 
 
@@ -115,7 +115,7 @@ def test_a_miss_has_one_reason_and_the_budget_is_blamed_only_where_more_of_it_wo
     assert told in MISS_REASONS
     # With a budget for everything that is asked, as many returns come as there are to be had.
     hits = np.isin(appearance.returns, allocate(demand, 1000, 0.3)).sum()
-    if told in (STARVED, RIM):
+    if told in (STARVED, ELSEWHERE):
         assert hits >= 3
     elif told != TOO_FEW_RETURNS:
         assert hits < 3

@@ -18,6 +18,9 @@ def made(measure, bound, *numbers, pairs=30, cautious=None):
     [
         (made(DETECTION, Bound.EXACT, 3.0, 2.0, 4.0), "+3.0* [2.0,4.0]", True),
         (made(DETECTION, Bound.EXACT, 0.2, 0.04, 0.4), "+0.2 [0.04,0.4]", True),
+        (made(DETECTION, Bound.EXACT, 0.04, 0.02, 0.06), "+0.04 [0.02,0.1]", True),
+        (made(DETECTION, Bound.EXACT, -0.04, -0.06, -0.02), "-0.04 [-0.1,-0.02]", True),
+        (made(DETECTION, Bound.EXACT, 0.004, 0.002, 0.006), "+0.00 [0.0,0.01]", False),
         (made(DETECTION, Bound.EXACT, -0.01, -0.04, 0.0), "+0.0 [-0.04,0.0]", False),
         (made(DETECTION, Bound.AT_MOST, -8.0, -9.0, -7.0), "≤-8.0* [-9.0,-7.0]", True),
         (

@@ -92,7 +92,7 @@ def test_a_pattern_without_camera_is_accounted_for():
 def test_with_a_budget_of_a_few_cells_the_wedge_starves_and_then_goes_to_its_rim():
     """Three wedges take turns; rows come from the top, where the margin is."""
     assert account("care", budget=6 / GRID.size).reasons[0] == "starved"
-    assert account("care", budget=12 / GRID.size).reasons[0] == "rim"
+    assert account("care", budget=12 / GRID.size).reasons[0] == "elsewhere"
 
 
 def test_a_lost_return_is_no_fault_of_the_policy():

@@ -4,7 +4,13 @@ import pytest
 
 from care_sim.core.cell_order import AS_DEMANDED
 from care_sim.sources.scenes import Scene, Streets
-from care_sim.study.designs.order import ORDERS, order_plays, order_study, rows_by_order
+from care_sim.study.designs.order import (
+    ORDERS,
+    order_plays,
+    order_study,
+    rows_by_order,
+    without_order,
+)
 from care_sim.study.designs.paper import paper_study
 
 STREETS = Streets("evaluation")
@@ -34,6 +40,17 @@ def test_the_full_scan_is_played_once_and_belongs_to_every_order():
     own = rows_by_order(rows_of(plays))["rows-up"]
     assert Counter(row["policy"] for row in own) == {"care": 8, "full": 2}
     assert {row["cell_order"] for row in own} == {AS_DEMANDED}
+
+
+def test_patterns_are_played_once_and_belong_to_every_order():
+    """History with rows asks for hulls: it feels the order."""
+    plays = order_plays(STREETS, SCENES, ["rows", "history-rows"], [0.03, 0.1])
+    assert len(plays) == len(set(plays)) == 2 * 2 * (1 + 6)
+    assert len(order_study([0], ["fan"])) == len(order_study([0])) + 4 + 3 + 1 + 2 + 2
+    for order, own in rows_by_order(rows_of(plays)).items():
+        counts = Counter(row["policy"] for row in own)
+        assert (order, counts) == (order, {"rows": 4, "history-rows": 4})
+    assert without_order(rows_of(plays)) == ["rows"]
 
 
 @pytest.mark.parametrize("kept", [("columns", "rows-down"), ("spread",)])

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.commands.shared.selection import policy_parameters
 from care_sim.core.conditions import Conditions
 from care_sim.perception.detectors import PROXY
 from care_sim.study.parameters import parameters
@@ -28,12 +29,14 @@ class Options(Conditions):
     """Parameters of the policies as NAME=VALUE, for example k_safe=0 for care-sbf; of one among
     several as POLICY.NAME=VALUE, for example ppo.path=weights.npz."""
 
-    def arguments(self) -> dict[str, Any]:
-        """As arguments of `EpisodeConfig`."""
+    def arguments(self, policies: Sequence[str]) -> dict[str, Any]:
+        """As arguments of `EpisodeConfig`, of studies that play these policies. Raises InvalidInput
+        for parameters of another one.
+        """
         pairs = {
             "detector_parameters": parameters(self.detector_parameters),
             "scenario_parameters": parameters(self.scenario_parameters),
-            "policy_parameters": parameters(self.policy_parameters),
+            "policy_parameters": policy_parameters(self.policy_parameters, policies),
         }
         return {field.name: getattr(self, field.name) for field in fields(self)} | pairs
 

@@ -1,11 +1,13 @@
 """Options of the commands of the open loop: source of the scenes, detector, conditions."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 
+from care_sim.commands.shared.selection import policy_parameters
 from care_sim.core.conditions import Conditions
 from care_sim.perception.detectors import PROXY
 from care_sim.sources.scenes import Source, source_of
@@ -60,12 +62,13 @@ class PlayOptions(SourceOptions):
         """The source that the options name. Raises InvalidInput where there is none."""
         return self.source_named(self.source)
 
-    def common(self) -> dict[str, Any]:
+    def common(self, policies: Sequence[str]) -> dict[str, Any]:
         """Conditions and parameters that all plays share, as fields of
-        `care_sim.study.play_config.PlayConfig`.
+        `care_sim.study.play_config.PlayConfig`, of studies that play these policies. Raises
+        InvalidInput for parameters of another one.
         """
         return asdict(self.conditions) | {
             "detector": self.detector,
             "detector_parameters": parameters(self.detector_parameters),
-            "policy_parameters": parameters(self.policy_parameters),
+            "policy_parameters": policy_parameters(self.policy_parameters, policies),
         }

@@ -4,8 +4,9 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
 from care_sim.base.errors import BrokenPolicy, InvalidInput, MissingExtra, report_problems
-from care_sim.commands.shared.options import DEFAULT_OPTIONS
-from care_sim.policies import contenders
+from care_sim.core.conditions import DEFAULTS
+from care_sim.policies import check_policy, contenders
+from care_sim.study.parameters import Parameters, parameters
 
 _ALL = "all"
 """The name that stands for every known one."""
@@ -50,10 +51,32 @@ def playable(names: Sequence[str], make: Callable[[str], object]) -> tuple[list[
 
     Raises InvalidInput where something else is wrong.
     """
-    policies, broken = makeable(expanded(names, contenders() if _ALL in names else ()), make)
+    policies, broken = makeable(_policies(names), make)
     left_out = [f"left out: {reason}" for reason in broken.values()]
     report_problems(left_out)
     return policies, left_out
+
+
+def policy_parameters(texts: Sequence[str], policies: Sequence[str]) -> Parameters:
+    """The parameters that are given as NAME=VALUE or POLICY.NAME=VALUE to the named `policies`.
+
+    Raises InvalidInput for one of a policy that is not among them: it would change nothing.
+    """
+    given = parameters(texts)
+    played = _policies(policies)
+    for name, _ in given:
+        owner = name.rpartition(".")[0]
+        if owner and owner not in played:
+            check_policy(owner)
+            raise InvalidInput(
+                f"policy parameter {name} is of a policy that is not played; played are "
+                f"{', '.join(played)}"
+            )
+    return given
+
+
+def _policies(names: Sequence[str]) -> list[str]:
+    return expanded(names, contenders() if _ALL in names else ())
 
 
 def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequence[Any]:
@@ -61,6 +84,6 @@ def in_turn(several: Sequence[Any], name: str, common: dict[str, Any]) -> Sequen
     which loses it.
     """
     one = common.pop(name)
-    if several and one != getattr(DEFAULT_OPTIONS, name):
+    if several and one != DEFAULTS[name]:
         raise InvalidInput(f"give {name} one value or several, not both")
     return several or (one,)

@@ -22,7 +22,7 @@ class Fan(Policy):
     name = "fan"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
-    keeps_order = True
+    is_pattern = True
 
     def __init__(self, rig: Rig):
         super().__init__(rig)

@@ -24,7 +24,7 @@ class Place(Policy):
     name = "place"
     tags = ("causal", "learned", "control")
     source = "own: a map that never changes"
-    keeps_order = True
+    is_pattern = True
 
     def __init__(self, rig: Rig, path: str | PathLike[str] | None = None):
         super().__init__(rig)

@@ -24,7 +24,7 @@ class Rows(Policy):
     name = "rows"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
-    keeps_order = True
+    is_pattern = True
 
     def __init__(self, rig: Rig, elevation_deg: float = RING_ELEVATION_DEG):
         super().__init__(rig)

@@ -14,7 +14,7 @@ class Stride(Policy):
     name = "stride"
     tags = ("causal", "control")
     source = "own: a pattern that never changes"
-    keeps_order = True
+    is_pattern = True
 
     def demand(self, belief: Belief) -> Demand:
         """The pattern of the budget."""

@@ -16,7 +16,7 @@ class Sweep(Policy):
     name = "sweep"
     tags = ("causal", "control")
     source = "own: a pattern that turns"
-    keeps_order = True
+    is_pattern = True
 
     def __init__(self, rig: Rig):
         super().__init__(rig)

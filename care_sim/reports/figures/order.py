@@ -1,12 +1,13 @@
 """Figures of the study of the order of cells: what every policy detects under every order."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING
 from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, styles
 from care_sim.reports.formatting import marked, tag_notes
@@ -28,6 +29,10 @@ street at the tightest, and at the one from which the reserves converge in the p
 """
 _NOT_DETECTED = 0.0
 """Where a median stands that is not detected, in metres."""
+_PER_INCH = 12
+"""Letters of a title on an inch."""
+_LEGEND_INCHES = 1.6
+"""Width of the legend on the right."""
 _BAND = 0.7
 """Share of the way from one order to the next that the markers of an order take."""
 
@@ -52,7 +57,7 @@ def order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
         return {}
     figure = _figure(panels, study.orders, study.tags, "first detection, median (m)")
     seeds = len({row["seed"] for row in rows})
-    _head(figure, f"{seeds} seeds (at 0: not detected)")
+    _head(figure, f"{counted(seeds, 'seed')} (at 0: not detected)")
     return {ORDER_FIGURE: figure}
 
 
@@ -63,7 +68,7 @@ def open_order_figures(rows: Sequence[Row]) -> dict[str, Figure]:
     if not panels:
         return {}
     figure = _figure(panels, tuple(study.by_order), study.tags, "first-sighting recall (%)")
-    _head(figure, f"{study.label}, {study.scenes} scenes")
+    _head(figure, f"{study.label}, {counted(study.scenes, 'scene')}")
     return {OPEN_ORDER_FIGURE: figure}
 
 
@@ -137,4 +142,7 @@ def _draw(axes: Axes, panel: _Panel, drawn: Mapping[str, Style], tags: _Tags) ->
 
 
 def _head(figure: Figure, text: str) -> None:
-    figure.suptitle(f"order of the cells inside a set: {text}", x=0.01, ha="left", fontsize=10)
+    # The title of a figure of few panels is broken before it reaches the legend.
+    room = int(_PER_INCH * (figure.get_figwidth() - _LEGEND_INCHES))
+    title = fill(f"order of the cells inside a set: {text}", room)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=10)

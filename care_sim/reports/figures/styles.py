@@ -34,11 +34,14 @@ _KNOWN = {
     "ppo-dartout": ("#661100", "*"),
     "care-sightlines": ("#000000", "d"),
     "care-spread": ("#6699CC", "H"),
-    "rows": ("#CC6677", "8"),
-    "place": ("#44AA99", "d"),
-    "fan": ("#BBAA33", "H"),
+    "rows": ("#CC6677", "x"),
+    "place": ("#44AA99", "+"),
+    "fan": ("#BBAA33", "8"),
 }
-"""From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind."""
+"""From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind. No
+two have one marker. `rows` and `place` have thin ones, since Matplotlib has too few to fill; a
+closed loop, whose figures leave markers open, plays `fan`.
+"""
 _SPARE = ("#88CCEE", "#DDCC77", "#EE8866", "#AAAA00", "#77AADD")
 _GREYS = ("0.3", "0.45", "0.6")
 _MARKERS = ("H", "8", "d", "s", "^")

@@ -26,7 +26,7 @@ def belief_table(study: MechanismRows) -> Table:
          _share(use.filled_rho, use.keyframes), ""),
         ("cells of explained wedges outside U, per keyframe",
          _mean(use.explained_cells, use.keyframes), paper.REMOVED_CELLS),
-        ("of these, cells that exploitation had not taken",
+        ("cells of them that exploitation had not taken, per keyframe",
          _mean(use.untaken_cells, use.keyframes), ""),
         *_entry_lines(study.entries(), study.driver),
     ]  # fmt: skip
@@ -48,9 +48,12 @@ def _entry_lines(entries: NewEntries, driver: str) -> list[TableRow]:
         ("new entries with a track already, detected beyond 50 m",
          _share(int(entries.tracked.sum()), count), ""),
         ("new entries with an image box", _share(pictured, count), ""),
-        ("of these, explained falsely", _share(falsely, pictured), paper.FALSELY_EXPLAINED),
-        ("of these, missed by a full scan too", _share(lost, falsely), paper.MISSED_ANYWAY),
-        (f"of these, missed by {driver} and found by a full scan", str(won), paper.RECOVERED),
+        ("entries with an image box that are explained falsely",
+         _share(falsely, pictured), paper.FALSELY_EXPLAINED),
+        ("falsely explained entries that a full scan misses too",
+         _share(lost, falsely), paper.MISSED_ANYWAY),
+        (f"falsely explained entries that {driver} misses and a full scan finds",
+         str(won), paper.RECOVERED),
     ]  # fmt: skip
 
 

@@ -5,7 +5,13 @@ from typing import NamedTuple
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio, among, ratio_level
-from care_sim.reports.controls import BEST_CONTROL, IN_HINDSIGHT, best_control, is_control
+from care_sim.reports.controls import (
+    BEST_CONTROL,
+    IN_HINDSIGHT,
+    best_control,
+    candidates,
+    is_control,
+)
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import HEADINGS, MeasuredDifference, PolicyPair
 from care_sim.reports.protocol.notes import left_out, on_intervals, played
@@ -96,6 +102,7 @@ def control_tables(plays: SettingPlays) -> list[Table]:
             (
                 f"Recall in points. {played(plays)}",
                 RULE,
+                candidates(controls(plays)),
                 *on_intervals(shown),
                 *left_out(plays),
                 *tag_notes(plays.tags.values()),

@@ -8,6 +8,7 @@ from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import FEWEST_PAIRS
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.formatting import interval, marked, tag_notes
+from care_sim.reports.order_tables import Shown, other_orders, played_once, tables_by_order
 from care_sim.reports.order_verdicts import Verdict, Verdicts, on_mirrored_order, verdict_tables
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.differences import MeasuredDifference, difference_between
@@ -16,12 +17,11 @@ from care_sim.reports.protocol.notes import played
 from care_sim.reports.protocol.paper import claims_about
 from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.reports.table import Table
-from care_sim.study.designs.order import BASE_ORDER, rows_by_order
+from care_sim.study.designs.order import BASE_ORDER, rows_by_order, without_order
 from care_sim.study.run_config import FULL, Row
 
 _RATIOS = (FIRST_SIGHTING, OVERALL)
-_NAMES = ("policy", "budget")
-_INTERVALS = f"In points, with intervals over scenes, none of fewer than {FEWEST_PAIRS}."
+_INTERVALS = f"With intervals over scenes, none of fewer than {FEWEST_PAIRS}."
 
 
 class OrderPlays:
@@ -37,11 +37,7 @@ class OrderPlays:
         self.label = first.setting.label
         self.scenes = len(first.scenes)
         self.played = played(first)
-
-    @property
-    def others(self) -> tuple[str, ...]:
-        """The orders that the usual one is compared with."""
-        return tuple(order for order in self.by_order if order != BASE_ORDER)
+        self.once = without_order(rows)
 
     def level(self, ratio: Ratio, order: str, policy: str, budget: float) -> float | None:
         """A recall in %."""
@@ -64,23 +60,18 @@ def order_tables(rows: Sequence[Row]) -> list[Table]:
     study = OrderPlays(rows)
     if not study.tags:
         return []
-    notes = (study.played, *tag_notes(study.tags.values()))
+    notes = (study.played, *played_once(study.once), *tag_notes(study.tags.values()))
+    title = f"{study.label}: the paper's statements by order of cells"
     return [
-        Table(
-            f"{study.label}: recall by order of cells, %",
-            (*_NAMES, *study.by_order),
-            tuple(_levels(study)),
+        *tables_by_order(
+            Shown(f"{study.label}: recall", "%", "points"),
+            study.by_order,
+            _levels(study),
+            _changes(study),
             notes,
-            whole=_NAMES,
+            (_INTERVALS,),
         ),
-        Table(
-            f"{study.label}: recall by order of cells, minus {BASE_ORDER}",
-            (*_NAMES, *study.others),
-            tuple(_changes(study)),
-            (_INTERVALS, *notes),
-            whole=_NAMES,
-        ),
-        *verdict_tables(f"{study.label}: the paper's statements by order of cells", verdicts(rows)),
+        *verdict_tables(title, verdicts(rows), study.played),
     ]
 
 
@@ -123,11 +114,13 @@ def _levels(study: OrderPlays) -> Iterator[tuple[str, ...]]:
 
 
 def _changes(study: OrderPlays) -> Iterator[tuple[str, ...]]:
+    others = other_orders(study.by_order)
     for ratio in _RATIOS:
         yield (ratio.name,)
         for policy, budget, names in _cells(study):
-            changes = (study.change(ratio, order, policy, budget) for order in study.others)
-            yield (*names, *map(interval, changes))
+            if policy not in study.once:
+                changes = (study.change(ratio, order, policy, budget) for order in others)
+                yield (*names, *map(interval, changes))
 
 
 def _cells(study: OrderPlays) -> Iterator[tuple[str, float, tuple[str, str]]]:

@@ -9,7 +9,13 @@ import numpy as np
 from care_sim.base.errors import percent
 from care_sim.reports.cells import Cell
 from care_sim.reports.contrasts import DETECTION, contrast
-from care_sim.reports.controls import BEST_CONTROL, IN_HINDSIGHT, best_control, is_control
+from care_sim.reports.controls import (
+    BEST_CONTROL,
+    IN_HINDSIGHT,
+    best_control,
+    candidates,
+    is_control,
+)
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.table import Table
 from care_sim.study.rows.reading import Groups, detection, full_of
@@ -52,7 +58,7 @@ def control_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> l
             f"{setting.label}: each policy minus the {BEST_CONTROL}, first detection in m",
             (f"minus the {BEST_CONTROL}", *map(percent, budgets)),
             tuple(lines),
-            (_RULE, *tag_notes(tags.values())),
+            (_RULE, candidates(controls), *tag_notes(tags.values())),
         )
     ]
 

@@ -4,19 +4,20 @@ first detections, order by order.
 
 from collections.abc import Iterator, Sequence
 
-from care_sim.base.errors import percent
+from care_sim.base.errors import counted, percent
 from care_sim.reports.cells import Cell, summarise
 from care_sim.reports.contrasts import DETECTION, Contrast, contrast
 from care_sim.reports.formatting import interval, marked, median, tag_notes
+from care_sim.reports.order_tables import Shown, other_orders, played_once, tables_by_order
 from care_sim.reports.order_verdicts import Verdict, Verdicts, on_mirrored_order, verdict_tables
 from care_sim.reports.table import Table
 from care_sim.reports.tables.paper_statements import statements
-from care_sim.study.designs.order import BASE_ORDER, rows_by_order
+from care_sim.study.designs.order import BASE_ORDER, rows_by_order, without_order
+from care_sim.study.designs.paper import PAPER_EPISODES
 from care_sim.study.rows.reading import Key, grouped
-from care_sim.study.run_config import FULL, Row
+from care_sim.study.run_config import Row
 
-_NAMES = ("policy", "budget")
-_FULL = "The full scan feels no order and was played once."
+_DETECTION = Shown("First detection", "median, m", "m")
 
 
 class OrderCells:
@@ -25,6 +26,8 @@ class OrderCells:
     def __init__(self, rows: Sequence[Row]):
         played = rows_by_order(rows)
         self.orders = tuple(played)
+        self.once = without_order(rows)
+        self.episodes = max(map(len, grouped(rows).values()))
         self._groups = {order: grouped(own) for order, own in played.items()}
         self._cells = {
             order: {cell.key: cell for cell in summarise(own)} for order, own in played.items()
@@ -32,11 +35,6 @@ class OrderCells:
         self.tags = {
             cell.policy: cell.tags for cells in self._cells.values() for cell in cells.values()
         }
-
-    @property
-    def others(self) -> tuple[str, ...]:
-        """The orders that the usual one is compared with."""
-        return tuple(order for order in self.orders if order != BASE_ORDER)
 
     @property
     def keys(self) -> list[Key]:
@@ -58,23 +56,13 @@ def order_tables(rows: Sequence[Row]) -> list[Table]:
     order.
     """
     study = OrderCells(rows)
-    notes = (_FULL, *tag_notes(study.tags.values()))
+    title = "The paper's statements by order of cells"
+    played = f"Of each cell {counted(study.episodes, 'episode')}; the paper has {PAPER_EPISODES}."
+    notes = (*played_once(study.once), *tag_notes(study.tags.values()))
     return [
-        *verdict_tables("The paper's statements by order of cells", verdicts(rows)),
-        Table(
-            "First detection by order of cells, median, m",
-            (*_NAMES, *study.orders),
-            tuple(_levels(study)),
-            notes,
-            whole=_NAMES,
-        ),
-        Table(
-            f"First detection by order of cells, minus {BASE_ORDER}, m",
-            (*_NAMES, *study.others),
-            tuple(_changes(study)),
-            notes,
-            whole=_NAMES,
-            terminal=False,
+        *verdict_tables(title, verdicts(rows), played),
+        *tables_by_order(
+            _DETECTION, study.orders, _levels(study), _changes(study), notes, terminal=False
         ),
     ]
 
@@ -102,9 +90,10 @@ def _levels(study: OrderCells) -> Iterator[tuple[str, ...]]:
 
 
 def _changes(study: OrderCells) -> Iterator[tuple[str, ...]]:
-    budgeted = [key for key in study.keys if key[1] != FULL]
-    for key, names in _named(study, budgeted):
-        changes = [study.change(order, key) for order in study.others] if key else []
+    others = other_orders(study.orders)
+    ordered = [key for key in study.keys if key[1] not in study.once]
+    for key, names in _named(study, ordered):
+        changes = [study.change(order, key) for order in others] if key else []
         yield (*names, *map(interval, changes))
 
 

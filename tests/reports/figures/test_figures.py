@@ -1,12 +1,15 @@
 import numpy as np
 import pytest
 
+from care_sim.commands.protocol import Protocol
+from care_sim.commands.sweep import Sweep
 from care_sim.reports.figures.budget import sweep_figures
 from care_sim.reports.figures.crowding import crowding_figures
 from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.figures.styles import styles
 from tests.helpers.made_rows import CROWD, STUDY, rows
 
+OWN = ("care-spread", "care-priority")
 SWEEP = [
     *STUDY,
     *rows("history", [None, None, None, 8.0, 9.0], budget=0.1),
@@ -50,6 +53,11 @@ def test_a_median_that_is_not_detected_is_an_open_marker_at_the_bottom_with_the_
     assert (list(hollow.get_xdata()), list(hollow.get_ydata())) == ([0.1], [0.0])
     assert [text.get_text() for text in axes.texts] == ["3/5 never"]
     assert axes.get_ylim()[0] == 0.0
+
+
+def test_policies_that_studies_play_share_no_marker():
+    drawn = styles((name, ()) for name in {*Protocol.policies, *Sweep.policies, *OWN} - {"full"})
+    assert len({style.marker for style in drawn.values()}) == len(drawn)
 
 
 def test_every_policy_looks_different_and_those_no_car_can_have_are_dashed():

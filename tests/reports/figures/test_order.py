@@ -1,6 +1,7 @@
 """Figures of the study of the order of cells."""
 
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from care_sim.reports.figures.files import save
 from care_sim.reports.figures.order import open_order_figures, order_figures
@@ -73,6 +74,20 @@ def test_figures_are_written_the_same_every_time(draw, rows, tmp_path):
     first = (tmp_path / f"{name}.svg").read_bytes()
     save(draw(rows)[name], tmp_path / name)
     assert (tmp_path / f"{name}.svg").read_bytes() == first
+
+
+@pytest.mark.parametrize("budgets", [(0.03,), (0.03, 0.1)])
+def test_the_title_fits_into_the_figure(budgets):
+    (figure,) = open_order_figures([p for p in PLAYS if p["budget"] in (*budgets, 1.0)]).values()
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    title = figure.findobj(lambda artist: getattr(artist, "get_text", str)().startswith("order of"))
+    box = title[0].get_window_extent(canvas.get_renderer())
+    legend = figure.legends[0].get_window_extent(canvas.get_renderer())
+    assert 0 <= box.x0 < box.x1 <= legend.x0
+    assert " ".join(title[0].get_text().split()) == (
+        "order of the cells inside a set: generated streets, detector returns, 6 scenes"
+    )
 
 
 def test_the_full_scan_alone_draws_nothing():

@@ -6,7 +6,13 @@ from hypothesis import strategies as st
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import Conditions
-from care_sim.evaluation.miss_reasons import EXPLAINED, MISS_REASONS, NOT_DEMANDED, RIM, STARVED
+from care_sim.evaluation.miss_reasons import (
+    ELSEWHERE,
+    EXPLAINED,
+    MISS_REASONS,
+    NOT_DEMANDED,
+    STARVED,
+)
 from care_sim.evaluation.ray_shares import RAY_SHARES
 from care_sim.reports.mechanism.rows import MechanismRows
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
@@ -49,13 +55,13 @@ ROWS = [
         pictured=(1, 1, 1), falsely_explained=(0, 0, 1), covered=(0, 0, 1), received=(40, 50, 7),
     ),
     row(
-        "a", "history", (1, 0, 6), (NOT_DEMANDED, FOUND, RIM),
+        "a", "history", (1, 0, 6), (NOT_DEMANDED, FOUND, ELSEWHERE),
         ((0, 0, 1), NONE, NONE, NONE, (0, 5, 0)),
         differing_keyframes=10, differing_cells=1000, received=(1, 3, 9),
     ),
     row("a", "full", (0, 0, 0), (FOUND,) * 3, (NONE, (4, 4, 4), NONE, NONE, NONE)),
     row(
-        "b", "care", (0, 2, 6), (FOUND, RIM, STARVED),
+        "b", "care", (0, 2, 6), (FOUND, ELSEWHERE, STARVED),
         ((0, 0, 0), (8, 0, 0), NONE, NONE, NONE),
         filled=40, filled_rho=40, explained_cells=36000, untaken_cells=16000,
         pictured=(1, 0, 0), falsely_explained=(0, 0, 0), covered=(0, 0, 0), received=(60, 0, 0),

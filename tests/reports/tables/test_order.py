@@ -51,6 +51,13 @@ def test_every_statement_has_a_verdict_under_every_order(tables):
     assert measured[1:3] == ("10.3 against 15.1", "15.1 against 15.1")
 
 
+def test_verdicts_say_how_many_episodes_they_rest_on(tables):
+    for title in TITLES[:2]:
+        assert "Of each cell 5 episodes; the paper has 5." in tables[title].notes
+    single = order_tables([row for row in ROWS if row["seed"] == 0])
+    assert "Of each cell 1 episode; the paper has 5." in single[0].notes
+
+
 def test_detections_stand_under_their_setting_with_the_full_scan_in_every_column(tables):
     table = tables[TITLES[2]]
     start = table.rows.index(("dense",))
