@@ -110,6 +110,16 @@ def test_equal_ratios_are_certain_and_silent_and_draws_are_seeded():
     assert ratio_of_sums(tuple(sums)) != ratio_of_sums(tuple(sums), seed=1)
 
 
+def test_an_interval_that_was_drawn_once_is_remembered():
+    """The very same one is given, not an equal one that was drawn again; other draws are others."""
+    ours, theirs = np.random.default_rng(10).random((2, 12)) + 0.5
+    difference, ratio = paired_difference(ours, theirs), ratio_of_sums((ours, theirs))
+    assert paired_difference(ours.tolist(), theirs.tolist()) is difference
+    assert ratio_of_sums((ours.tolist(), theirs.tolist())) is ratio
+    assert paired_difference(ours, theirs, resamples=9000) is not difference
+    assert ratio_of_sums((ours, theirs), less=(theirs, ours)) is not ratio
+
+
 @pytest.mark.parametrize(
     ("sums", "less"),
     [
