@@ -9,6 +9,7 @@ from rich.console import Console
 
 from care_sim.base.errors import InvalidInput, printable
 from care_sim.base.files import write_text
+from care_sim.reports.captions import caption
 from care_sim.reports.figures.files import remove_others, save
 from care_sim.reports.latex import PREAMBLE, latex, paragraph
 from care_sim.reports.studies import STUDIES, SWEEP, Study, study_of
@@ -54,11 +55,12 @@ class StudyReport:
         """The report of a study that lacks what is `left_out`."""
         tables = study.tables(rows)
         closing = _closing(rows, study, left_out)
-        pages = [f"{study.caption}\n", *(table.markdown() for table in tables)]
+        reading = caption(study.caption, tables)
+        pages = [f"{reading}\n", *(table.markdown() for table in tables)]
         if closing:
             sentences = "".join(f"- {unmarked(sentence)}\n" for sentence in closing)
             pages.append(f"## Statements\n\n{sentences}")
-        texts = [PREAMBLE, paragraph(study.caption), *map(latex, tables), *map(paragraph, closing)]
+        texts = [PREAMBLE, paragraph(reading), *map(latex, tables), *map(paragraph, closing)]
         return cls(
             {"tables.md": "\n".join(pages), "tables.tex": "\n".join(texts)}, study.figures(rows)
         )
@@ -89,11 +91,11 @@ def print_report(
     rows: Sequence[Row], console: Console, study: Study = SWEEP, left_out: Sequence[str] = ()
 ) -> None:
     """Print the tables, how to read them, and the closing sentences."""
-    for table in study.tables(rows):
-        if table.terminal:
-            console.print(table.rich())
-            console.print()
-    for sentence in (study.caption, *_closing(rows, study, left_out)):
+    shown = [table for table in study.tables(rows) if table.terminal]
+    for table in shown:
+        console.print(table.rich())
+        console.print()
+    for sentence in (caption(study.caption, shown), *_closing(rows, study, left_out)):
         console.print(sentence, markup=False)
 
 

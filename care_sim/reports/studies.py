@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import unknown
 from care_sim.reports.captions import (
-    DIFFERENCES_CAPTION,
     EPISODES_CAPTION,
     MECHANISM_CAPTION,
     PROTOCOL_CAPTION,
+    Remark,
 )
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
@@ -59,7 +59,7 @@ class Study:
     figures: Callable[[Sequence[Row]], dict[str, Figure]]
     closing: Callable[[Sequence[Row]], list[str]]
     figure_names: tuple[str, ...]
-    caption: str = EPISODES_CAPTION
+    caption: tuple[Remark, ...] = EPISODES_CAPTION
     results: ResultsFormat = EPISODES
     columns: Mapping[str, Column] = field(default_factory=dict)
 
@@ -117,7 +117,6 @@ _ALL = (
         crowding_figures,
         _sweep_closing,
         (CROWDING_FIGURE,),
-        DIFFERENCES_CAPTION,
         columns={VEHICLES_COLUMN: COUNT},
     ),
     Study(
@@ -127,7 +126,6 @@ _ALL = (
         _no_figures,
         _sweep_closing,
         (),
-        DIFFERENCES_CAPTION,
     ),
     Study(
         "faults",
@@ -136,7 +134,6 @@ _ALL = (
         fault_figures,
         _sweep_closing,
         FAULT_FIGURES,
-        DIFFERENCES_CAPTION,
     ),
     Study(
         "order",

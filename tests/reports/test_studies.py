@@ -8,7 +8,7 @@ from rich.console import Console
 
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
-from care_sim.reports.report import print_report, write_report
+from care_sim.reports.report import StudyReport, print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
 from care_sim.study.designs import ablations, crowding, faults, order, paper
 from care_sim.study.episode_config import grid
@@ -124,3 +124,9 @@ def test_a_study_leaves_its_name_and_its_columns_in_the_folder(tmp_path):
     assert json.loads((tmp_path / "config.json").read_text())["study"] == "crowding"
     assert study_of(tmp_path / "episodes.parquet").name == "crowding"
     assert {"tags", "regret_m", "censored"} <= set(read_rows(tmp_path / "episodes.parquet")[0])
+
+
+def test_without_a_sentence_there_is_no_heading_for_it():
+    silent = replace(STUDIES["sweep"], closing=lambda rows: [])
+    assert "## Statements" in StudyReport.of(STUDY, STUDIES["sweep"]).texts["tables.md"]
+    assert "## Statements" not in StudyReport.of(STUDY, silent).texts["tables.md"]

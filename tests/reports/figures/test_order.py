@@ -78,7 +78,9 @@ def test_figures_are_written_the_same_every_time(draw, rows, tmp_path):
 
 @pytest.mark.parametrize("budgets", [(0.03,), (0.03, 0.1)])
 def test_the_title_fits_into_the_figure(budgets):
-    (figure,) = open_order_figures([p for p in PLAYS if p["budget"] in (*budgets, 1.0)]).values()
+    wide = made_plays.study({"care-sightlines": (7, 5)}, budgets=budgets, cell_order="rows-down")
+    plays = [*PLAYS, *wide]
+    (figure,) = open_order_figures([p for p in plays if p["budget"] in (*budgets, 1.0)]).values()
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     title = figure.findobj(lambda artist: getattr(artist, "get_text", str)().startswith("order of"))

@@ -81,6 +81,16 @@ def test_differences_are_those_to_the_usual_order_seed_by_seed(tables):
     assert isinstance(camera[2], Bold)
 
 
+def test_a_pattern_has_one_level_for_all_orders_and_no_differences():
+    rows = [as_in_the_paper(config, distance(config)) for config in order_study([0], ["fan"])]
+    made = {table.title: table for table in order_tables(rows)}
+    fans = [row for row in made[TITLES[2]].rows if row[0] == "fan"]
+    assert len(fans) == 4 + 3 + 1 + 2 + 2
+    assert all(len(set(row[2:])) == 1 for row in fans)
+    assert not [row for row in made[TITLES[3]].rows if row[0] in ("fan", "full")]
+    assert "Feel no order, played once: full, fan." in made[TITLES[3]].notes
+
+
 def test_the_closing_names_what_hangs_on_the_numbering():
     (sentence,) = order_closing(ROWS)
     assert sentence == (
