@@ -8,6 +8,7 @@ from care_sim.core.driver_settings import BRAKING_RULES, CAREFUL_HUMAN, FIXED, D
 from care_sim.core.types import Command, Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.careful_human import CarefulHuman
+from care_sim.driving.human_model import HUMAN_MODEL
 
 
 class Driver(Protocol):
@@ -33,6 +34,11 @@ def check_driver(settings: DriverSettings) -> None:
             raise InvalidInput(
                 f"{name} is of the driver {FIXED}, {settings.driver} does not know it"
             )
+
+
+def brake_delay_s(settings: DriverSettings) -> float:
+    """Seconds from the driver's decision until the brake acts."""
+    return settings.brake_reaction_s if settings.driver == FIXED else HUMAN_MODEL.delay_s
 
 
 def make_driver(

@@ -6,7 +6,7 @@ from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
 from care_sim.driving.careful_human import CarefulHuman
-from care_sim.driving.drivers import check_driver, make_driver
+from care_sim.driving.drivers import brake_delay_s, check_driver, make_driver
 from care_sim.driving.human_model import HUMAN_MODEL as HUMAN
 
 FRONT, HALF_WIDTH, KEYFRAME = 2.5, 0.9, 0.1
@@ -131,3 +131,8 @@ def test_unknown_drivers_and_rules_that_are_not_theirs_are_refused(settings, lin
 def test_comfort_is_of_both_drivers():
     check_driver(DriverSettings(driver="careful-human", comfort_mps2=2.0))
     check_driver(DriverSettings(brake_mps2=6.0, comfort_mps2=2.0))
+
+
+def test_the_brake_acts_after_the_delay_of_the_driver():
+    assert brake_delay_s(DriverSettings(brake_reaction_s=0.2)) == 0.2
+    assert brake_delay_s(DriverSettings(driver="careful-human")) == 0.75

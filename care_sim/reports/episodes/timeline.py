@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from care_sim.base.errors import printable
+from care_sim.driving.drivers import brake_delay_s
 from care_sim.loops.records import Keyframe, Outcome
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.run_config import Row
@@ -23,8 +24,8 @@ _COLUMNS = (
 )
 _LEGEND = (
     "seen: the camera shows the actor; found: the LiDAR detector reports it; distances are "
-    "planar.\nThe brake acts 0.3 s after the decision. Keyframes in which nothing changes are left "
-    "out."
+    "planar.\nThe brake acts {delay:g} s after the decision. Keyframes in which nothing changes "
+    "are left out."
 )
 _LABELS = {
     "detection_distance_m": "detection_distance_m (sensor to actor)",
@@ -48,7 +49,7 @@ def print_timeline(
     for frame in eventful(keyframes):
         table.add_row(*(_cells(frame) if frame else ["..."]))
     console.print(table)
-    console.print(_LEGEND, markup=False)
+    console.print(_LEGEND.format(delay=brake_delay_s(config)), markup=False)
     for name in Outcome.__dataclass_fields__:
         console.print(f"{_LABELS.get(name, name):44} {text(row[name])}")
     console.print(f"{'episode_hash':44} {row['episode_hash']}")
