@@ -334,3 +334,10 @@ def test_a_collision_is_told_at_its_keyframe_with_the_speed_of_the_contact(stree
     impacts = [loop.keyframe(EVERYTHING).impact_speed_mps for _ in range(8)]
     assert impacts[:7] == [None] * 7
     assert impacts[7] == pytest.approx(7.75)
+
+
+def test_the_guarded_strip_is_that_of_the_driver(street):
+    width = CATALOGUE["ego"].size[1]
+    wide = loop_in(street(), brake_side_margin_m=1.0)
+    human = loop_in(street(), driver="careful-human")
+    assert (wide.guarded_m, human.guarded_m) == (pytest.approx(width + 2.0), width)
