@@ -63,3 +63,17 @@ def test_the_readings_differ_in_what_is_known_of_the_cars_alone():
 def test_a_speed_without_a_turn_is_refused_when_the_environment_is_made():
     with pytest.raises(care_sim.InvalidInput, match="speed_kph of CPTAfo-50 must be one of"):
         make(test="CPTAfo-50")
+
+
+def test_a_vector_gives_the_same_episode_of_a_turn_and_begins_another_after_its_end():
+    turn = {"test": "CPTAno-50", "speed_kph": 10.0, "budget": 0.03, "duration_s": 0.5}
+    play = np.zeros((2, 32, 512), np.float32)
+    with make(**turn) as env:
+        alone = [env.reset(seed=5)[0], *(env.step(NOTHING)[0] for _ in range(5))]
+    vector = gymnasium.make_vec("CARE-NCAP-v0", 2, "sync", **turn)
+    together = [vector.reset(seed=[5, 6])[0], *(vector.step(play)[0] for _ in range(5))]
+    again = vector.step(play)[0]
+    vector.close()
+    for one, both in zip(alone, together, strict=True):
+        assert all(np.array_equal(one[key], both[key][0]) for key in one)
+    assert np.count_nonzero(again["ranges"]) == 0

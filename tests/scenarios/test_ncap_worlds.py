@@ -206,3 +206,20 @@ def test_the_target_has_the_speed_that_is_asked_for():
     (_, before, _), (_, after, _) = (world.first_sighting.pose_at(t) for t in (0.0, 1.0))
     world.close()
     assert abs(after - before) == pytest.approx(50 / 3.6)
+
+
+def test_the_seeds_draw_what_the_protocol_leaves_open():
+    scenario = make_scenario("ncap", test="CPNCO-50", speed_kph=40.0)
+    speeds, sides, lengths, ways = [], [], [], []
+    for seed in range(40):
+        world = scenario.build(np.random.default_rng(seed))
+        small, large, child = world.actors
+        speeds.append(3.6 * world.ego.speed)
+        sides.append(np.sign(child.pose_at(0.0)[1]))
+        lengths.append((small.kind.size[0], large.kind.size[0]))
+        ways.append((child.pose_at(0.0)[0] - EGO_LENGTH / 2 - 0.149) / world.ego.speed)
+        world.close()
+    assert 40.0 <= min(speeds) < 40.2 < 40.8 < max(speeds) <= 41.0
+    assert 4.0 <= min(ways) < 4.02 < 4.08 < max(ways) <= 4.1
+    assert 10 <= sides.count(1.0) <= 30
+    assert np.all((np.min(lengths, axis=0) >= (4.1, 4.3)) & (np.max(lengths, axis=0) <= (4.4, 4.7)))
