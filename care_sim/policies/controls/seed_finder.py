@@ -15,7 +15,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.scenarios import ENCOUNTERS, SCENARIOS, make_scenario
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import World
 
@@ -46,7 +46,8 @@ class SeedFinder(Policy):
 
     def __init__(self, rig: Rig, scenario: str | None = None, seeds: int = 30):
         scenario = FALLBACK_SCENARIO if scenario is None else scenario
-        check_known("scenario", scenario, SCENARIOS)
+        # Who comes out in a drive goes by where the ego is, not by the clock.
+        check_known("scenario", scenario, ENCOUNTERS)
         check_whole("seeds", seeds, 1, 10**6)
         super().__init__(rig)
         self._scenario = scenario
