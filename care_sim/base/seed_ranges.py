@@ -11,14 +11,44 @@ seed below 2,000. Where episodes differ by the recording and not by the seed (`C
 hold out recordings.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from care_sim.base.checks import check_seed
 from care_sim.base.errors import InvalidInput
 
 VALIDATION = 2_000
 TRAINING = 10_000
 LAST = 2**31 - 1
 """Training seeds lie below it."""
+SPLITS = {
+    "test": range(VALIDATION),
+    "validation": range(VALIDATION, TRAINING),
+    "train": range(TRAINING, LAST),
+}
+
+
+def split_of(seeds: Iterable[int]) -> str:
+    """The one split that all `seeds` are of.
+
+    Raises InvalidInput for seeds of several splits, for a seed of none, and for none at all.
+    """
+    found = dict.fromkeys(_split_of_one(seed) for seed in seeds)
+    if len(found) != 1:
+        mixed = f"seeds of {' and '.join(found)}" if found else "no seed"
+        raise InvalidInput(f"seeds must be of one split ({_ranges()}), got {mixed}")
+    return next(iter(found))
+
+
+def _split_of_one(seed: int) -> str:
+    check_seed(seed)
+    for name, seeds in SPLITS.items():
+        if seed in seeds:
+            return name
+    raise InvalidInput(f"seed {seed} is of no split; there are {_ranges()}")
+
+
+def _ranges() -> str:
+    return ", ".join(f"{name} {seeds[0]} to {seeds[-1]}" for name, seeds in SPLITS.items())
 
 
 def check_benchmark_seeds(seeds: Sequence[int]) -> None:

@@ -67,7 +67,15 @@ class NcapEnv(ClosedLoopEnv):
 
 
 class DriveEnv(ClosedLoopEnv):
-    """`CARE-Drive-v0`: a drive through a generated street, with bends, traffic and conflicts."""
+    """`CARE-Drive-v0`: a drive through a generated street, with bends, traffic and conflicts.
+
+    The ego follows a route of 160 to 260 m, straight on, round a bend or off into a side street,
+    with six cameras. Up to three times somebody comes out of hiding, from either side: to a
+    conflict, a near miss or a stop at the edge of the lanes. The episode ends at the end of the
+    way, too. The outcome is a `care_sim.loops.records.DriveOutcome`: what the contract says of the
+    first-sighting actor is of the first encounter that is a conflict, else of the first; without an
+    encounter there is none, and `undetected_to_m` is 0. See `care_sim.scenarios.drive`.
+    """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"
     scenario_name = "drive"

@@ -19,6 +19,8 @@ SCENARIOS: dict[str, type[Scenario]] = {
     "ncap": Ncap,
     "drive": DriveScenario,
 }
+ENCOUNTERS = ("dartout", "dense", "cutin")
+"""Those of one encounter on a straight road, which runs by the clock: the paper's three."""
 
 
 def make_scenario(name: str, /, **parameters: object) -> Scenario:

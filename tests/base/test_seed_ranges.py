@@ -3,7 +3,7 @@
 import pytest
 
 from care_sim.base.errors import InvalidInput
-from care_sim.base.seed_ranges import check_benchmark_seeds, training_seeds
+from care_sim.base.seed_ranges import SPLITS, check_benchmark_seeds, split_of, training_seeds
 
 
 def test_test_seeds_end_where_seeds_begin_that_something_is_chosen_by():
@@ -14,3 +14,23 @@ def test_test_seeds_end_where_seeds_begin_that_something_is_chosen_by():
 
 def test_training_seeds_are_counted_from_the_first():
     assert list(training_seeds(3)) == [10_000, 10_001, 10_002]
+
+
+@pytest.mark.parametrize("name", SPLITS)
+def test_the_ends_of_a_split_are_of_it(name):
+    assert split_of([SPLITS[name][0], SPLITS[name][-1]]) == name
+
+
+@pytest.mark.parametrize(
+    ("seeds", "complaint"),
+    [
+        ([0, 10_000], r"of one split \(test 0 to 1999, .*\), got seeds of test and train"),
+        ([], "got no seed"),
+        ([2**31], r"seed 2147483648 is of no split; there are test 0 to 1999, validation"),
+        ([-1], "seed must be"),
+    ],
+)
+def test_seeds_that_are_mixed_or_of_none_are_refused_in_one_line(seeds, complaint):
+    with pytest.raises(InvalidInput, match=complaint) as refusal:
+        split_of(seeds)
+    assert "\n" not in str(refusal.value)

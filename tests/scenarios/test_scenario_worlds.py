@@ -191,7 +191,7 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones(name, parameter):
             r"vehicles of dense must be a whole number >= 0 and <= 12, got 13",
         ),
         ("dense", {"vehicles": "five"}, "dense"),
-        ("roundabout", {}, r"scenario 'roundabout'; known: cutin, dartout, dense, ncap"),
+        ("roundabout", {}, r"scenario 'roundabout'; known: cutin, dartout, dense, drive, ncap"),
     ],
 )
 def test_an_impossible_value_is_refused_in_one_line(name, parameters, named):

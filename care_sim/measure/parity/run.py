@@ -19,7 +19,7 @@ from care_sim.measure.parity.outcomes import outcomes
 from care_sim.measure.parity.random_scenes import random_scenes
 from care_sim.measure.parity.tables import parity_tables
 from care_sim.measure.parity.tally import REFERENCE_NAMES
-from care_sim.scenarios import SCENARIOS
+from care_sim.scenarios import ENCOUNTERS
 from care_sim.study.progress import ProgressLines, progress_bar
 from care_sim.study.provenance import machine, versions
 
@@ -71,12 +71,13 @@ def agree(report: dict[str, Any]) -> bool:
 
 def parity_report(config: ParityConfig) -> dict[str, Any]:
     """`config`, `machine` and `versions`; `scans`, the figures of random scenes and of every
-    scenario; `pictures`, those of every scenario; and `outcomes`, those of whole episodes.
+    scenario of one encounter; `pictures`, those of these scenarios; and `outcomes`, those of whole
+    episodes.
     """
     random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
     played = {
         name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name))
-        for name in SCENARIOS
+        for name in ENCOUNTERS
     }
     ended = _shown("seeds of the paper's study", config.episodes, outcomes)
     scans = {"random scenes": random, **{name: compared.rays for name, compared in played.items()}}

@@ -57,9 +57,12 @@ class View {
   furnish(standing) {
     const { ego, moving } = this.story;
     const { side } = this.window;
-    const tens = Array.from({ length: 18 }, (_, n) => 10 * n - 20);
-    for (const x of tens) add(this.stage, "path", { d: `M${x} ${-side}V${side}`, class: "tick" });
-    this.sensor = add(this.stage, "g");
+    // What lies in the world, which turns and moves under a car that always points to the right.
+    this.world = add(this.stage, "g");
+    this.turns = this.story.place.some(([, , yaw]) => yaw !== this.story.place[0][2]);
+    const tens = this.turns ? [] : Array.from({ length: 18 }, (_, n) => 10 * n - 20);
+    for (const x of tens) add(this.world, "path", { d: `M${x} ${-side}V${side}`, class: "tick" });
+    this.sensor = add(this.world, "g");
     this.sectors = [...this.story.rays[0]].map((_, n, all) => {
       const [from, to] = [n, n + 1].map((end) => ((2 * end) / all.length - 1) * Math.PI * 1000);
       return add(this.sensor, "path", { d: fan(from, to, REACH), class: "ray" });
@@ -67,17 +70,22 @@ class View {
     this.wedges = add(this.sensor, "g");
     this.bodies = new Map();
     for (const body of [...standing, ...moving]) this.addBody(body);
-    for (const x of tens) add(this.stage, "text", { x: x + 0.2, y: side - 0.4, class: "metres" }, `${x} m`);
-    this.tracks = add(this.stage, "g");
-    this.ring = add(this.stage, "circle", { r: 1.5, class: "ring" });
-    this.ego = add(this.stage, "g");
-    add(this.ego, "rect", { x: 0, y: -ego.size[1] / 200 - 0.3, width: REACH - 10, height: ego.size[1] / 100 + 0.6, class: "path" });
+    for (const x of tens) add(this.world, "text", { x: x + 0.2, y: side - 0.4, class: "metres" }, `${x} m`);
+    this.tracks = add(this.world, "g");
+    this.ring = add(this.world, "circle", { r: 1.5, class: "ring" });
+    this.ego = add(this.world, "g");
+    const wide = ego.size[1] / 100 + 0.6;
+    if (this.turns) {
+      // Round bends the way is the one that is driven.
+      const way = this.story.place.map(([x, y]) => `${x / 100} ${-y / 100}`).join("L");
+      this.world.insertBefore(add(this.world, "path", { d: `M${way}`, class: "way", "stroke-width": wide }), this.sensor);
+    } else add(this.ego, "rect", { x: 0, y: -wide / 2, width: REACH - 10, height: wide, class: "path" });
     box(this.ego, ego.size, "ego");
     this.lights = add(this.ego, "rect", { x: -ego.size[0] / 200, y: -ego.size[1] / 200, width: 0.8, height: ego.size[1] / 100, class: "brake" });
   }
 
   addBody(body) {
-    const shape = add(this.stage, "g", { transform: place(body.pose ?? body.poses[0]) });
+    const shape = add(this.world, "g", { transform: place(body.pose ?? body.poses[0]) });
     const rect = box(shape, body.size, body.sought ? "sought" : body.reported ? "body" : "mute");
     add(rect, "title", {}, body.kind);
     this.bodies.set(body.n, { body, shape, rect });
@@ -118,7 +126,8 @@ class View {
     const { behind, ahead, side } = this.window;
     const frame = Math.min(k, this.last - 1);
     const pose = at(story.place, k, share);
-    this.stage.setAttribute("viewBox", `${pose[0] / 100 - behind} ${-side} ${behind + ahead} ${2 * side}`);
+    this.stage.setAttribute("viewBox", `${-behind} ${-side} ${behind + ahead} ${2 * side}`);
+    this.world.setAttribute("transform", `rotate(${-degrees(pose[2])}) translate(${-pose[0] / 100} ${pose[1] / 100})`);
     this.ego.setAttribute("transform", place(pose));
     for (const { body, shape } of this.bodies.values()) if (body.poses) shape.setAttribute("transform", place(at(body.poses, k, share)));
     if (this.sought) {
