@@ -169,11 +169,11 @@ def test_an_episode_plays_to_its_end(opened, played):
     page.locator("#moment").fill("0")
     assert page.inner_text(".now").startswith("0.0 s")
     assert page.locator(".view .ring").first.get_attribute("class") == "ring unseen"
-    view = page.locator(".view svg").first.get_attribute("viewBox")
+    view = page.locator(".view svg > g").first.get_attribute("transform")
     page.select_option("#speed", "1")
     page.locator("#play").click()
     page.wait_for_function("Number(document.querySelector('#moment').value) > 5")
-    assert page.locator(".view svg").first.get_attribute("viewBox") != view
+    assert page.locator(".view svg > g").first.get_attribute("transform") != view
     page.locator("#play").click()
     stopped = page.input_value("#moment")
     assert page.inner_text("#play") == "Play"
@@ -253,8 +253,8 @@ def test_nobody_who_wants_calm_sees_a_body_between_two_keyframes(opened, played)
     page.locator("#moment").fill("10")
     page.evaluate(
         "window.seen = new Set(); new MutationObserver(() => "
-        "seen.add(document.querySelector('.view svg').getAttribute('viewBox')))"
-        ".observe(document.querySelector('.view svg'), {attributes: true})"
+        "seen.add(document.querySelector('.view svg > g').getAttribute('transform')))"
+        ".observe(document.querySelector('.view svg > g'), {attributes: true})"
     )
     page.locator("#play").click()
     page.wait_for_function("Number(document.querySelector('#moment').value) > 13")
