@@ -154,32 +154,37 @@ def _drawn(rng: np.random.Generator, road: Road, s: float, side: Side) -> Encoun
 
     # All ways are of the middle, from its start behind the occluder's edge by the run-up.
     start = edge_d + comer.run_up_m + length / 2
-    shown = comer.run_up_m + SHOWN_M
     hit = start - impact - length / 2 + min(length / 2, HALF_BICYCLE_M)
     clear = start + (EGO_WIDTH_M + length) / 2
-    far = road.side(-side.sign)
-    across = start + length / 2 + (far.boundary_m + 1.0 if who == "car" else far.kerb_m + 0.3)
-    stop = start - side.lane_edge_m - STOP_SHORT_M - length / 2
     x, y, heading = road.curve.to_world(np.array([s, side.sign * start, 0.0])).tolist()
     walk = Walk(
         (x, y),
         heading - side.sign * np.pi / 2,
         speed,
         speed**2 / (2 * comer.run_up_m),
-        stop if course is Course.STOP else across,
+        _way_m(road, side, who, start, course),
     )
-    lead = (
-        walk.duration_to(clear) + encroachment
-        if course is Course.NEAR_MISS
-        else walk.duration_to(hit)
-    )
+    is_near_miss = course is Course.NEAR_MISS
+    lead = walk.duration_to(clear) + encroachment if is_near_miss else walk.duration_to(hit)
     occluder_s = s - gap - CATALOGUE[occluder].size[0] / 2
     pose = road.curve.to_world(np.array([occluder_s, side.sign * middle_d, 0.0])).tolist()
-    sight = walk.duration_to(hit) - walk.duration_to(shown)
+    sight = walk.duration_to(hit) - walk.duration_to(comer.run_up_m + SHOWN_M)
     return Encounter(
         who, occluder, tuple(pose), course, road.curve, s, side.sign,
         side.sign * start, walk, lead, sight,
     )  # fmt: skip
+
+
+def _way_m(road: Road, side: Side, who: str, start: float, course: Course) -> float:
+    """How far somebody goes who waits `start` from the middle of the ego's lane: to the edge of the
+    lanes, to the far pavement, or with a car into the drive beyond it.
+    """
+    length = CATALOGUE[who].size[0]
+    if course is Course.STOP:
+        return start - side.lane_edge_m - STOP_SHORT_M - length / 2
+    far = road.side(-side.sign)
+    beyond = far.boundary_m + 1.0 if who == "car" else far.kerb_m + 0.3
+    return start + length / 2 + beyond
 
 
 def _place(side: Side, occluder: str, at_kerb: bool) -> tuple[float, float]:
