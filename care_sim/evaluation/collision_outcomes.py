@@ -1,20 +1,24 @@
 """What became of a threatening collision: avoided, mitigated or hit."""
 
-AVOIDED = "avoided"
-"""The car touched nothing."""
-MITIGATED = "mitigated"
-"""It touched something, and was slower by then than it had come."""
-HIT = "hit"
-"""It touched something at the speed at which it had come."""
-COLLISION_OUTCOMES = (AVOIDED, MITIGATED, HIT)
+from enum import StrEnum
+
 SAME_SPEED_MPS = 1 / 3.6
 """Within 1 km/h a speed is the same: the tolerance of a test speed in Euro NCAP's protocols."""
 
 
-def collision_outcome(impact_mps: float | None, approach_mps: float) -> str:
-    """One of `COLLISION_OUTCOMES`, from the car's speed at its first contact, None without one, and
-    the speed at which it came.
+class CollisionOutcome(StrEnum):
+    """How it ended."""
+
+    AVOIDED = "avoided"
+    MITIGATED = "mitigated"
+    HIT = "hit"
+
+
+def collision_outcome(impact_mps: float | None, unbraked_mps: float) -> CollisionOutcome:
+    """How it ended, from the speed of the impact, None without one, and that at which a car hits
+    that does not brake.
     """
     if impact_mps is None:
-        return AVOIDED
-    return MITIGATED if impact_mps < approach_mps - SAME_SPEED_MPS else HIT
+        return CollisionOutcome.AVOIDED
+    slower = impact_mps < unbraked_mps - SAME_SPEED_MPS
+    return CollisionOutcome.MITIGATED if slower else CollisionOutcome.HIT

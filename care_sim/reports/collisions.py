@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from care_sim.evaluation.censoring import Reading, difference
-from care_sim.evaluation.collision_outcomes import collision_outcome
+from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
 from care_sim.reports.contrasts import GATE_POINTS, Contrast, Measure
 from care_sim.reports.controls import best_control, is_control
 from care_sim.study.rows.reading import policy_of, tags_of_row
@@ -41,7 +41,7 @@ class CollisionRows:
         """The rows of a policy at a budget; those of the full scan at any."""
         return [*self._cell(policy, budget).values()]
 
-    def outcomes(self, rows: Sequence[Row]) -> Counter[str]:
+    def outcomes(self, rows: Sequence[Row]) -> Counter[CollisionOutcome]:
         """How many of the rows there are of each outcome."""
         return Counter(
             collision_outcome(row["impact_speed_mps"], self._approach_mps(row)) for row in rows

@@ -10,7 +10,8 @@ import numpy as np
 
 from care_sim.base.checks import check_known
 from care_sim.evaluation.censoring import Reading, difference
-from care_sim.evaluation.ncap_score import Ending, ending, score
+from care_sim.evaluation.collision_outcomes import CollisionOutcome, collision_outcome
+from care_sim.evaluation.ncap_score import score
 from care_sim.reports.contrasts import Contrast, Measure
 from care_sim.reports.controls import best_control, is_control
 from care_sim.reports.formatting import marked, tag_notes
@@ -95,11 +96,11 @@ class NcapRows:
         """
         return policy, 1.0 if policy == FULL else budget
 
-    def endings(self, contender: Contender, lines: Iterable[Line]) -> Counter[Ending]:
+    def endings(self, contender: Contender, lines: Iterable[Line]) -> Counter[CollisionOutcome]:
         """How the episodes of some lines ended."""
         held = set(lines)
         own = self._rows.get(contender, [])
-        return Counter(ending(*impact_of(row)) for row in own if _line(row) in held)
+        return Counter(collision_outcome(*impact_of(row)) for row in own if _line(row) in held)
 
     def scores(self, contender: Contender, lines: Iterable[Line]) -> Scores:
         """The scores of some lines."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from care_sim.base.errors import percent
-from care_sim.evaluation.ncap_score import Ending
+from care_sim.evaluation.collision_outcomes import CollisionOutcome
 from care_sim.reports.controls import BEST_CONTROL, IN_HINDSIGHT
 from care_sim.reports.formatting import interval
 from care_sim.reports.ncap import READINGS, Contender, Line, NcapRows, overall
@@ -43,7 +43,7 @@ def _entry(results: NcapRows, contender: Contender, lines: Iterable[Line]) -> st
     endings = results.endings(contender, held)
     if not endings:
         return "-"
-    counts = "/".join(str(endings[each]) for each in Ending)
+    counts = "/".join(str(endings[each]) for each in CollisionOutcome)
     return f"{counts} {overall(results.scores(contender, held)):.2f}"
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.base.errors import percent
 from care_sim.core.driver_settings import FIXED
-from care_sim.evaluation.collision_outcomes import AVOIDED, HIT, MITIGATED
+from care_sim.evaluation.collision_outcomes import CollisionOutcome
 from care_sim.reports.collisions import CollisionRows
 from care_sim.reports.controls import BEST_CONTROL, IN_HINDSIGHT
 from care_sim.reports.formatting import interval, marked, tag_notes
@@ -48,9 +48,9 @@ def _outcome_table(study: CollisionRows, drivers: str) -> Table:
         (
             "policy",
             "cases",
-            AVOIDED,
-            MITIGATED,
-            HIT,
+            CollisionOutcome.AVOIDED,
+            CollisionOutcome.MITIGATED,
+            CollisionOutcome.HIT,
             "median impact, km/h",
             f"avoided minus {REFERENCE}, points",
             f"minus the {BEST_CONTROL}",
@@ -71,9 +71,9 @@ def _outcomes(study: CollisionRows, policy: str, budget: float, best: str | None
     others = [None if other in (None, policy) else other for other in (REFERENCE, best)]
     return (
         str(len(rows)),
-        f"{100 * counts[AVOIDED] / len(rows):.1f}%",
-        str(counts[MITIGATED]),
-        str(counts[HIT]),
+        f"{100 * counts[CollisionOutcome.AVOIDED] / len(rows):.1f}%",
+        str(counts[CollisionOutcome.MITIGATED]),
+        str(counts[CollisionOutcome.HIT]),
         f"{float(np.median(impacts)) / KPH:.0f}" if impacts else "",
         *(interval(study.difference(policy, each, budget)) if each else "" for each in others),
     )
