@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from care_sim.sources.streets.recording import street_film
+from care_sim.sources.street_films import street_film
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,10 +75,10 @@ def test_the_curves_rise():
 
 
 def test_the_curves_are_those_of_the_cluster_detector():
-    """On two streets of the calibration; the curves are of twenty."""
+    """On one street of the calibration; the curves are of twenty."""
     cluster = make_detector("cluster", 1.84)
     expected, found = {"people": [], "vehicles": []}, {"people": [], "vehicles": []}
-    for seed in (1000, 1002):
+    for seed in (1002,):
         for shot in street_film(seed).shots[::13]:
             report, _ = cluster.detect(shot.cloud, shot.annotations)
             matched = found_objects(shot.annotations, report)

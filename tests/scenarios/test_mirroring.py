@@ -7,8 +7,11 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.rig import Rig
 from care_sim.policies.controls.rehearsal import rehearsal
 from care_sim.scenarios import SCENARIOS, make_scenario
+from care_sim.scenarios.mirroring import MirrorableScenario
 
-every_scenario = pytest.mark.parametrize("name", SCENARIOS)
+every_scenario = pytest.mark.parametrize(
+    "name", [name for name, kind in SCENARIOS.items() if issubclass(kind, MirrorableScenario)]
+)
 
 
 def boxes(name, mirrored, seed=0, seconds=4.0):

@@ -30,7 +30,7 @@ def test_every_scenario_has_its_environment():
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        ({"scenario": "dance"}, ["'dance'", "cutin, dartout, dense, r157"]),
+        ({"scenario": "dance"}, ["'dance'", "cutin, dartout, dense, drive, ncap, r157"]),
         ({"policy": "best"}, ["'best'", "all-camera", "care-sbf"]),
         ({"budget": 0.0}, ["budget", "(0, 1]"]),
         ({"budget": 1.1}, ["budget", "(0, 1]"]),
