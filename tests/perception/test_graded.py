@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from care_sim.sources.street_films import street_film
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from care_sim.perception.detectors import make_detector
 from care_sim.perception.graded import CURVES, GradedProxy, chance
 from care_sim.perception.matching import found_objects
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
+from care_sim.sources.street_films import street_film
 
 
 def crowd(count, kind="pedestrian", seed=0):
