@@ -7,8 +7,8 @@
 | 10,000 and up | training |
 
 No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
-seed below 2,000. Where episodes differ by the recording and not by the seed (`CARE-Replay-v0`),
-hold out recordings.
+seed below 2,000 but by the streets of the calibration. Where episodes differ by the recording and
+not by the seed (`CARE-Replay-v0`), hold out recordings.
 """
 
 from collections.abc import Iterable, Sequence
@@ -42,7 +42,7 @@ def split_of(seeds: Iterable[int]) -> str:
 def _split_of_one(seed: int) -> str:
     check_seed(seed)
     for name, seeds in SPLITS.items():
-        if seed in seeds:
+        if int(seed) in seeds:
             return name
     raise InvalidInput(f"seed {seed} is of no split; there are {_ranges()}")
 

@@ -129,8 +129,8 @@ def _filled(stages: Sequence[Sequence[Cells]], limits: Sequence[int]) -> Cells:
     stage_ends = np.array([*accumulate(map(len, stages))], np.int64)
 
     # A table of flags runs from the lowest to the highest cell, so its size must be bounded.
-    lowest = sets.cells.min(initial=0)
-    highest = sets.cells.max(initial=0)
+    lowest = int(sets.cells.min(initial=0))
+    highest = int(sets.cells.max(initial=0))
     if highest - lowest > HIGHEST_CELL:
         wrong = lowest if lowest < 0 else highest
         raise InvalidInput(f"cells must lie in 0..{HIGHEST_CELL}, got {wrong}")

@@ -45,7 +45,9 @@ class BrakingController:
         self._free_s = 0.0
 
     def command(self, tracks: Tracks, ego: Ego) -> Command:
-        """Decide from the tracks of this keyframe, in the sensor frame, and the ego's motion."""
+        """Decide from the tracks of this keyframe, as they lie before a car that drives straight
+        ahead, and the ego's motion.
+        """
         halves = half_extents(tracks.boxes)
         counting = self._counting(tracks, *halves)
         if self._braking_s is None:

@@ -48,7 +48,9 @@ class CarefulHuman:
         self._danger_s: float | None = None
 
     def command(self, tracks: Tracks, ego: Ego) -> Command:
-        """Decide from the tracks of this keyframe, in the sensor frame, and the ego's motion."""
+        """Decide from the tracks of this keyframe, as they lie before a car that drives straight
+        ahead, and the ego's motion.
+        """
         half_x, half_y = half_extents(tracks.boxes)
         risks = self._perceived(tracks, self._risky(tracks, half_x, half_y))
         closing = ego.speed - tracks.velocities[:, 0]

@@ -14,9 +14,9 @@ from care_sim.world.route import Route
 def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     """The tracks as they would lie before a car that drives straight ahead.
 
-    x is metres along the route from where the sensor is, y metres to the route's left; headings and
-    velocities are relative to the route where it comes nearest to the track. A track keeps its
-    sizes and z.
+    x is metres along the route from where the sensor is, y metres to the left of the sensor's own
+    line along it; headings and velocities are relative to the route where it comes nearest to the
+    track. A track keeps its sizes and z.
     """
     if not len(tracks):
         return tracks

@@ -18,7 +18,9 @@ class Driver(Protocol):
     """Width of the strip ahead that it guards, metres."""
 
     def command(self, tracks: Tracks, ego: Ego) -> Command:
-        """Decide from the tracks of this keyframe, in the sensor frame, and the ego's motion."""
+        """Decide from the tracks of this keyframe, as they lie before a car that drives straight
+        ahead, and the ego's motion.
+        """
         ...
 
 

@@ -24,5 +24,7 @@ def detector_of(
         raise InvalidInput(f"min_returns is of the detector {PROXY}, {name} does not know it")
     if not isinstance(parameters, Mapping | None):
         raise InvalidInput(f"detector_parameters must map names to values, got {shown(parameters)}")
+    if name == PROXY and "min_returns" in (parameters or {}):
+        raise InvalidInput("min_returns is a condition, give it without detector_parameters")
     own = {"min_returns": conditions.min_returns} if name == PROXY else {}
     return make_detector(name, sensor_height_m, **own | dict(parameters or {}))

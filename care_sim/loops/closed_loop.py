@@ -14,7 +14,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
 from care_sim.core.types import Command, Detections, Scan, Tracks
 from care_sim.driving.corridor import along_route
-from care_sim.driving.cruising import Cruising
+from care_sim.driving.cruising import Cruising, CruisingRules
 from care_sim.driving.drivers import make_driver
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.needless import NeedlessBraking
@@ -93,7 +93,10 @@ class ClosedLoop:
         self._driver = make_driver(conditions, cruise_mps, front_m, width / 2, rig.keyframe_s)
         self.guarded_m = self._driver.guarded_m
         plan = world.speed_plan
-        self._cruising = Cruising(plan, front_m, width / 2, rig.keyframe_s) if plan else None
+        comfort = CruisingRules(comfort_mps2=conditions.comfort_mps2)
+        self._cruising = (
+            Cruising(plan, front_m, width / 2, rig.keyframe_s, comfort) if plan else None
+        )
         self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions)
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
@@ -161,7 +164,8 @@ class ClosedLoop:
         return self._lidar.peek(self.sensor)
 
     def detectable(self) -> bool:
-        """Whether a scan of every cell would detect the first-sighting actor now.
+        """Whether a scan of every cell would give the first-sighting actor the returns that the
+        proxy needs, whatever the detector.
 
         Truth: for the reward alone.
         """
@@ -195,8 +199,10 @@ class ClosedLoop:
         cloud = Cloud(cells, points, np.where(reported, bodies[returned], NO_OBJECT))
         present = Annotations(self._reported, self._classes, self._local_boxes(self._reported))
         detections, behind = self._detector.detect(cloud, present)
-        found = found_objects(present, detections) & np.isin(self._reported, behind)
-        return detections, behind, self._reported[found]
+        hit = np.isin(present.objects, behind)
+        candidates = Annotations(present.objects[hit], present.classes[hit], present.boxes[hit])
+        found = found_objects(candidates, detections)
+        return detections, behind, candidates.objects[found]
 
     def _command(self, sensor: Frame) -> Command:
         """What the car's software asks for, from the tracks of this keyframe."""

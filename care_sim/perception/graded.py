@@ -37,9 +37,10 @@ def chance(name: str, returns: Integers) -> Floats:
 class GradedProxy:
     """Every object is detected with its true box, by chance: the more returns, the more probably.
 
-    The luck of an object hangs on where it is alone. So every policy meets the same luck in the
-    same world, and more returns never lose an object. What stands still before a car that stands
-    still keeps its luck.
+    The luck of an object hangs on where it is from the sensor alone, in centimetres: it is the same
+    for all policies while their cars drive alike, and more returns never lose an object. Where
+    anything moves it is drawn anew at every keyframe; what stands before a car that stands keeps
+    its luck.
     """
 
     def detect(self, cloud: Cloud, annotations: Annotations) -> tuple[Detections, Integers]:

@@ -87,6 +87,7 @@ class World:
         self.ego_body = self.bullet.add(self.ego_kind, self.ego.pose, transparent=True)
         self._footprints = Footprints()
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
+        self._before = self._footprints.boxes[:, :2].copy()
         self.first_sighting = None
         self.is_over = lambda: False
         self.speed_plan = None

@@ -116,3 +116,8 @@ def test_the_oracle_plays_beside_a_detector_whose_boxes_lie_on_nobody():
 def test_bad_arguments_are_named(arguments, message):
     with pytest.raises(InvalidInput, match=message):
         gymnasium.make("CARE-Dartout-v0", **arguments)
+
+
+def test_the_threshold_of_the_proxy_is_a_condition_alone():
+    with pytest.raises(InvalidInput, match="min_returns is a condition"):
+        gymnasium.make("CARE-Dartout-v0", detector_parameters={"min_returns": 40})
