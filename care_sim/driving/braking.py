@@ -16,10 +16,11 @@ cruising speed. Numbers and sources are those of `care_sim.core.driver_settings`
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats
 from care_sim.core.boxes import half_extents
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
+from care_sim.driving.corridor import enters_strip
 
 
 class BrakingController:
@@ -38,7 +39,6 @@ class BrakingController:
         self.guarded_m = 2 * (half_width_m + rules.brake_side_margin_m)
         self._cruise_mps = cruise_mps
         self._front_m = front_m
-        self._half_width_m = half_width_m
         self._keyframe_s = keyframe_s
         self._rules = rules
         self._braking_s: float | None = None
@@ -48,10 +48,12 @@ class BrakingController:
         """Decide from the tracks of this keyframe, as they lie before a car that drives straight
         ahead, and the ego's motion.
         """
-        halves = half_extents(tracks.boxes)
-        counting = self._counting(tracks, *halves)
+        counting = enters_strip(
+            tracks, self._front_m, self.guarded_m / 2, self._rules.brake_horizon_s
+        )
         if self._braking_s is None:
-            gaps = tracks.boxes[:, 0] - halves[0] - self._front_m
+            half_x, _ = half_extents(tracks.boxes)
+            gaps = tracks.boxes[:, 0] - half_x - self._front_m
             if np.any(counting & (gaps <= self._stopping_distances(tracks, ego.speed))):
                 self._braking_s = 0.0
                 self._free_s = 0.0
@@ -70,17 +72,6 @@ class BrakingController:
             return Command(float(min(max(wanted, -comfort), comfort)), False)
         acting = self._braking_s >= self._rules.brake_reaction_s - LAST_BITS_S
         return Command(-self._rules.brake_mps2 if acting else 0.0, True)
-
-    def _counting(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> Mask:
-        """(n,) which tracks count; `half_x` and `half_y` (n,) are the half extents of boxes."""
-        rules = self._rules
-        ahead = tracks.boxes[:, 0] + half_x > self._front_m
-        reach = self._half_width_m + rules.brake_side_margin_m + half_y
-        # Sideways motion is even, so that a track is in the strip at some time of the horizon
-        # exactly if the stretch between where it is now and where it is then meets the strip.
-        now = tracks.boxes[:, 1]
-        then = now + tracks.velocities[:, 1] * rules.brake_horizon_s
-        return ahead & (np.minimum(now, then) <= reach) & (np.maximum(now, then) >= -reach)
 
     def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
         """(n,) gaps in metres at which the ego must begin to brake."""

@@ -38,6 +38,8 @@ def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float
     """
     half_x, half_y = half_extents(ahead.boxes)
     reach = reach_m + half_y
+    # Sideways motion is even, so that a track is in the strip at some time of the horizon exactly
+    # if the stretch between where it is now and where it is then meets the strip.
     now = ahead.boxes[:, 1]
     then = now + ahead.velocities[:, 1] * horizon_s
     return (

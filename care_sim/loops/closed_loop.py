@@ -97,7 +97,8 @@ class ClosedLoop:
         self._cruising = (
             Cruising(plan, front_m, width / 2, rig.keyframe_s, comfort) if plan else None
         )
-        self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions)
+        # The outcome of a drive alone tells of it, and it asks the truth about every body.
+        self._needless = NeedlessBraking(front_m, self.guarded_m / 2, conditions) if plan else None
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -118,7 +119,9 @@ class ClosedLoop:
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
         command = self._command(sensor)
-        needless = self._needless.judge(world, sensor, command.braking)
+        needless = self._needless is not None and self._needless.judge(
+            world, sensor, command.braking
+        )
         sights = self._sights(found)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
@@ -261,6 +264,8 @@ class ClosedLoop:
     def _sights(self, detected: Integers) -> tuple[Sight, ...]:
         """Whom the scenario lets the ego meet, at this scan."""
         bodies = [one.body for one in self.world.meetings]
+        if not bodies:
+            return ()
         ranges = planar_ranges(self._local_boxes(np.array(bodies, np.int64)))
         return tuple(
             Sight(distance, self.shows(body), body in detected)

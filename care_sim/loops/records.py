@@ -53,7 +53,9 @@ class Keyframe:
     sights: tuple[Sight, ...] = ()
     """Of `World.meetings`, in their order."""
     needless: bool = False
-    """Whether the brake was on with nothing to brake for; see `care_sim.loops.needless`."""
+    """Whether the brake was on with nothing to brake for; see `care_sim.loops.needless`. Judged in
+    drives alone.
+    """
 
 
 @dataclass(frozen=True)

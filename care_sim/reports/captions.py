@@ -123,8 +123,9 @@ R157_CAPTION = (
 )
 NCAP_CAPTION = (
     Remark(
-        "Avoided: no contact; mitigated: an impact slower than that of a car that does not brake; "
-        "hit: at its speed. Score: 5 without a contact, else 4 max(0, 1 - v_impact / v_reference), "
+        "Avoided: no contact; mitigated: an impact slower by more than 1 km/h than that of a car "
+        "that does not brake; hit: at its speed. Score: 5 without a contact, else "
+        "4 max(0, 1 - v_impact / v_reference), "
         "where v_reference is the speed at which a car hits that does not brake (Ljungbergh et al. "
         "2024, NeuroNCAP); on a target that goes ahead at an even speed both are speeds of "
         "closing. A target that was never detected counts by what came of it. In all: the mean of "

@@ -19,8 +19,8 @@ SCENARIOS: dict[str, type[Scenario]] = {
     "ncap": Ncap,
     "drive": DriveScenario,
 }
-ENCOUNTERS = ("dartout", "dense", "cutin")
-"""Those of one encounter on a straight road, which runs by the clock: the paper's three."""
+PAPER_SCENARIOS = ("dartout", "dense", "cutin")
+"""The three that stand for the paper's: one encounter on a straight road, by the clock."""
 
 
 def make_scenario(name: str, /, **parameters: object) -> Scenario:

@@ -1,5 +1,8 @@
 """Which seeds are for what."""
 
+import time
+
+import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
@@ -34,3 +37,9 @@ def test_seeds_that_are_mixed_or_of_none_are_refused_in_one_line(seeds, complain
     with pytest.raises(InvalidInput, match=complaint) as refusal:
         split_of(seeds)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_seed_of_numpy_is_found_as_quickly():
+    begin = time.perf_counter()
+    assert split_of([np.int64(2_000_000_000)]) == "train"
+    assert time.perf_counter() - begin < 1.0

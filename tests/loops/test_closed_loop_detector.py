@@ -121,3 +121,36 @@ def test_bad_arguments_are_named(arguments, message):
 def test_the_threshold_of_the_proxy_is_a_condition_alone():
     with pytest.raises(InvalidInput, match="min_returns is a condition"):
         gymnasium.make("CARE-Dartout-v0", detector_parameters={"min_returns": 40})
+
+
+def test_a_box_is_of_whom_it_has_returns_though_somebody_hidden_is_nearer(monkeypatch):
+    class Between:
+        """One box of a person between one who is seen and one who is hidden."""
+
+        def detect(self, points, sensor_height_m):
+            seen, hidden = boxes()
+            box = seen.copy()
+            box[:2] += 0.6 * (hidden[:2] - seen[:2])
+            box[3:5] = 3.0
+            return care_sim.Detections(np.array([4]), box[None], np.array([1]), None)
+
+    monkeypatch.setitem(detectors.DETECTORS.built_in, "between", Between)
+    env = gymnasium.make("CARE-Dartout-v0", budget=1.0, detector="between")
+    build = env.unwrapped.scenario.build
+
+    def with_two(rng):
+        world = build(rng)
+        world.add("hidden", "pedestrian", (10.0, 0.0, 0.0))
+        world.first_sighting = world.add("seen", "pedestrian", (9.0, 0.0, 0.0))
+        return world
+
+    object.__setattr__(env.unwrapped.scenario, "build", with_two)
+
+    def boxes():
+        loop = env.unwrapped.loop
+        hidden, seen = loop.world.actors[-2:]
+        return loop.sensor.boxes_to_local(loop.world.boxes([seen, hidden]))
+
+    env.reset(seed=0)
+    assert env.step(np.ones(env.action_space.shape, np.float32))[4]["detected"]
+    env.close()

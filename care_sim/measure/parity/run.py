@@ -19,7 +19,7 @@ from care_sim.measure.parity.outcomes import outcomes
 from care_sim.measure.parity.random_scenes import random_scenes
 from care_sim.measure.parity.tables import parity_tables
 from care_sim.measure.parity.tally import REFERENCE_NAMES
-from care_sim.scenarios import ENCOUNTERS
+from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.study.progress import ProgressLines, progress_bar
 from care_sim.study.provenance import machine, versions
 
@@ -77,7 +77,7 @@ def parity_report(config: ParityConfig) -> dict[str, Any]:
     random = _shown("scenes", config.scenes, partial(random_scenes, config.seed))
     played = {
         name: _shown(f"{name} episodes", config.episodes, partial(keyframes, name))
-        for name in ENCOUNTERS
+        for name in PAPER_SCENARIOS
     }
     ended = _shown("seeds of the paper's study", config.episodes, outcomes)
     scans = {"random scenes": random, **{name: compared.rays for name, compared in played.items()}}

@@ -29,4 +29,4 @@ class HistoryLearnedPlace(Policy):
     def demand(self, belief: Belief) -> Demand:
         """Hulls, then the map."""
         hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
-        return Demand(hulls, [[self._pattern]])
+        return Demand(hulls, [[self._pattern[: belief.budget]]])

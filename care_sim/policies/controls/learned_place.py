@@ -34,7 +34,7 @@ class LearnedPlace(Policy):
     tags = ("causal", "learned", "control")
     source = "own: a map of the scenario's training seeds that never changes"
     told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
-    keeps_order = True
+    is_pattern = True
 
     def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
         super().__init__(rig)
@@ -42,7 +42,7 @@ class LearnedPlace(Policy):
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
-        return Demand(layers=[[self._pattern]])
+        return Demand(layers=[[self._pattern[: belief.budget]]])
 
 
 def learned_cells(rig: Rig, scenario: Scenario | str | None, seeds: int) -> Cells:

@@ -23,7 +23,7 @@ from care_sim.measure.bench.ratios import TWO_OVER_ONE
 from care_sim.measure.bench.run import bench_report, run_bench
 from care_sim.measure.bench.steps import DRIVING, REACHING, makers
 from care_sim.measure.bench.tables import bench_tables
-from care_sim.scenarios import ENCOUNTERS
+from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
 from tests.helpers.places import ROOT
@@ -49,7 +49,7 @@ def test_the_stages_add_up_to_the_keyframe():
     assert min(parts[stage] for stage in (POLICY, *KEYFRAME_STAGES)) > 0
 
 
-@pytest.mark.parametrize("scenario", ENCOUNTERS)
+@pytest.mark.parametrize("scenario", PAPER_SCENARIOS)
 def test_the_stages_one_by_one_are_the_keyframes_of_the_loop(scenario):
     """What is timed apart is what the environment does: the same sights, forecasts and moves."""
     config = EpisodeConfig(scenario, "care", 0.1, 3)

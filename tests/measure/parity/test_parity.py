@@ -16,7 +16,7 @@ from care_sim.measure.parity.run import agree, unexplained
 from care_sim.measure.parity.scenes import SCENE_GRIDS, draw_bodies, draw_scene
 from care_sim.measure.parity.tally import GROUPS, AgreementCounts, ray_groups
 from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
-from care_sim.scenarios import ENCOUNTERS
+from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
@@ -190,7 +190,7 @@ def test_pictures_that_agree_and_that_do_not(bullet):
     assert seen.figures()["other_pixels"] > 10
 
 
-@pytest.mark.parametrize("scenario", ENCOUNTERS)
+@pytest.mark.parametrize("scenario", PAPER_SCENARIOS)
 @pytest.mark.parametrize(
     "changes", [{}, {"camera_latency": 1, "camera_rotation_sigma_deg": 1.0, "lidar_dropout": 0.1}]
 )
