@@ -57,7 +57,8 @@ class NcapEnv(ClosedLoopEnv):
     `test`, `speed_kph` and `target_kph` say which: a child who steps out from behind two parked
     cars (`CPNCO-50`, the default), pedestrians, bicyclists and cars that cross, go ahead, brake or
     come towards the ego, which turns in some. An ego that does not brake hits the target. The seed
-    draws what the protocol leaves open, and the side. The test is over, and the episode terminated,
+    draws what the protocol leaves open, and the side; with `test="drawn", speed_kph=0` the test and
+    its speeds, too. The test is over, and the episode terminated,
     when the ego stands before the target's way, the ways have parted, or the ego is no faster than
     the target ahead.
     """

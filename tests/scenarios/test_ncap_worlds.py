@@ -1,5 +1,7 @@
 """What an ego meets in the Euro NCAP tests, and when they are over."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -188,7 +190,10 @@ def test_a_bend_turns_by_what_it_says(radius, clothoid, right):
         ({"test": "CPNC"}, "test of ncap 'CPNC'"),
         ({"test": "CPTAfs-50"}, "speed_kph of CPTAfs-50 must be one of 10, 15, 20"),
         ({"test": "CCFtap", "speed_kph": 30.0}, "speed_kph of CCFtap must be one of 10, 15, 20"),
-        ({"speed_kph": 0.0}, r"speed_kph of ncap must lie in \[1, 140\]"),
+        ({"speed_kph": 150.0}, r"speed_kph of ncap must lie in \[0, 140\]"),
+        ({"test": "drawn"}, "speed_kph of ncap must be 0 where the test is drawn"),
+        ({"speed_kph": 0, "target_kph": 20}, "target_kph of ncap must be 0 where speed_kph is"),
+        ({"speed_kph": 0.5}, "speed_kph of ncap must be 0 or at least 1, got 0.5"),
         ({"target_kph": 0.5}, "target_kph of ncap must be 0 or at least 1, got 0.5"),
         ({"test": 5}, "test of ncap must be a name"),
     ],
@@ -223,3 +228,42 @@ def test_the_seeds_draw_what_the_protocol_leaves_open():
     assert 4.0 <= min(ways) < 4.02 < 4.08 < max(ways) <= 4.1
     assert 10 <= sides.count(1.0) <= 30
     assert np.all((np.min(lengths, axis=0) >= (4.1, 4.3)) & (np.max(lengths, axis=0) <= (4.4, 4.7)))
+
+
+def test_a_drawn_test_is_the_world_of_that_test():
+    """Draws of the test do not move what the seed draws in it."""
+    for seed in range(12):
+        scenario = make_scenario("ncap", test="drawn", speed_kph=0)
+        given = scenario.drawn(np.random.default_rng(seed))
+        drawn, known = (each.build(np.random.default_rng(seed)) for each in (scenario, given))
+        kinds, speeds, boxes = zip(
+            *(
+                ([one.kind for one in world.actors], world.ego.speed, world.boxes(world.actors))
+                for world in (drawn, known)
+            ),
+            strict=True,
+        )
+        drawn.close()
+        known.close()
+        assert kinds[0] == kinds[1]
+        assert speeds[0] == speeds[1]
+        np.testing.assert_array_equal(*boxes)
+
+
+def test_every_test_and_each_of_its_speeds_is_drawn_as_often():
+    scenario = make_scenario("ncap", test="drawn", speed_kph=0)
+    drawn = [scenario.drawn(np.random.default_rng(seed)) for seed in range(4000)]
+    counts = Counter(each.test for each in drawn)
+    # Of 4,000 draws from 21 tests, 190 each; four standard deviations are 54.
+    assert set(counts) == set(TESTS)
+    assert max(abs(count - 4000 / 21) for count in counts.values()) < 54
+    for name, test in TESTS.items():
+        pairs = {(each.speed_kph, each.target_kph) for each in drawn if each.test == name}
+        assert pairs == {(each.ego_kph, each.target_kph) for each in test.variations}
+
+
+def test_a_given_test_keeps_its_name_where_its_speeds_are_drawn():
+    scenario = make_scenario("ncap", test="CCFtap", speed_kph=0)
+    drawn = [scenario.drawn(np.random.default_rng(seed)) for seed in range(60)]
+    assert {each.test for each in drawn} == {"CCFtap"}
+    assert {each.speed_kph for each in drawn} == {10.0, 15.0, 20.0}

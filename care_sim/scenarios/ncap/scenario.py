@@ -1,6 +1,6 @@
 """A Euro NCAP test as a scenario: test and speeds are arguments, the seed draws the rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -38,6 +38,9 @@ from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
+DRAWN = "drawn"
+"""In the place of a test's name: the seed draws one."""
+
 
 @dataclass(frozen=True)
 class Ncap(Scenario):
@@ -49,19 +52,22 @@ class Ncap(Scenario):
     sizes of the cars that stand there, and the side: half of the episodes are mirrored, as in
     left-hand traffic.
 
+    With `test="drawn", speed_kph=0` the seed draws a test too, each as often as the others, and one
+    of its pairs of speeds: no pattern can be laid out for a world of all tests.
+
     These cars are of one of the five classes. With `occluder_reported=False` perception does not
     report them. Ranges are drawn uniformly by the seed.
     """
 
     duration_s: float = bounded(20.0, 0.05, LONGEST_EPISODE_S)
     test: str = "CPNCO-50"
-    """One of `care_sim.scenarios.ncap.table.TESTS`."""
-    speed_kph: float = bounded(40.0, 1, 140)
-    """The ego's, km/h. Tests in which it turns have a line for each of the protocol's speeds and
-    take no other."""
+    """One of `care_sim.scenarios.ncap.table.TESTS`, or drawn."""
+    speed_kph: float = bounded(40.0, 0, 140)
+    """The ego's, km/h. 0 stands for a pair of the protocol's speeds that the seed draws. Tests in
+    which it turns have a line for each of the protocol's speeds and take no other."""
     target_kph: float = bounded(0.0, 0, 140)
     """The target's, km/h. 0 stands for the protocol's at the ego's speed: the first where it has
-    several."""
+    several, unless the pair is drawn."""
     occluder_reported: bool = True
     excess_kph: Range = bounded((0.0, 1.0), 0, 4)
     """By how much the ego is faster than the test's speed: the protocol's tolerance."""
@@ -75,21 +81,51 @@ class Ncap(Scenario):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_known("test of ncap", self.test, TESTS)
-        if 0 < self.target_kph < 1:
+        check_known("test of ncap", self.test, (*TESTS, DRAWN))
+        for name in ("speed_kph", "target_kph"):
+            if 0 < getattr(self, name) < 1:
+                raise InvalidInput(
+                    f"{name} of ncap must be 0 or at least 1, got {getattr(self, name):g}"
+                )
+        if not self.speed_kph and self.target_kph:
             raise InvalidInput(
-                f"target_kph of ncap must be 0 or at least 1, got {self.target_kph:g}"
+                "target_kph of ncap must be 0 where speed_kph is: the seed draws the pair, got "
+                f"{self.target_kph:g}"
             )
+        if self.test == DRAWN:
+            if self.speed_kph:
+                raise InvalidInput(
+                    "speed_kph of ncap must be 0 where the test is drawn, since not every test has "
+                    f"every speed, got {self.speed_kph:g}"
+                )
+            return
         way = TESTS[self.test].way
-        if isinstance(way, AcrossExit | Oncoming) and self.speed_kph not in way.bends:
+        bends = way.bends if isinstance(way, AcrossExit | Oncoming) else {}
+        if bends and self.speed_kph and self.speed_kph not in bends:
             raise InvalidInput(
                 f"speed_kph of {self.test} must be one of "
-                f"{', '.join(f'{speed:g}' for speed in way.bends)}, the only ones for which the "
-                f"protocol has a turn, got {self.speed_kph:g}"
+                f"{', '.join(f'{speed:g}' for speed in bends)}, the only ones for which the "
+                f"protocol has a turn, or 0, got {self.speed_kph:g}"
             )
+
+    def drawn(self, rng: np.random.Generator) -> "Ncap":
+        """The scenario with the test and the speeds of an episode; itself where all are given.
+
+        Takes no number of `rng`, so that what `build` draws then is what it draws for that test.
+        """
+        if self.speed_kph:
+            return self
+        own = rng.spawn(1)[0]
+        name = str(own.choice(list(TESTS))) if self.test == DRAWN else self.test
+        known = TESTS[name].variations
+        speeds = known[int(own.integers(len(known)))]
+        return replace(self, test=name, speed_kph=speeds.ego_kph, target_kph=speeds.target_kph)
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
+        return self.drawn(rng)._build(rng)
+
+    def _build(self, rng: np.random.Generator) -> World:
         # The order of the draws is part of what a seed means. All are made for every test.
         test = TESTS[self.test]
         speed = (self.speed_kph + draw(rng, self.excess_kph)) / 3.6
