@@ -35,6 +35,10 @@ class DriverSettings:
     """Room kept on either side of the ego, metres."""
     brake_release_s: float = bounded(0.5, 0, 60)
     """The way must have been free this long before the brake is released, seconds."""
+    brake_for_oncoming: bool = False
+    """Whether a track that comes towards the ego counts where it will be, not where it is
+    (`care_sim.driving.braking`).
+    """
     comfort_mps2: float = bounded(1.5, 0.01, 10)
     """Acceleration back to cruising speed, m/s^2."""
 

@@ -11,6 +11,12 @@ v_x^2 / (2 b) (Shalev-Shwartz et al. 2017, RSS). It acts with b at the first key
 least `brake_reaction_s` later. It stays on while any counting track is not faster than the ego, and
 for `brake_release_s` after the last one. Then the ego gains speed at `comfort_mps2` up to its
 cruising speed. Numbers and sources are those of `care_sim.core.driver_settings`.
+
+With `brake_for_oncoming` the gap to a track with v_x < 0 is the least that it will have before it
+leaves the strip, at most `brake_horizon_s` after it has entered: x - |v_x| * t for x. So an ego
+that sees an oncoming car in time stands s_0 before all that the car will sweep, not in it. RSS for
+opposite directions has the other brake, too; a car that crosses the ego's way need not, and leaves
+the strip instead.
 """
 
 import numpy as np
@@ -20,7 +26,7 @@ from care_sim.core.arrays import Floats
 from care_sim.core.boxes import half_extents
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
-from care_sim.driving.corridor import enters_strip
+from care_sim.driving.corridor import enters_strip, leaves_strip_s
 
 
 class BrakingController:
@@ -52,9 +58,8 @@ class BrakingController:
             tracks, self._front_m, self.guarded_m / 2, self._rules.brake_horizon_s
         )
         if self._braking_s is None:
-            half_x, _ = half_extents(tracks.boxes)
-            gaps = tracks.boxes[:, 0] - half_x - self._front_m
-            if np.any(counting & (gaps <= self._stopping_distances(tracks, ego.speed))):
+            stopping = self._stopping_distances(tracks, ego.speed)
+            if np.any(counting & (self._gaps(tracks) <= stopping)):
                 self._braking_s = 0.0
                 self._free_s = 0.0
         else:
@@ -72,6 +77,16 @@ class BrakingController:
             return Command(float(min(max(wanted, -comfort), comfort)), False)
         acting = self._braking_s >= self._rules.brake_reaction_s - LAST_BITS_S
         return Command(-self._rules.brake_mps2 if acting else 0.0, True)
+
+    def _gaps(self, tracks: Tracks) -> Floats:
+        """(n,) metres between the front bumper and tracks that count."""
+        half_x, _ = half_extents(tracks.boxes)
+        gaps = tracks.boxes[:, 0] - half_x - self._front_m
+        if not self._rules.brake_for_oncoming:
+            return gaps
+        in_strip_s = leaves_strip_s(tracks, self.guarded_m / 2, self._rules.brake_horizon_s)
+        nearer: Floats = np.minimum(tracks.velocities[:, 0], 0.0) * in_strip_s
+        return gaps + nearer
 
     def _stopping_distances(self, tracks: Tracks, speed: float) -> Floats:
         """(n,) gaps in metres at which the ego must begin to brake."""

@@ -10,6 +10,9 @@ from care_sim.core.frames import Frame, turned
 from care_sim.core.types import Tracks
 from care_sim.world.route import Route
 
+_NO_PACE_MPS = 1e-6
+"""Who goes sideways no faster does not leave."""
+
 
 def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     """The tracks as they would lie before a car that drives straight ahead.
@@ -47,3 +50,18 @@ def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float
         & (np.minimum(now, then) <= reach)
         & (np.maximum(now, then) >= -reach)
     )
+
+
+def leaves_strip_s(ahead: Tracks, reach_m: float, horizon_s: float) -> Floats:
+    """(n,) seconds until tracks that enter the strip have left it, if they keep their velocities;
+    at most `horizon_s` after they have entered it. Of tracks that never enter it says nothing. The
+    strip and the tracks are those of `enters_strip`.
+    """
+    _, half_y = half_extents(ahead.boxes)
+    reach = reach_m + half_y
+    sideways = ahead.velocities[:, 1]
+    to_middle = -np.sign(sideways) * ahead.boxes[:, 1]
+    pace = np.maximum(np.abs(sideways), _NO_PACE_MPS)
+    enters_s = np.maximum(to_middle - reach, 0.0) / pace
+    leaves: Floats = np.minimum((to_middle + reach) / pace, enters_s + horizon_s)
+    return leaves

@@ -141,6 +141,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `brake_horizon_s` | fixed driver | how far ahead it foresees an entry, s |
     | `brake_side_margin_m` | fixed driver | room that it keeps on either side, m |
     | `brake_release_s` | fixed driver | time of free way before it lets go, s |
+    | `brake_for_oncoming` | fixed driver | whether it foresees how near a track comes by itself |
     | `comfort_mps2` | driver | acceleration back to cruising speed, m/s^2 |
 
     (3) `care_sim.driving.braking` and `care_sim.driving.careful_human`. Only `fixed` has the

@@ -66,7 +66,7 @@ class Study:
     `title` names it to readers. `closing` are sentences after the tables. `figure_names` are all
     figures that the study can draw, as patterns in which a * stands for any text. `caption` says
     how to read its tables. `results` is what it plays. `columns` are further columns that its
-    tables need.
+    tables read: those that a row may leave empty may be missing where all rows do.
     """
 
     name: str
@@ -81,8 +81,13 @@ class Study:
 
     @property
     def schema(self) -> Schema:
-        """The columns that its rows must have."""
-        return replace(self.results.schema, needed={**self.results.schema.needed, **self.columns})
+        """The columns that its rows must have, and those that are checked where they are."""
+        schema = self.results.schema
+        optional = {name: one for name, one in self.columns.items() if one.optional}
+        needed = {name: one for name, one in self.columns.items() if not one.optional}
+        return replace(
+            schema, needed={**schema.needed, **needed}, further={**schema.further, **optional}
+        )
 
 
 def collisions(rows: Sequence[Row]) -> str:

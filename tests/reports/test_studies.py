@@ -57,6 +57,20 @@ EPISODES = {
 }
 
 
+def test_a_column_that_no_row_fills_may_be_missing(tmp_path):
+    """Only tests with cars that hide the target have the reading of Euro NCAP's."""
+    bare = [row(config, 9.0) for config in ncap.ncap_study([0], ["full"], ["CCFtap"])]
+    study = STUDIES["ncap"]
+    write_rows(bare, tmp_path / "episodes.parquet", "ncap")
+    read = read_rows(tmp_path / "episodes.parquet", study.schema)
+    assert study.tables(read) == study.tables(bare)
+    # Where it is there, it is checked.
+    wrong = [{**one, ncap.REPORTED_COLUMN: "yes"} for one in bare]
+    write_rows(wrong, tmp_path / "episodes.parquet", "ncap")
+    with pytest.raises(InvalidInput, match=f"its column {ncap.REPORTED_COLUMN} must hold"):
+        read_rows(tmp_path / "episodes.parquet", study.schema)
+
+
 @pytest.mark.parametrize(("name", "rows"), EPISODES.items())
 def test_every_study_shows_its_rows_in_three_forms(name, rows, tmp_path, capsys):
     study = STUDIES[name]

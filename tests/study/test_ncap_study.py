@@ -39,6 +39,7 @@ def test_the_configurations_of_a_seed_are_as_many_as_stated():
     assert len(configs) == 16
     assert {config.policy for config in configs} == set(NCAP_POLICIES)
     assert {config.seed for config in configs} == {4}
+    assert all(config.brake_for_oncoming for config in configs)
 
 
 @pytest.mark.parametrize("reported", [True, False, None])

@@ -25,15 +25,15 @@ class SeedFinder(Policy):
     """What an agent can do that holds this package. Of the first `seeds` seeds of a public
     `scenario` it takes the one whose ego begins at the speed that it reads, and of several such the
     one whose first picture it sees. It lets a twin of that episode's world go on beside it, its ego
-    driven as the own car drives, and reserves the hull of where the hidden actor is by then. It
-    needs no return. It plays as history does if no seed that it knows begins at that speed: with a
-    seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
+    driven as the own car drives, and reserves the hulls of where all who come out of hiding are by
+    then. It needs no return. It plays as history does if no seed that it knows begins at that
+    speed: with a seed beyond `seeds`, a `secret` of the environment, or noise of the speed.
 
     `make_policy` tells it the `scenario` of the environment, with its parameters. Made of a rig
     alone it takes `dense`. In another scenario than it is given by name the first speed can be the
-    same. It then finds the seed, and fires where the actor would be in the scenario that it knows.
+    same. It then finds the seed, and fires where they would be in the scenario that it knows.
 
-    With `hidden_first` it asks for that hull before anything else and gives its tracks what is
+    With `hidden_first` it asks for these hulls before anything else and gives its tracks what is
     left: the most that memory of the seeds can do.
 
     It is a control, no contender: what it reaches without a camera is what the seeds give away.
@@ -84,7 +84,7 @@ class SeedFinder(Policy):
         self._speed = speed
 
     def demand(self, belief: Belief) -> Demand:
-        """Hulls, and that of the actor whom nobody has seen."""
+        """Hulls, and those of whom nobody has seen."""
         tracked = self.rig.hulls(belief.tracks.boxes)
         hidden = self.rig.hulls(self._expected())
         if self._hidden_first:
@@ -106,11 +106,14 @@ class SeedFinder(Policy):
         return alike
 
     def _expected(self) -> Floats:
-        """(n, 7) the box of the hidden actor in the sensor frame, none if it is not known."""
-        if self._twin is None or self._twin.first_sighting is None:
+        """(n, 7) boxes in the sensor frame of all who come out of hiding, none if not known."""
+        if self._twin is None:
             return np.empty((0, 7))
+        hidden = {one.body for one in self._twin.meetings}
+        if self._twin.first_sighting is not None:
+            hidden.add(self._twin.first_sighting.body)
         sensor = Frame.mounted(self._twin.ego.pose, LIDAR_POSITION)
-        return sensor.boxes_to_local(self._twin.boxes([self._twin.first_sighting]))
+        return sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
 
 
 @lru_cache(maxsize=10_000)

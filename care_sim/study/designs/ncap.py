@@ -68,9 +68,18 @@ def ncap_study(
     budgets: Sequence[float] = NCAP_BUDGETS,
     step_kph: float = NCAP_STEP_KPH,
 ) -> list[EpisodeConfig]:
-    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default."""
+    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default. The driver
+    brakes for who comes towards it, as the turn across an oncoming car asks for.
+    """
     return [
         config
         for case in ncap_cases(tests, step_kph)
-        for config in grid(["ncap"], policies, budgets, seeds, scenario_parameters=case.parameters)
+        for config in grid(
+            ["ncap"],
+            policies,
+            budgets,
+            seeds,
+            scenario_parameters=case.parameters,
+            brake_for_oncoming=True,
+        )
     ]

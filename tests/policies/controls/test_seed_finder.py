@@ -109,6 +109,22 @@ def test_it_knows_the_parameters_of_the_scenario(make):
     played(env, "seed-finder", watch=watch)
 
 
+def test_in_a_drive_it_knows_all_whom_the_ego_is_to_meet():
+    env = gymnasium.make("care_sim:CARE-Drive-v0", disable_env_checker=True, budget=0.01)
+    with env:
+        finder = care_sim.make_policy("seed-finder", env, seeds=4, hidden_first=True)
+        observation, _ = env.reset(seed=3)
+        finder.reset()
+        for _ in range(8):
+            loop = env.unwrapped.loop
+            met = [one.body for one in loop.world.meetings]
+            assert len(met) > 1
+            true = loop.sensor.boxes_to_local(loop.world.boxes_of(np.array(met)))
+            action = finder(observation)
+            np.testing.assert_allclose(finder._expected(), true, atol=0.05)
+            observation, *_ = env.step(action)
+
+
 def test_of_seeds_that_share_a_speed_it_takes_the_one_whose_picture_it_sees(make):
     """The vehicles of the dense street are never in the same places; of the dart-out, where the
     first picture is empty, it takes the first seed."""
