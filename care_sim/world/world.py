@@ -68,9 +68,9 @@ class World:
     goal_m: float
     """Where on its way the ego has arrived; its scenario may set it."""
     ended: "Callable[[World], bool]"
-    """Whether nothing can happen any more that the episode is about: the ego has arrived, unless
-    its scenario sets another rule. Handed the world, like all that a world calls: what held it
-    would keep it, and its client of PyBullet, until the garbage is collected.
+    """The rule by which nothing can happen any more that the episode is about: the ego has arrived,
+    unless its scenario sets another. Like all that a world calls, it is handed the world and does
+    not hold it: a world that holds itself keeps its client of PyBullet until garbage is collected.
     """
     meetings: list[Meeting]
     """Whom the scenario lets the ego meet, in the order of the way."""
