@@ -7,8 +7,9 @@
 | 10,000 and up | training |
 
 No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
-seed below 2,000 but by the streets of the calibration. Where episodes differ by the recording and
-not by the seed (`CARE-Replay-v0`), hold out recordings.
+seed below 2,000 but by the streets of the calibration. A study of several seeds takes them of one
+split; one episode, of a command or of an environment that is reset by hand, takes any. Where
+episodes differ by the recording and not by the seed (`CARE-Replay-v0`), hold out recordings.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,9 +33,11 @@ def split_of(seeds: Iterable[int]) -> str:
 
     Raises InvalidInput for seeds of several splits, for a seed of none, and for none at all.
     """
-    found = dict.fromkeys(_split_of_one(seed) for seed in seeds)
+    found: dict[str, int] = {}
+    for seed in seeds:
+        found.setdefault(_split_of_one(seed), seed)
     if len(found) != 1:
-        mixed = f"seeds of {' and '.join(found)}" if found else "no seed"
+        mixed = " and ".join(f"{seed} of {name}" for name, seed in found.items()) or "no seed"
         raise InvalidInput(f"seeds must be of one split ({_ranges()}), got {mixed}")
     return next(iter(found))
 
@@ -52,10 +55,10 @@ def _ranges() -> str:
 
 
 def check_benchmark_seeds(seeds: Sequence[int]) -> None:
-    """Raise InvalidInput for a seed that is not the benchmark's: what is learned or chosen by it
-    would be tested on it.
+    """Raise InvalidInput unless all are the benchmark's: what is learned or chosen by another would
+    be tested on it.
     """
-    if seeds and max(seeds) >= VALIDATION:
+    if split_of(seeds) != "test":
         raise InvalidInput(
             f"seeds of a test must lie below {VALIDATION:,}, got {max(seeds)}: policies are chosen "
             f"and trained on those from {VALIDATION:,} on"

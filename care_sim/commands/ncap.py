@@ -25,7 +25,7 @@ class Ncap(EpisodeStudy):
     """Play the Euro NCAP tests of emergency braking: avoided, mitigated or hit, and a score."""
 
     seeds: tuple[int, ...] = (10,)
-    """One number: that many seeds, from 0. Several numbers: these seeds."""
+    """One number: that many seeds, from 0. Several numbers: these seeds, of one split."""
     tests: tuple[str, ...] = ("all",)
     """Names of tests, as on the page of CARE-NCAP-v0; `all` stands for all of them."""
     policies: tuple[str, ...] = NCAP_POLICIES

@@ -16,7 +16,7 @@ class R157(FixedStudy):
     """
 
     seeds: tuple[int, ...] = (1,)
-    """One number: that many seeds, from 0. Several numbers: these seeds."""
+    """One number: that many seeds, from 0. Several numbers: these seeds, of one split."""
     driver: str = FIXED
     """fixed, or careful-human: the regulation's driver at the wheel."""
     out: Path = Path("runs/r157")

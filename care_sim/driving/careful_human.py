@@ -15,10 +15,11 @@ what comes after the braking.
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Mask
 from care_sim.core.boxes import half_extents
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.types import Command, Ego, Tracks
+from care_sim.driving.corridor import in_strip
 from care_sim.driving.human_model import HUMAN_MODEL
 
 _STEADY_MPS = 0.1
@@ -51,8 +52,8 @@ class CarefulHuman:
         """Decide from the tracks of this keyframe, as they lie before a car that drives straight
         ahead, and the ego's motion.
         """
-        half_x, half_y = half_extents(tracks.boxes)
-        risks = self._perceived(tracks, self._risky(tracks, half_x, half_y))
+        half_x, _ = half_extents(tracks.boxes)
+        risks = self._perceived(tracks, self._risky(tracks))
         closing = ego.speed - tracks.velocities[:, 0]
         if self._danger_s is None:
             gaps = tracks.boxes[:, 0] - half_x - self._front_m
@@ -74,16 +75,14 @@ class CarefulHuman:
         before, after = HUMAN_MODEL.speed_lost(ends)
         return Command(float((before - after) / self._keyframe_s), True)
 
-    def _risky(self, tracks: Tracks, half_x: Floats, half_y: Floats) -> Mask:
-        """(n,) which tracks are in the way or cut in; `half_x` and `half_y` (n,) are the half
-        extents of their boxes.
-        """
+    def _risky(self, tracks: Tracks) -> Mask:
+        """(n,) which tracks are in the way or cut in."""
+        half_x, _ = half_extents(tracks.boxes)
         ahead = tracks.boxes[:, 0] + half_x > self._front_m
-        off_m = np.abs(tracks.boxes[:, 1])
-        in_the_way = off_m <= self._half_width_m + half_y
         towards_mps = -np.sign(tracks.boxes[:, 1]) * tracks.velocities[:, 1]
-        off_its_lane = off_m < HUMAN_MODEL.lane_m - HUMAN_MODEL.wander_m
-        return ahead & (in_the_way | (off_its_lane & (towards_mps > _STEADY_MPS)))
+        off_its_lane = np.abs(tracks.boxes[:, 1]) < HUMAN_MODEL.lane_m - HUMAN_MODEL.wander_m
+        cuts_in = ahead & off_its_lane & (towards_mps > _STEADY_MPS)
+        return in_strip(tracks, self._front_m, self._half_width_m) | cuts_in
 
     def _perceived(self, tracks: Tracks, risky: Mask) -> Mask:
         """(n,) which tracks have been risky for as long as their evaluation takes."""

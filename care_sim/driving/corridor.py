@@ -35,6 +35,14 @@ def along_route(tracks: Tracks, route: Route, sensor: Frame) -> Tracks:
     return replace(tracks, boxes=straight, velocities=turned(tracks.velocities, -turn))
 
 
+def in_strip(ahead: Tracks, front_m: float, reach_m: float) -> Mask:
+    """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, now.
+
+    Tracks as `along_route` gives them.
+    """
+    return enters_strip(ahead, front_m, reach_m, horizon_s=0.0)
+
+
 def enters_strip(ahead: Tracks, front_m: float, reach_m: float, horizon_s: float) -> Mask:
     """(n,) which tracks lie ahead of `front_m` within `reach_m` to either side of the way, or will
     within `horizon_s` if they keep their velocities. Tracks as `along_route` gives them.

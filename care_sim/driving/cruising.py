@@ -12,6 +12,7 @@ import numpy as np
 
 from care_sim.core.boxes import half_extents
 from care_sim.core.types import Command, Tracks
+from care_sim.driving.corridor import in_strip
 from care_sim.world.speed_plan import SpeedPlan
 
 
@@ -66,10 +67,10 @@ class Cruising:
 
     def _for_who_leads(self, tracks: Tracks, speed: float) -> float:
         rules = self._rules
-        half_x, half_y = half_extents(tracks.boxes)
+        half_x, _ = half_extents(tracks.boxes)
         gaps = tracks.boxes[:, 0] - half_x - self._front_m
-        beside = np.abs(tracks.boxes[:, 1]) > self._half_width_m + half_y
-        leads = (gaps > 0) & ~beside & (tracks.velocities[:, 0] > rules.moving_mps)
+        in_the_way = in_strip(tracks, self._front_m, self._half_width_m)
+        leads = in_the_way & (gaps > 0) & (tracks.velocities[:, 0] > rules.moving_mps)
         if not leads.any():
             return np.inf
         lead = int(np.argmin(np.where(leads, gaps, np.inf)))

@@ -193,11 +193,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self.render_mode = render_mode
         self.keyframes: list[Keyframe] = []
         self._weights = rewards.weights(reward_weights)
-        # Of the running episode: whether the first-sighting actor was ever in view or detected,
-        # and what was lost of the full-scan bound.
-        self._in_view = False
-        self._detected = False
-        self._potential = rewards.Potential()
+        self._reward = rewards.EpisodeReward(self._weights)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -214,9 +210,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self.close()
         pool = self._pool(entropy)
         world = self.scenario.build(np.random.default_rng(scenario))
-        self._in_view = False
-        self._detected = False
-        self._potential = rewards.Potential()
+        self._reward = rewards.EpisodeReward(self._weights)
         self.keyframes = []
         loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, self._detector)
         return self._begin(loop, floor), self._info_of({}, {"seed": entropy})
@@ -229,18 +223,18 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         """
         loop = self.loop
         fired = self._choose_cells(action)
-        # Asked before the keyframe, which moves the world on.
-        detectable = self._detectable()
+        # Asked before the keyframe, which moves the world on, and only while it is needed: it costs
+        # rays.
+        detectable = self._reward.needs_bound and loop.detectable()
         record = loop.keyframe(fired)
         self.keyframes.append(record)
         terminated = record.impact_speed_mps is not None or loop.world.is_over()
         truncated = loop.world.time >= self.scenario.duration_s - LAST_BITS_S
         self._over = terminated or truncated
-        terms = self._terms(record, detectable)
+        reward, terms = self._reward.of(record, detectable, self._over)
         info = self._info(record, terms)
         if self._over:
             info["outcome"] = asdict(self._outcome())
-        reward = sum(self._weights[name] * value for name, value in terms.items())
         return self.observed(), reward, terminated, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -271,28 +265,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             world, self.scenario.duration_s, self.rig, self.conditions, seeds, self._detector
         )
 
-    def _detectable(self) -> bool:
-        """Whether a scan of every cell would detect the first-sighting actor now.
-
-        The scan costs rays, so it is cast only while the reward's bound is needed and not yet
-        known; otherwise the answer is False.
-        """
-        needed = bool(self._weights["gain"]) and self._potential.bound_m is None
-        return needed and self.loop.detectable()
-
     def _outcome(self) -> Outcome:
         """The result of the episode."""
         return outcome(self.keyframes)
-
-    def _terms(self, record: Keyframe, detectable: bool) -> dict[str, float]:
-        self._in_view |= record.in_view
-        self._detected |= record.detected
-        lost = (
-            self._potential.advance(record, detectable, self._over)
-            if self._weights["gain"]
-            else 0.0
-        )
-        return rewards.terms(record, self._in_view, self._detected, lost)
 
     def _info(self, record: Keyframe, terms: dict[str, float]) -> dict[str, Any]:
         own = {

@@ -99,3 +99,32 @@ class Potential:
             self._lost = 1.0 if all_of_it else max(before, 1.0 - record.distance_m / self.bound_m)
         self._found |= record.detected
         return self._lost - before
+
+
+class EpisodeReward:
+    """The reward of one episode. `weights` holds one of every term."""
+
+    def __init__(self, weights: Mapping[str, float]):
+        self._weights = weights
+        # Whether the first-sighting actor was in view or detected at any keyframe so far.
+        self._in_view = False
+        self._detected = False
+        self._potential = Potential()
+
+    @property
+    def needs_bound(self) -> bool:
+        """Whether the full-scan bound counts and is not known yet."""
+        return bool(self._weights["gain"]) and self._potential.bound_m is None
+
+    def of(self, record: Keyframe, detectable: bool, over: bool) -> tuple[float, dict[str, float]]:
+        """The reward of the next keyframe, and its `terms`.
+
+        `detectable` says whether a scan of every cell would detect the actor, where `needs_bound`
+        asks for it; `over` whether the episode ends with this keyframe.
+        """
+        self._in_view |= record.in_view
+        self._detected |= record.detected
+        measured = bool(self._weights["gain"])
+        lost = self._potential.advance(record, detectable, over) if measured else 0.0
+        earned = terms(record, self._in_view, self._detected, lost)
+        return sum(self._weights[name] * value for name, value in earned.items()), earned

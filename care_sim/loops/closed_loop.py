@@ -12,20 +12,19 @@ from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import Rig
-from care_sim.core.types import Command, Detections, Scan, Tracks
+from care_sim.core.types import Command, Scan, Tracks
 from care_sim.driving.corridor import along_route
 from care_sim.driving.cruising import Cruising, CruisingRules
 from care_sim.driving.drivers import make_driver
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.needless import NeedlessBraking
 from care_sim.loops.records import Keyframe, Sight
+from care_sim.loops.scan_detection import ScanDetection
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
-from care_sim.perception.matching import found_objects
-from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
-from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud, IdentifiedDetections
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
@@ -72,15 +71,13 @@ class ClosedLoop:
         self.rig = rig
         self._labels = labels = world.labels()
         self._reported = np.array(list(labels), np.int64)
-        self._classes = np.array(list(labels.values()), np.int64)
         self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, conditions, seeds.lidar)
         self._camera = CameraDetector(
             list(labels), conditions, rig.keyframe_s, seeds.camera, rig.cameras, pool
         )
         self._odometry = Odometry(conditions.ego_speed_sigma, seeds.odometry)
-        self._detector = detector
-        self._returns_rule = ReturnsRule(labels, conditions.min_returns)
+        self._detection = ScanDetection(rig.grid, labels, conditions.min_returns, detector)
         self._min_returns = conditions.min_returns
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
@@ -115,7 +112,7 @@ class ClosedLoop:
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
-        detections, behind, found = self._detect(scan, bodies)
+        detections, behind, found = self._detection.detect(scan, bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
         command = self._command(sensor)
@@ -182,30 +179,6 @@ class ClosedLoop:
     def shows(self, body: int) -> bool:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
         return any(picture.shows(body) for picture in self.pictures)
-
-    def _detect(self, scan: Scan, bodies: Integers) -> tuple[Detections, Integers, Integers]:
-        """What is detected in a scan: the detections, the body behind each or NO_OBJECT, and all
-        bodies that were found.
-
-        `bodies` are those behind the returns. The proxy alone may ask whose return each is. What
-        another detector finds is scored by the class-consistent 2 m match (paper, Remark 1), and
-        only what a box has returns of: else a box on the end of a lorry would find who is hidden
-        behind it.
-        """
-        if self._detector is None:
-            detections, detected = self._returns_rule.detections(bodies, self._local_boxes)
-            return detections, detected, detected
-        (returned,) = np.nonzero(np.isfinite(scan.ranges))
-        cells = scan.cells[returned]
-        points = self.rig.grid.directions[cells] * scan.ranges[returned, None]
-        reported = np.isin(bodies[returned], self._reported)
-        cloud = Cloud(cells, points, np.where(reported, bodies[returned], NO_OBJECT))
-        present = Annotations(self._reported, self._classes, self._local_boxes(self._reported))
-        detections, behind = self._detector.detect(cloud, present)
-        hit = np.isin(present.objects, behind)
-        candidates = Annotations(present.objects[hit], present.classes[hit], present.boxes[hit])
-        found = found_objects(candidates, detections)
-        return detections, behind, candidates.objects[found]
 
     def _command(self, sensor: Frame) -> Command:
         """What the car's software asks for, from the tracks of this keyframe."""

@@ -45,6 +45,7 @@ __all__ = [
     "POLICIES",
     "check_policy",
     "contenders",
+    "controls",
     "is_pattern",
     "make_policy",
     "policy_names",
@@ -104,6 +105,13 @@ def policy_names() -> list[str]:
 def contenders() -> list[str]:
     """The policies that `all` stands for: every one that is no control."""
     return [name for name in policy_names() if "control" not in tags_of(name)]
+
+
+def controls() -> list[str]:
+    """The built-in controls that a car can have: patterns that no camera moves."""
+    return [
+        name for name in BUILT_IN if "control" in tags_of(name) and "generator" not in tags_of(name)
+    ]
 
 
 def check_policy(name: str) -> None:

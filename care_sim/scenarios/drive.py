@@ -61,7 +61,6 @@ class DriveScenario(Scenario):
         nobody = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
         world = World(nobody, drive.cruise_mps, drive.route)
         world.goal_m = drive.goal_m
-        world.is_over = lambda: world.along_m >= drive.goal_m
         plan = SpeedPlan(drive.route, drive.cruise_mps, SIDEWAYS_MPS2, COMFORT_MPS2)
         world.speed_plan = plan
         traffic = StreetTraffic([_flowing(drive, lane) for lane in drive.lanes])
@@ -113,7 +112,7 @@ def _add_vehicles(world: World, drive: Drive, traffic: StreetTraffic) -> None:
     for number, lane in enumerate(drive.lanes):
         for place, kind in enumerate(lane.kinds):
             world.add(f"driven {kind}", kind, _driving(traffic, number, place))
-    world.at_every_step(lambda: traffic.step(WORLD_STEP_S, world.along_m, world.ego.speed))
+    world.at_every_step(lambda now: traffic.step(WORLD_STEP_S, now.along_m, now.ego.speed))
 
 
 def _driving(traffic: StreetTraffic, lane: int, number: int) -> Motion:
@@ -123,14 +122,11 @@ def _driving(traffic: StreetTraffic, lane: int, number: int) -> Motion:
 def _add_encounters(world: World, drive: Drive, plan: SpeedPlan, traffic: StreetTraffic) -> None:
     """Who comes out. The episode is about the first who would be hit, else the first of all."""
     for along, one in drive.encounters:
-        crosser = Crosser(
-            one.walk,
-            one.lead_s,
-            _seconds_left(world, plan, along - one.half_width - EGO_LENGTH_M / 2),
-            _may_go(drive, traffic, CATALOGUE[one.who].size[:2]),
-        )
+        free = _may_go(drive, traffic, CATALOGUE[one.who].size[:2])
+        crosser = Crosser(one.walk, one.lead_s, free)
         actor = world.add(one.who, one.who, crosser.pose)
-        world.at_every_step(_looking(world, crosser))
+        line_m = along - one.half_width - EGO_LENGTH_M / 2
+        world.at_every_step(_looking(crosser, plan, line_m))
         side = "left" if one.side > 0 else "right"
         occluder = one.occluder, one.occluder_reported
         world.meetings.append(
@@ -143,18 +139,20 @@ def _add_encounters(world: World, drive: Drive, plan: SpeedPlan, traffic: Street
         world.first_sighting = next(a for a in world.actors if a.body == hits[0].body)
 
 
-def _looking(world: World, crosser: Crosser) -> Callable[[], None]:
-    return lambda: crosser.look(world.time)
+def _looking(crosser: Crosser, plan: SpeedPlan, line_m: float) -> Callable[[World], None]:
+    """Somebody who watches the ego, whose middle is on the line `line_m` along the route."""
+
+    def look(world: World) -> None:
+        if crosser.went is None:
+            crosser.look(world.time, _seconds_left(world, plan, line_m))
+
+    return look
 
 
-def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> Callable[[], float]:
+def _seconds_left(world: World, plan: SpeedPlan, line_m: float) -> float:
     """The ego's time until its middle is `line_m` along the route, if it goes on as it does."""
-
-    def seconds() -> float:
-        gaining = max(world.ego_motion.acceleration, 0.0)
-        return plan.seconds_to(world.along_m, line_m, world.ego.speed, gaining)
-
-    return seconds
+    gaining = max(world.ego_motion.acceleration, 0.0)
+    return plan.seconds_to(world.along_m, line_m, world.ego.speed, gaining)
 
 
 def _may_go(

@@ -11,35 +11,27 @@ class Crosser:
     """Waits at the beginning of a walk and sets off when the ego has `lead_s` seconds left to its
     line. Whom traffic would then run over waits on, as people do who see it come, and stays.
 
-    `seconds_left` tells the ego's time, `may_go` whether the way is free of other traffic.
+    `may_go` tells whether the way is free of other traffic.
     """
 
     walk: Walk
     went: bool | None
     """Whether it set off; None before the decision."""
 
-    def __init__(
-        self,
-        walk: Walk,
-        lead_s: float,
-        seconds_left: Callable[[], float],
-        may_go: Callable[[Walk], bool],
-    ):
+    def __init__(self, walk: Walk, lead_s: float, may_go: Callable[[Walk], bool]):
         self.walk = walk
         self.went = None
         self._lead_s = lead_s
-        self._seconds_left = seconds_left
         self._may_go = may_go
 
-    def look(self, time: float) -> None:
-        """Decide at `time`, seconds from the start; to be called at every world step."""
-        if self.went is not None:
-            return
-        left = self._seconds_left()
-        if left > self._lead_s:
+    def look(self, time: float, seconds_left: float) -> None:
+        """Decide at `time`, seconds from the start, at which the ego has `seconds_left`; to be
+        called at every world step until it has decided.
+        """
+        if self.went is not None or seconds_left > self._lead_s:
             return
         # World steps are short but not endless: it set off a moment ago, when the time was right.
-        self.walk = self.walk.setting_off(time - (self._lead_s - left))
+        self.walk = self.walk.setting_off(time - (self._lead_s - seconds_left))
         self.went = self._may_go(self.walk)
 
     def pose(self, time: float) -> Pose:

@@ -63,12 +63,15 @@ class World:
     """The actor whom the episode is about; its scenario sets it."""
     route: Route | None
     """The way that the ego is to go, as its navigation knows it; None is straight ahead."""
-    is_over: Callable[[], bool]
-    """Whether nothing can happen any more that the episode is about; its scenario may set it."""
     speed_plan: SpeedPlan | None
     """How fast it means to go there; None is as fast as it starts. Its scenario sets it."""
     goal_m: float
-    """Where on the route the episode ends; its scenario sets it."""
+    """Where on its way the ego has arrived; its scenario may set it."""
+    ended: "Callable[[World], bool]"
+    """The rule by which nothing can happen any more that the episode is about: the ego has arrived,
+    unless its scenario sets another. Like all that a world calls, it is handed the world and does
+    not hold it: a world that holds itself keeps its client of PyBullet until garbage is collected.
+    """
     meetings: list[Meeting]
     """Whom the scenario lets the ego meet, in the order of the way."""
 
@@ -89,13 +92,13 @@ class World:
         self._footprints.add(self.ego_body, self.ego_kind.size, self.ego.pose)
         self._before = self._footprints.boxes[:, :2].copy()
         self.first_sighting = None
-        self.is_over = lambda: False
         self.speed_plan = None
         self.goal_m = np.inf
+        self.ended = lambda world: world.along_m >= world.goal_m
         self.meetings = []
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
-        self._every_step: list[Callable[[], None]] = []
+        self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
         self._steps = 0
 
@@ -133,9 +136,13 @@ class World:
         """Call `event` once, at the first world step at or after `time`."""
         self._events.append((time, event))
 
-    def at_every_step(self, event: Callable[[], None]) -> None:
-        """Call `event` at every world step, when the ego has moved and the clock with it."""
+    def at_every_step(self, event: "Callable[[World], None]") -> None:
+        """Call `event` with this world at every step, when ego and clock have moved on."""
         self._every_step.append(event)
+
+    def is_over(self) -> bool:
+        """Whether nothing can happen any more that the episode is about."""
+        return self.ended(self)
 
     @property
     def along_m(self) -> float:
@@ -195,8 +202,10 @@ class World:
         # which has its turn at the next step if it is due already.
         due = [event for start, event in self._events if start <= self.time]
         self._events = [(start, event) for start, event in self._events if start > self.time]
-        for event in (*due, *self._every_step):
+        for event in due:
             event()
+        for look in self._every_step:
+            look(self)
         self._ego_motion = Ego(
             self.ego.speed, self.ego.yaw_rate, (self.ego.speed - before) / WORLD_STEP_S
         )

@@ -71,11 +71,12 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         ),
         (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
         (["sweep", "--seeds", "0"], ["seeds", "from 1 to"]),
+        (["sweep", "--seeds", "2001"], ["seeds", "from 1 to 2,000"]),
         (["sweep", "--budgets"], ["--budgets", "at least one"]),
         (["sweep", "--scenarios"], ["--scenarios", "at least one"]),
         (["validate"], ["WORLD"]),
         (["validate", "moon"], ["scenario 'moon'", "dartout"]),
-        (["validate", "cutin", "--seeds", "0", "10000"], ["seeds of a test", "2,000", "10000"]),
+        (["validate", "cutin", "--seeds", "2000", "2001"], ["seeds of a test", "2,000", "2001"]),
         (["validate", "cutin", "--training-seeds", "0"], ["training_seeds", ">= 1"]),
         (["validate", "cutin", "--factors", "mirrored"], ["NAME=VALUE", "'mirrored'"]),
         (["validate", "cutin", "--factors", "mirrored=half"], ["mirrored 'half'", "drawn"]),
@@ -90,6 +91,31 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_pat
     assert err.startswith("care-sim: ")
     assert err.count("\n") == 1
     assert all(name in err for name in names), err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["sweep"],
+        ["ncap"],
+        ["r157"],
+        ["validate", "dartout"],
+        ["reproduce"],
+        ["ablate"],
+        ["faults"],
+        ["crowding"],
+        ["order"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_seeds_of_several_splits_are_no_study(command, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(capsys, *command, "--seeds", "1999", "2000", "10000")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "test 0 to 1999" in err
+    assert "got 1999 of test and 2000 of validation and 10000 of train" in err
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.types import Ego, Tracks
 from care_sim.driving.braking import BrakingController
-from care_sim.driving.corridor import along_route
+from care_sim.driving.corridor import along_route, enters_strip, in_strip
 from care_sim.world.route import Route
 
 LEFT_TURN = Route(legs=((10.0, 0.0), (8.0 * np.pi / 2, 1 / 8.0)))
@@ -55,3 +55,24 @@ def test_the_controller_brakes_for_what_stands_on_the_way_alone(place, brakes):
 def test_no_tracks_stay_none():
     nobody = Tracks.from_rows(np.zeros((0, 13)))
     assert len(along_route(nobody, LEFT_TURN, Frame(0.0, 0.0, 1.84, 0.0))) == 0
+
+
+def rows_of(*places):
+    """Tracks 2 m long and 2 m wide from (x, y, sideways m/s)."""
+    rows = [
+        [n, 0, x, y, 0.9, 2.0, 2.0, 1.5, 0.0, 0.0, vy, 0, 5] for n, (x, y, vy) in enumerate(places)
+    ]
+    return Tracks.from_rows(np.array(rows, float))
+
+
+def test_the_strip_reaches_from_the_bumper_on_and_to_either_side():
+    """1.5 m ahead, 0.9 m to a side; a box that touches the side is in it, one that ends at the
+    bumper is not.
+    """
+    inside = [(5.0, 1.9, 0.0), (5.0, -1.9, 0.0), (0.6, 0.0, 0.0)]
+    outside = [(5.0, 1.91, 0.0), (5.0, -1.91, 0.0), (0.5, 0.0, 0.0)]
+    assert in_strip(rows_of(*inside), 1.5, 0.9).all()
+    assert not in_strip(rows_of(*outside), 1.5, 0.9).any()
+    crossing = rows_of((5.0, 3.0, -1.0), (5.0, -3.0, 1.0), (5.0, 3.0, 1.0))
+    assert not in_strip(crossing, 1.5, 0.9).any()
+    assert enters_strip(crossing, 1.5, 0.9, 1.2).tolist() == [True, True, False]

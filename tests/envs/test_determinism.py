@@ -1,6 +1,7 @@
 """The same seed gives the same episode to the last bit: in one process, in many, in vectors."""
 
 import hashlib
+import os
 import subprocess
 import sys
 
@@ -9,11 +10,13 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.envs import CLOSED_LOOP
 from tests.helpers.places import ROOT
 
 NAME = "care_sim:CARE-Dense-v0"
 SEED = 11
 STEPS = 8
+every_world = pytest.mark.parametrize("name", CLOSED_LOOP)
 
 
 def digest(observations):
@@ -29,8 +32,8 @@ def actions():
     return [rng.random((32, 512), dtype=np.float32) for _ in range(STEPS)]
 
 
-def alone():
-    env = gymnasium.make(NAME, disable_env_checker=True)
+def alone(name=NAME):
+    env = gymnasium.make(name, disable_env_checker=True)
     observations = [env.reset(seed=SEED)[0]]
     observations += [env.step(action)[0] for action in actions()]
     env.close()
@@ -47,19 +50,31 @@ def in_a_vector(vector):
     return digest(observations)
 
 
+@every_world
 @pytest.mark.parametrize("mode", ["sync", "async"])
-def test_vectors_of_gymnasium_give_the_same_episode(mode):
-    kwargs = {} if mode == "sync" else {"context": "spawn"}
-    vector = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode, vector_kwargs=kwargs)
-    assert in_a_vector(vector) == alone()
+def test_vectors_of_gymnasium_give_the_same_episode(name, mode):
+    # One of them in interpreters of their own; the others are forked, which takes no time.
+    context = {"context": "spawn" if name in NAME else "fork"}
+    kwargs = {} if mode == "sync" else context
+    vector = gymnasium.make_vec(name, num_envs=2, vectorization_mode=mode, vector_kwargs=kwargs)
+    assert in_a_vector(vector) == alone(name)
 
 
-def test_another_process_gives_the_same_episode():
-    program = "from tests.envs import test_determinism; print(test_determinism.alone())"
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+def test_another_process_with_another_hash_seed_gives_the_same_episodes():
+    program = (
+        "from tests.envs.test_determinism import CLOSED_LOOP, alone; "
+        "print(*(alone(name) for name in CLOSED_LOOP))"
     )
-    assert done.stdout.split()[-1] == alone()
+    other = "1" if os.environ.get("PYTHONHASHSEED") != "1" else "2"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONHASHSEED": other},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split()[-len(CLOSED_LOOP) :] == [alone(name) for name in CLOSED_LOOP]
 
 
 @pytest.mark.slow
@@ -79,10 +94,11 @@ def make_one():
     return gymnasium.make(NAME, disable_env_checker=True)
 
 
-def test_the_policy_loop_repeats_and_another_seed_differs():
+@every_world
+def test_the_policy_loop_repeats_and_another_seed_differs(name):
     digests = []
     for seed in (SEED, SEED, SEED + 1):
-        env = gymnasium.make(NAME, disable_env_checker=True)
+        env = gymnasium.make(name, disable_env_checker=True)
         policy = care_sim.make_policy("care", env)
         observations = [env.reset(seed=seed)[0]]
         for _ in range(STEPS):

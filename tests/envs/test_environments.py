@@ -307,6 +307,17 @@ def test_a_person_who_is_run_into_ends_the_episode():
     assert outcome["clearance_m"] <= 0.0
 
 
+def test_a_drive_ends_at_its_goal():
+    drive = make("CARE-Drive-v0", budget=0.01).unwrapped
+    drive.reset(seed=0)
+    world = drive.loop.world
+    world.ego.along = world.goal_m - 1.5 * drive.rig.keyframe_s * world.ego.speed
+    first, second = (drive.step(NOTHING) for _ in range(2))
+    assert (first[2:4], second[2:4]) == ((False, False), (True, False))
+    assert second[4]["outcome"]["progress"] >= 1.0
+    drive.close()
+
+
 @pytest.mark.parametrize(
     ("duration", "keyframe", "steps"),
     [(0.1, 0.1, 1), (0.3, 0.1, 3), (0.7, 0.1, 7), (0.6, 0.2, 3), (0.25, 0.1, 3)],

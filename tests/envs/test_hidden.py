@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
 from care_sim.envs.open_loop import OpenLoopEnv
 from care_sim.streets.street import make_street
 
-OWN = {"CARE-Dense-v0": {"fired", "braking", "time_s"}, "CARE-Replay-v0": {"fired", "time_s"}}
+OWN = {name: {"fired", "braking", "time_s"} for name in CLOSED_LOOP} | {
+    "CARE-Replay-v0": {"fired", "time_s"}
+}
+SHORT = {name: {"duration_s": 0.5} for name in CLOSED_LOOP}
 NOTHING = np.zeros((32, 512), np.float32)
 SECRET = "6d0f5b7e"
 
@@ -47,18 +51,15 @@ def infos(env):
 def test_without_scoring_info_only_what_the_car_knows_is_told_and_at_the_end_the_outcome(
     make, name
 ):
-    begun, *steps, last = infos(make(name, scoring_info=False))
+    begun, *steps, last = infos(make(name, scoring_info=False, **SHORT.get(name, {})))
     assert begun == {}
     assert all(set(info) == OWN[name] for info in steps)
     assert set(last) == OWN[name] | {"outcome"}
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"), [("CARE-Dense-v0", ClosedLoopEnv), ("CARE-Replay-v0", OpenLoopEnv)]
-)
-def test_every_key_of_info_stands_on_the_page_as_the_cars_own_or_for_scoring_alone(
-    make, name, kind
-):
+@pytest.mark.parametrize("name", OWN)
+def test_every_key_of_info_stands_on_the_page_as_the_cars_own_or_for_scoring_alone(make, name):
+    kind = ClosedLoopEnv if name in CLOSED_LOOP else OpenLoopEnv
     lines = re.findall(
         r"^ *\| (`.*) \| .* \| (the car's own|scoring alone) \|$", kind.__doc__, re.MULTILINE
     )
@@ -67,7 +68,7 @@ def test_every_key_of_info_stands_on_the_page_as_the_cars_own_or_for_scoring_alo
         for keys, whose in lines
         for key in re.findall(r"`(\w+)`", keys.partition(" | ")[0])
     }
-    told = {key for info in infos(make(name)) for key in info}
+    told = {key for info in infos(make(name, **SHORT.get(name, {}))) for key in info}
     assert set(page) == told
     assert {key for key, whose in page.items() if whose == "the car's own"} == OWN[name]
 
@@ -84,23 +85,20 @@ def test_the_truth_left_out_changes_nothing_else(make):
 
 
 def begins(env, seed):
-    """The first observation, and after two scans of every cell; then the person's place at three
-    moments.
+    """The first observation, and after two scans of every cell; then the place of everybody at
+    three moments.
     """
     observation, _ = env.reset(seed=seed)
     seen = [observation, *(env.step(np.ones((32, 512), np.float32))[0] for _ in range(2))]
     world = env.unwrapped.loop.world
-    return seen, [world.first_sighting.pose_at(time) for time in (0.0, 3.5, 4.0)]
+    return seen, [actor.pose_at(time) for actor in world.actors for time in (0.0, 3.5, 4.0)]
 
 
 def same(one, other):
     return all(np.array_equal(one[key], other[key]) for key in one)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-NCAP-v0", "CARE-R157-v0"],
-)
+@pytest.mark.parametrize("name", CLOSED_LOOP)
 def test_a_secret_makes_another_episode_of_a_seed_and_the_same_one_again(make, name):
     public, secret, again, other = (
         begins(make(name, budget=1.0, secret=text), 0)

@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from care_sim.envs import CLOSED_LOOP
 from care_sim.scenarios.dartout import Dartout
 from care_sim.world.bullet_clients import MOST_FREE, pybullet
 
@@ -33,8 +34,8 @@ class Broken(Dartout):
         raise RuntimeError("no furniture")
 
 
-def made():
-    return gymnasium.make("CARE-Dartout-v0", disable_env_checker=True, budget=0.01)
+def made(name="CARE-Dartout-v0"):
+    return gymnasium.make(name, disable_env_checker=True, budget=0.01)
 
 
 def closed(seed):
@@ -44,9 +45,10 @@ def closed(seed):
     env.close()
 
 
-def dropped(seed):
-    env = made()
+def dropped(seed, name="CARE-Dartout-v0"):
+    env = made(name)
     env.reset(seed=seed)
+    env.step(np.zeros((32, 512), np.float32))
 
 
 def reset_twice(seed):
@@ -109,12 +111,14 @@ def test_they_stay_flat_over_a_thousand():
     is_flat(closed_or_dropped, max(CYCLES, 1000), MIXED_GROWTH_MB)
 
 
-def test_a_dropped_environment_leaves_its_client_at_once_without_the_garbage_collector():
+@pytest.mark.parametrize("name", CLOSED_LOOP)
+def test_a_dropped_environment_leaves_its_client_at_once_without_the_garbage_collector(name):
+    gc.collect()
     before = clients()
     gc.disable()
     try:
-        for seed in range(2 * MOST_FREE):
-            dropped(seed)
+        for seed in range(MOST_FREE + 2):
+            dropped(seed, name)
         assert clients() <= before + 1
     finally:
         gc.enable()

@@ -13,7 +13,7 @@ KINDS = {4: "child", 5: "bicycle", 6: "car"}
 
 
 def meeting(body, course, went):
-    crosser = Crosser(Walk((0.0, 0.0), 0.0, 1.0, 1.0, 1.0), 1.0, lambda: 0.0, lambda _walk: True)
+    crosser = Crosser(Walk((0.0, 0.0), 0.0, 1.0, 1.0, 1.0), 1.0, lambda _walk: True)
     crosser.went = went
     return Meeting(body, KINDS[body], "right", 50.0, course, "van", True, crosser)
 

@@ -12,6 +12,8 @@ from care_sim.perception.tracker import MemoryRules
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE
+from care_sim.world.route import Route
+from care_sim.world.speed_plan import SpeedPlan
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World
 
@@ -28,8 +30,8 @@ def street():
     """Makes worlds of one lane, the ego driving at SPEED."""
     made = []
 
-    def make():
-        made.append(World(Traffic((1,), 0, 3.5, 14.0), SPEED))
+    def make(route=None):
+        made.append(World(Traffic((1,), 0, 3.5, 14.0), SPEED, route))
         return made[-1]
 
     yield make
@@ -341,3 +343,17 @@ def test_the_guarded_strip_is_that_of_the_driver(street):
     wide = loop_in(street(), brake_side_margin_m=1.0)
     human = loop_in(street(), driver="careful-human")
     assert (wide.guarded_m, human.guarded_m) == (pytest.approx(width + 2.0), width)
+
+
+@pytest.mark.parametrize("comfort", [0.8, 2.5])
+def test_comfort_is_that_of_the_drive_too(street, comfort):
+    """A car that drives by a plan and is slower than it gains speed as its settings say."""
+    world = street(Route(legs=((300.0, 0.0),)))
+    world.speed_plan = SpeedPlan(world.route, 2 * SPEED, 2.0, 1.5)
+    loop = loop_in(world, comfort_mps2=comfort)
+    world.ego.speed = SPEED / 2
+    # The odometer tells the new speed at the second keyframe.
+    loop.keyframe(NOTHING)
+    before = world.ego.speed
+    loop.keyframe(NOTHING)
+    assert world.ego.speed - before == pytest.approx(0.1 * comfort)

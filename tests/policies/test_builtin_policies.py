@@ -16,9 +16,9 @@ from care_sim.core.belief import Belief
 from care_sim.core.forgetting import ForgettingRules
 from care_sim.core.rig import Rig
 from care_sim.core.types import Ego
+from care_sim.envs import CLOSED_LOOP
 from care_sim.policies.paper.care_sbf import CareSbf
 
-SCENARIOS = ["CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0"]
 CAMERA_POLICIES = ["care", "all-camera", "care-priority", "care-sbf"]
 
 
@@ -45,12 +45,14 @@ def driven(scenario, policy, keyframes=60, seed=0, **parameters):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", CLOSED_LOOP)
 @pytest.mark.parametrize("policy", ["care", "care-priority", "all-camera"])
-def test_with_a_camera_that_misses_everything_whole_episodes_are_those_of_history(scenario, policy):
+def test_with_a_camera_that_misses_everything_episodes_are_those_of_history(scenario, policy):
     blind = driven(scenario, policy, false_negative_rate=1.0)
     history = driven(scenario, "history", false_negative_rate=1.0)
-    assert len(blind) == len(history) == 60
+    # A test of Euro NCAP may be over before its six seconds are.
+    assert len(blind) == len(history)
+    assert len(blind) == 60 or scenario == "CARE-NCAP-v0"
     for (_, _, one), (_, _, other) in zip(blind, history, strict=True):
         assert np.array_equal(one["fired"], other["fired"])
 

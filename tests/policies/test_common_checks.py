@@ -13,6 +13,8 @@ from care_sim.core.belief import MAX_DETECTIONS, Belief
 from care_sim.core.cell_order import CELL_ORDERS
 from care_sim.core.residual import camera_layers
 from care_sim.core.types import CLASSES, ImageDetections
+from care_sim.envs import IDS
+from care_sim.measure.certify.design import AS_LISTED
 from care_sim.policies import BUILT_IN
 
 BEFORE = {
@@ -20,11 +22,13 @@ BEFORE = {
     "CARE-Dense-v0": 24,
     "CARE-CutIn-v0": 24,
     "CARE-NCAP-v0": 20,
+    "CARE-R157-v0": 2,
     "CARE-Street-v0": 2,
     "CARE-Replay-v0": 2,
 }
 """Keyframes until the hidden one is about to come into view; on the street many are, on the log one
-is.
+is, and before a cut-in nobody is hidden. A drive, which takes a moment to draw, has a test of its
+own.
 """
 KEYFRAMES = 6
 OWN = {"care-spread": 1, "care-sightlines": 2}
@@ -101,6 +105,36 @@ def test_it_repeats_itself_and_shares_nothing_with_another_of_its_kind(case):
         assert np.array_equal(other(observation), action)
         observation, *_ = env.step(action)
         read_only(observation)
+
+
+def test_these_are_all_environments():
+    assert {*BEFORE, "CARE-Drive-v0"} == {*IDS}
+
+
+@pytest.fixture(scope="module")
+def drive_under_way():
+    """A drive that goes on from test to test, and its last observation."""
+    with gymnasium.make("CARE-Drive-v0", budget=0.05, duration_s=12.0) as env:
+        seen = [env.reset(seed=0)[0]]
+        yield env, seen
+
+
+@pytest.mark.parametrize("name", [name for name in BUILT_IN if name != "full"])
+def test_every_policy_takes_over_a_drive(name, drive_under_way, request):
+    if name == "farthest-points":
+        request.getfixturevalue("open3d")
+    env, seen = drive_under_way
+    # Of what plays whole episodes first, few are enough.
+    policy, twin = (care_sim.make_policy(name, env, **AS_LISTED.get(name, {})) for _ in range(2))
+    for _ in range(3):
+        observation = read_only(seen[-1])
+        action = policy(observation)
+        assert env.action_space.contains(action)
+        assert np.count_nonzero(action) <= env.unwrapped.rig.budget
+        assert np.array_equal(twin(observation), action)
+        following, *_, info = env.step(action)
+        assert {*np.flatnonzero(action).tolist()} <= {*info["fired"].tolist()}
+        seen.append(following)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,6 @@ from tests.torture import hostile, judge
 from tests.torture.case import DONE, Fault
 
 LIMIT_S = 10.0
-LOOPS = ("CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0")
 MORE = ("reward_weights", "render_mode", "keyframe_s", "budget", "seed", "self", "unknown")
 
 
@@ -107,9 +106,10 @@ def environment(case):
     import gymnasium
 
     from care_sim.core.conditions import ClosedLoopConditions
+    from care_sim.envs import CLOSED_LOOP
     from care_sim.scenarios import SCENARIOS
 
-    name = case.rng.choice(LOOPS)
+    name = case.rng.choice([*CLOSED_LOOP])
     case.tell(name)
     scenario = SCENARIOS[name.split("-")[1].lower()]
     known = _fields_of(ClosedLoopConditions) | _fields_of(scenario) | dict.fromkeys(MORE)
@@ -443,13 +443,16 @@ def vector(case):
     """Several environments side by side."""
     import gymnasium
 
+    from care_sim.envs import CLOSED_LOOP
+
     count = some(case, 1, 2)
     # Gymnasium makes as many as it is asked for, and NumPy no array of True rows.
     if isinstance(count, Real) and count > 4:
         return
     count = int(count) if isinstance(count, bool) else count
+    name = case.rng.choice([*CLOSED_LOOP])
     env = gymnasium.make_vec(
-        case.rng.choice(LOOPS), num_envs=count, vectorization_mode="sync", **draw(case, MORE_BUDGET)
+        name, num_envs=count, vectorization_mode="sync", **draw(case, MORE_BUDGET)
     )
     try:
         env.reset(seed=some(case, 0, [1, 2], None))

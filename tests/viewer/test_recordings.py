@@ -13,6 +13,7 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.envs.wrappers.record_rerun import RecordRerun, recording
 from care_sim.loops.watcher import EpisodeWatcher
+from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.recording import entities
@@ -37,6 +38,18 @@ def episode(tmp_path_factory, read):
 def test_recording_changes_nothing(episode):
     row, *_ = episode
     assert row["episode_hash"] == run_episode(CONFIG)["episode_hash"]
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_recording_changes_nothing_in_any_world(scenario, tmp_path, read):
+    config = EpisodeConfig(scenario, "care", 0.03, 2, scenario_parameters=(("duration_s", 0.5),))
+    path = tmp_path / "out.rrd"
+    row, keyframes = trace(config, wrap=lambda env, policy: RecordRerun(env, path, policy))
+    assert row["episode_hash"] == run_episode(config)["episode_hash"]
+    found = read(path)
+    assert found.numbers("care/measures/speed") == [frame.speed_mps for frame in keyframes]
+    (text,) = found.fixed["care/outcome"]["TextDocument:text"]
+    assert f"| rays_fired | {row['rays_fired']} |" in text
 
 
 def test_every_entity_is_documented_and_every_documented_one_is_there(episode):

@@ -8,33 +8,29 @@ from care_sim.world.walker import Walk
 WALK = Walk((20.0, -4.0), 1.5707963267948966, 2.0, 100.0, 6.0)
 
 
-def crosser(seconds_left, may_go=lambda _walk: True, lead_s=2.0):
-    return Crosser(WALK, lead_s, lambda: seconds_left[0], may_go)
+def crosser(may_go=lambda _walk: True, lead_s=2.0):
+    return Crosser(WALK, lead_s, may_go)
 
 
 def test_it_waits_until_the_ego_is_near():
-    left = [2.4]
-    one = crosser(left)
-    one.look(1.0)
+    one = crosser()
+    one.look(1.0, seconds_left=2.4)
     assert one.went is None
     assert one.pose(9.0) == (20.0, -4.0, WALK.heading)
 
 
 def test_it_set_off_at_the_very_time_between_two_steps():
-    left = [1.97]
-    one = crosser(left)
-    one.look(5.0)
+    one = crosser()
+    one.look(5.0, seconds_left=1.97)
     assert one.went
     assert one.walk.starts_s == pytest.approx(4.97)
     assert one.pose(6.97)[1] == pytest.approx(-4.0 + 2.0 * 2.0, abs=0.03)
 
 
 def test_it_decides_once():
-    left = [1.9]
-    one = crosser(left)
-    one.look(5.0)
-    left[0] = 0.5
-    one.look(7.0)
+    one = crosser()
+    one.look(5.0, seconds_left=1.9)
+    one.look(7.0, seconds_left=0.5)
     assert one.walk.starts_s == pytest.approx(4.9)
 
 
@@ -45,9 +41,9 @@ def test_whom_others_would_run_over_stays():
         asked.append(walk.starts_s)
         return False
 
-    one = crosser([1.9], may_go)
-    one.look(5.0)
-    one.look(5.05)
+    one = crosser(may_go)
+    one.look(5.0, seconds_left=1.9)
+    one.look(5.05, seconds_left=1.85)
     assert one.went is False
     assert asked == [pytest.approx(4.9)]
     assert one.pose(9.0) == (20.0, -4.0, WALK.heading)

@@ -139,3 +139,23 @@ def test_what_comes_later_is_at_once_where_it_belongs(world):
 def test_an_unknown_kind_of_body_is_named(world):
     with pytest.raises(InvalidInput, match=r"unknown kind of body 'dragon'; known: .*pedestrian"):
         world.add("somebody", "dragon", (10.0, 0.0, 0.0))
+
+
+def test_an_episode_goes_on_until_the_ego_arrives_unless_its_scenario_ends_it_otherwise(world):
+    assert not world.is_over()
+    world.goal_m = 3.0
+    world.advance(0.0, 0.25)
+    assert not world.is_over()
+    world.advance(0.0, 0.05)
+    assert world.is_over()
+    world.ended = lambda now: now.time > 0.4
+    assert not world.is_over()
+    world.advance(0.0, 0.15)
+    assert world.is_over()
+
+
+def test_what_is_called_at_every_step_is_handed_the_world_of_that_time(world):
+    seen = []
+    world.at_every_step(lambda now: seen.append((now is world, now.time, now.along_m)))
+    world.advance(0.0, 0.1)
+    assert seen == [(True, 0.05, pytest.approx(0.5)), (True, 0.1, pytest.approx(1.0))]

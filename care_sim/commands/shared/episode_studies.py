@@ -21,7 +21,7 @@ class EpisodeStudy(StudyCommand):
     """A study of the closed loop."""
 
     seeds: tuple[int, ...] = (5,)
-    """One number: that many seeds, from 0. Several numbers: these seeds."""
+    """One number: that many seeds, from 0. Several numbers: these seeds, of one split."""
 
 
 @dataclass(frozen=True, kw_only=True)

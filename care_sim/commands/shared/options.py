@@ -5,11 +5,11 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.seed_ranges import VALIDATION, split_of
 from care_sim.commands.shared.selection import policy_parameters
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.perception.detectors import PROXY
 from care_sim.study.parameters import parameters
-from care_sim.study.run_config import MOST_TASKS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,11 +47,15 @@ DEFAULT_OPTIONS = Options()
 
 def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
     """The seeds that are meant by one number (that many, from 0) or by several (these). Raises
-    InvalidInput for a number below one, and for more seeds than a study can hold.
+    InvalidInput for a number below one or above that of the test seeds, and for seeds of several
+    splits (`care_sim.base.seed_ranges`).
     """
-    if len(numbers) == 1 and not 1 <= numbers[0] <= MOST_TASKS:
+    if len(numbers) != 1:
+        split_of(numbers)
+        return numbers
+    if not 1 <= numbers[0] <= VALIDATION:
         raise InvalidInput(
-            f"seeds must be a number of seeds from 1 to {MOST_TASKS:,}, whose rows a study holds "
-            f"in memory, or a list of seeds, got {shown(numbers[0])}"
+            f"seeds must be a number of seeds from 1 to {VALIDATION:,}, as many as there are for "
+            f"tests, or a list of seeds, got {shown(numbers[0])}"
         )
-    return range(numbers[0]) if len(numbers) == 1 else numbers
+    return range(numbers[0])

@@ -1,7 +1,8 @@
 """The list of episodes: what the episode of a number is made of.
 
-Everything is drawn independently, so that a thousand episodes hold every pair of an environment, a
-policy, a fault, a setting and a mode that can meet. The order of the draws is a part of the list.
+Everything is drawn independently, so that the first `CERTIFIED_EPISODES` hold every pair of an
+environment, a policy, a fault, a setting and a mode that can meet. The order of the draws is a part
+of the list.
 
 The open loop detects with the paper's proxy. The detector `cluster` fits the road by iteration,
 which ends a little differently on another processor.
@@ -15,11 +16,24 @@ from typing import Any
 from care_sim.policies import maker
 from care_sim.policies.makers import is_privileged
 
-CLOSED = ("CARE-Dartout-v0", "CARE-Dense-v0", "CARE-CutIn-v0")
+CERTIFIED_EPISODES = 1_800
+"""What is played unless more is asked for. With 28 policies the last pair meets in number 1,784."""
+
+DRIVE = "CARE-Drive-v0"
+CLOSED = (
+    "CARE-Dartout-v0",
+    "CARE-Dense-v0",
+    "CARE-CutIn-v0",
+    "CARE-R157-v0",
+    "CARE-NCAP-v0",
+    DRIVE,
+)
 STREET = "CARE-Street-v0"
 REPLAY = "CARE-Replay-v0"
-_ENVIRONMENTS = (*CLOSED, *CLOSED, STREET, REPLAY)
-"""What an environment is drawn from: the closed loop takes three quarters."""
+_ENVIRONMENTS = (*CLOSED, STREET, REPLAY)
+"""What an environment is drawn from: the closed loop takes three quarters. Written out, as the
+policies are.
+"""
 
 CERTIFIED_POLICIES = (
     "full",
@@ -39,9 +53,6 @@ CERTIFIED_POLICIES = (
     "ppo",
     "ppo-dartout",
     "seed-finder",
-)
-"""Written out, because one more changes what every episode of the list is made of."""
-NOT_YET_CERTIFIED = (
     "care-spread",
     "care-sightlines",
     "rows",
@@ -54,11 +65,15 @@ NOT_YET_CERTIFIED = (
     "learned-place",
     "history-learned-place",
 )
-"""Younger than the published list. They come into it when it is published anew."""
-
-AS_LISTED: dict[str, dict[str, Any]] = {"seed-finder": {"scenario": "dense"}}
-"""Parameters of policies, the same in the whole list: when it was first published, `seed-finder`
-knew the dense street alone.
+"""Written out, because one more changes what every episode of the list is made of."""
+_KNOWN_SEEDS = 3
+AS_LISTED: dict[str, dict[str, Any]] = {
+    "seed-finder": {"seeds": _KNOWN_SEEDS},
+    "learned-place": {"seeds": 1},
+    "history-learned-place": {"seeds": 1},
+}
+"""Parameters of policies, the same in the whole list. These play whole episodes before their first
+keyframe, as many as they have seeds.
 """
 
 SINGLE, INTERLEAVED, SYNC, ASYNC, SUBPROCESS, HASH_SEED = MODES = (
@@ -97,16 +112,24 @@ CERTIFIED_SETTINGS: dict[str, dict[str, Any]] = {
     "floor_seed": {"floor_seed": 2},
     "azimuth_margin": {"azimuth_margin": 4},
     "elevation_margin": {"elevation_margin": 0},
+    "cell_order": {"cell_order": "core-spread"},
+    "driver": {"driver": "careful-human"},
 }
-_CLOSED_ALONE = ("camera_rotation_sigma_deg", "camera_position_sigma_m", "engine", "keyframe_s")
+_CLOSED_ALONE = (
+    "camera_rotation_sigma_deg",
+    "camera_position_sigma_m",
+    "engine",
+    "keyframe_s",
+    "driver",
+)
 """Faults and settings that the open loop does not have."""
 
 _CLOSED_KEYFRAMES = (*(4,) * 7, *(6,) * 4, *(8,) * 5, 12, 12, 16, 60)
 _OPEN_KEYFRAMES = (2, 4, 4, 8, 8, 12, 40)
 """Numbers of keyframes that are played: mostly few, sometimes the whole episode."""
 STREETS = (3000, 3001)
-"""Seeds of streets of the first thousand episodes, which share two because a street takes seconds
-to make. They are none of a split.
+"""Seeds of streets of the first `CERTIFIED_EPISODES`, which share two because a street takes
+seconds to make. They are none of a split.
 """
 _MORE_STREETS = tuple(range(3000, 3012))
 """Seeds of streets of the others."""
@@ -149,9 +172,10 @@ def drawn(number: int) -> Drawn:
             arguments |= choices[name]
 
     if environment == STREET:
-        seed = rng.choice(STREETS if number < 1000 else _MORE_STREETS)
+        seed = rng.choice(STREETS if number < CERTIFIED_EPISODES else _MORE_STREETS)
     else:
-        seed = rng.randrange(1000)
+        # One that `seed-finder` knows, where it plays.
+        seed = rng.randrange(_KNOWN_SEEDS if policy == "seed-finder" else 1000)
     keyframes = rng.choice(_CLOSED_KEYFRAMES if closed else _OPEN_KEYFRAMES)
     mode = rng.choice(modes(environment, policy))
     return Drawn(number, environment, tuple(arguments.items()), policy, seed, keyframes, mode)

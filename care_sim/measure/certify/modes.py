@@ -44,7 +44,7 @@ _HASH_SEEDS = "0123456789"
 def play_in_mode(mode: str, episodes: Sequence[Drawn], source: str) -> list[Played]:
     """The trails of episodes played in a mode; `source` names the recordings of the replay.
 
-    In a vector all are of one environment, or of the closed loop: their spaces are the same.
+    In a vector all have the same spaces, those of one environment or of the worlds with one camera.
     """
     if mode == HASH_SEED:
         return _under_another_hash_seed(episodes, source)

@@ -9,7 +9,15 @@ from tempfile import TemporaryDirectory
 
 from care_sim.base.errors import MissingExtra
 from care_sim.base.extras import import_open3d
-from care_sim.measure.certify.design import CLOSED, HASH_SEED, STREET, SUBPROCESS, Drawn, drawn
+from care_sim.measure.certify.design import (
+    CLOSED,
+    DRIVE,
+    HASH_SEED,
+    STREET,
+    SUBPROCESS,
+    Drawn,
+    drawn,
+)
 from care_sim.measure.certify.drive import write_drive
 from care_sim.measure.certify.modes import Played, play_in_mode, together
 from care_sim.study.episode_play import result_or_reason
@@ -149,6 +157,7 @@ def _alike(batch: Sequence[Drawn]) -> Iterator[list[Drawn]]:
 
 def _world(episode: Drawn) -> tuple[str, int]:
     """What episodes of one vector share: their spaces, and the street that is made for them."""
-    if episode.environment in CLOSED:
+    # All other worlds of the closed loop have one camera, the same; a drive has six.
+    if episode.environment in CLOSED and episode.environment != DRIVE:
         return "", 0
     return episode.environment, episode.seed * (episode.environment == STREET)

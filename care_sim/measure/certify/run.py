@@ -12,14 +12,13 @@ import tyro
 from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput, MissingExtra, report_problems
-from care_sim.measure.certify.design import drawn
+from care_sim.measure.certify.design import CERTIFIED_EPISODES, drawn
 from care_sim.measure.certify.playing import Trails, playable_here, trails_of
 from care_sim.measure.certify.published import combined, read, write
 from care_sim.measure.certify.verdict import verdict_of
 from care_sim.study.executors import MOST_WORKERS
 from care_sim.study.progress import ProgressLines, progress_bar
 
-CERTIFIED_EPISODES = 1_000
 _ALL_EPISODES = 10_000
 
 
@@ -30,7 +29,7 @@ class CertifyConfig:
     """
 
     every: Annotated[bool, tyro.conf.arg(name="all"), tyro.conf.FlagCreatePairsOff] = False
-    """All 10,000 episodes, not only the first 1,000."""
+    """All 10,000 episodes, not only the first 1,800."""
     episode: int | None = None
     """This episode alone, by its number in the list."""
     workers: int = bounded(os.cpu_count() or 1, 1, MOST_WORKERS)

@@ -188,6 +188,8 @@ def _filmed(loop: Any) -> tuple[Any, ...]:
 
 def _detected(env: Any) -> tuple[Any, ...]:
     if isinstance(env, ClosedLoopEnv):
-        return env.keyframes[-1].detected, env.keyframes[-1].braking
+        record = env.keyframes[-1]
+        sights = np.array([astuple(sight) for sight in record.sights], float)
+        return record.detected, record.braking, record.needless, sights
     found = env.keyframes[-1].detections
     return found.classes, found.boxes, found.returns

@@ -3,15 +3,13 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from care_sim.core.belief import Belief
 from care_sim.core.rig import Rig
-from care_sim.core.types import Demand
-from care_sim.policies.base import Policy
-from care_sim.policies.controls.learned_place import learned_cells
+from care_sim.policies.controls.history_pattern import HistoryPattern
+from care_sim.policies.controls.learned_place import LearnedPlace
 from care_sim.scenarios.base import Scenario
 
 
-class HistoryLearnedPlace(Policy):
+class HistoryLearnedPlace(HistoryPattern):
     """The hulls of the history policy; the reserve goes to the map of `learned-place`, of which it
     has the parameters.
     """
@@ -20,13 +18,6 @@ class HistoryLearnedPlace(Policy):
     tags = ("causal", "learned", "control")
     source = "own: history, and a map of the scenario's training seeds that never changes"
     told: ClassVar[Mapping[str, str]] = {"scenario": "scenario"}
-    keeps_order = True
 
     def __init__(self, rig: Rig, scenario: Scenario | str | None = None, seeds: int = 10):
-        super().__init__(rig)
-        self._pattern = learned_cells(rig, scenario, seeds)
-
-    def demand(self, belief: Belief) -> Demand:
-        """Hulls, then the map."""
-        hulls = self.rig.listed(self.rig.hulls(belief.tracks.boxes))
-        return Demand(hulls, [[self._pattern[: belief.budget]]])
+        super().__init__(LearnedPlace(rig, scenario, seeds))

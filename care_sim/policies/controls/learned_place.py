@@ -2,7 +2,7 @@
 memory.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import lru_cache
@@ -60,24 +60,25 @@ def _learned(rig: Rig, scenario: Scenario, seeds: int) -> Cells:
     sightings = np.zeros(rig.grid.size)
     for seed in training_seeds(seeds):
         # A hull is dilated by the paper's margins, its guess of how far off a box can be.
-        for hull in _first_hulls(rig, scenario, seed):
-            sightings[hull] += 1
+        sightings[_first_hull(rig, scenario, seed)] += 1
     return likeliest_first(rig.grid, sightings)
 
 
-def _first_hulls(rig: Rig, scenario: Scenario, seed: int) -> Iterator[Cells]:
-    """The hull of every first-sighting actor at the keyframe at which a full scan detects it."""
+def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:
+    """The hull of the first-sighting actor at the first keyframe at which a full scan detects it;
+    no cell if it never does.
+    """
     everything = np.arange(rig.grid.size)
-    found: set[int] = set()
     loop = rehearsal(scenario, seed, rig)
     with closing(loop.world) as world:
-        while world.time < scenario.duration_s:
+        over = False
+        while (target := world.first_sighting) and not over:
             # Where the actor is at the scan: the keyframe moves the world on.
-            target = world.first_sighting
-            boxes = loop.sensor.boxes_to_local(world.boxes([target] if target else []))
+            boxes = loop.sensor.boxes_to_local(world.boxes([target]))
             record = loop.keyframe(everything)
-            if target and record.detected and target.body not in found:
-                found.add(target.body)
-                yield from rig.hulls(boxes)
-            if record.impact_speed_mps is not None:
-                return
+            if record.detected:
+                (hull,) = rig.hulls(boxes)
+                return hull
+            hit = record.impact_speed_mps is not None
+            over = hit or world.is_over() or world.time >= scenario.duration_s
+    return np.zeros(0, np.int64)

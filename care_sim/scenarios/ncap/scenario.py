@@ -1,7 +1,6 @@
 """A Euro NCAP test as a scenario: test and speeds are arguments, the seed draws the rest."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -144,7 +143,7 @@ class Ncap(Scenario):
         world.first_sighting = world.add(
             "target", test.target.body, lambda time: _mirrored(meeting.motion(time), side)
         )
-        world.is_over = partial(meeting.end.is_over, world)
+        world.ended = meeting.end.is_over
         return world
 
     def _add_cars(self, world: World, meeting: Meeting, sizes: Sizes, side: float) -> None:

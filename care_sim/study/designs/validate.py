@@ -12,24 +12,13 @@ from care_sim.base.seed_ranges import (
     check_benchmark_seeds,
     training_seeds,
 )
+from care_sim.policies import controls
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.parameters import Parameters
 from care_sim.study.run_config import FULL, Row
 
 CAMERA_POLICIES = ("all-camera", "care", "care-sightlines")
 """The causal policies with a camera; the best of them has to beat the best control."""
-CONTROLS = (
-    "fan",
-    "rows",
-    "stride",
-    "sweep",
-    "place",
-    "history-rows",
-    "history-place",
-    "learned-place",
-    "history-learned-place",
-)
-"""Patterns that no camera moves. The last two are learned on the world's own training seeds."""
 MEMORISER = "seed-finder"
 """It looks the test seed up: what memory of the seeds can reach. Its figure is published, and it is
 nothing to beat.
@@ -45,7 +34,7 @@ def validation_study(
     trained: int,
 ) -> list[EpisodeConfig]:
     """Every level of a world: camera policies and controls on the first `trained` training seeds,
-    and all policies on the `test` seeds.
+    and all policies on the `test` seeds. The learned maps are of the same training seeds.
 
     Raises InvalidInput for a test seed that is no seed of the benchmark.
     """
@@ -57,7 +46,7 @@ def validation_study(
         (f"{MEMORISER}.seeds", VALIDATION),
         (f"{MEMORISER}.hidden_first", True),
     )
-    chosen = (*CAMERA_POLICIES, *CONTROLS)
+    chosen = (*CAMERA_POLICIES, *controls())
     return [
         config
         for level in levels

@@ -13,11 +13,12 @@ import care_sim.wrappers
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.belief import Belief
 from care_sim.core.types import ImageDetections
+from care_sim.envs import IDS
 from care_sim.envs.wrappers.grid_observation import GridObservation
 from care_sim.envs.wrappers.sector_actions import SectorReserve, SectorScores
 from care_sim.policies.learned.grid_features import GridFeatures
 
-NAMES = ["CARE-Dense-v0", "CARE-Dartout-v0", "CARE-CutIn-v0", "CARE-Street-v0", "CARE-Replay-v0"]
+NAMES = [*IDS]
 ORDERS = [
     lambda env: GridObservation(SectorReserve(env)),
     lambda env: SectorReserve(GridObservation(env)),
@@ -28,12 +29,13 @@ ORDERS = [
 
 @pytest.fixture(params=NAMES)
 def env(request, short_streets):
-    place = (
-        {"source": f"argoverse2:{request.getfixturevalue('drive')}"}
-        if request.param == "CARE-Replay-v0"
-        else {}
-    )
-    made = gymnasium.make(request.param, disable_env_checker=True, budget=0.03, **place)
+    given = {}
+    if request.param == "CARE-Replay-v0":
+        given["source"] = f"argoverse2:{request.getfixturevalue('drive')}"
+    if request.param == "CARE-Drive-v0":
+        # A short drive is drawn in half the time.
+        given["duration_s"] = 1.0
+    made = gymnasium.make(request.param, disable_env_checker=True, budget=0.03, **given)
     yield made
     made.close()
 

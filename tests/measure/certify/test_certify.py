@@ -6,6 +6,7 @@ import sys
 from dataclasses import fields, replace
 from itertools import combinations, product
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -13,15 +14,18 @@ from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.core.conditions import CameraFaults, LidarFaults
 from care_sim.core.types import Scan
 from care_sim.driving.braking import BrakingController
-from care_sim.envs import sensing
+from care_sim.envs import IDS, sensing
+from care_sim.loops.needless import NeedlessBraking
 from care_sim.measure.certify import design, playing, published, run
 from care_sim.measure.certify.design import (
+    AS_LISTED,
+    CERTIFIED_EPISODES,
     CERTIFIED_FAULTS,
     CERTIFIED_POLICIES,
     CERTIFIED_SETTINGS,
     CLOSED,
+    DRIVE,
     MODES,
-    NOT_YET_CERTIFIED,
     REPLAY,
     STREET,
     drawn,
@@ -36,7 +40,7 @@ from care_sim.measure.certify.playing import (
     playable_here,
     trails_of,
 )
-from care_sim.measure.certify.run import CERTIFIED_EPISODES, CertifyConfig
+from care_sim.measure.certify.run import CertifyConfig
 from care_sim.measure.certify.trail import (
     CONFIGURATION,
     DIGEST_BYTES,
@@ -46,14 +50,15 @@ from care_sim.measure.certify.trail import (
 )
 from care_sim.measure.certify.verdict import verdict_of
 from care_sim.perception.tracker import TrackMemory
-from care_sim.policies import BUILT_IN
+from care_sim.policies import BUILT_IN, make_policy
 from care_sim.sensors.camera import CameraDetector
 from care_sim.sensors.lidar import Lidar
 from care_sim.sensors.recorded_lidar import RecordedLidar
 from care_sim.world.world import World
 from tests.helpers.places import ROOT
 
-LIST = [drawn(number) for number in range(1000)]
+LIST = [drawn(number) for number in range(CERTIFIED_EPISODES)]
+waits = pytest.mark.xfail(strict=True, reason="the list is not published yet")
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +76,7 @@ def alone(episode, source=""):
     return trail
 
 
-def test_a_thousand_episodes_hold_every_pair_that_can_meet():
+def test_the_episodes_that_are_played_hold_every_pair_that_can_meet():
     met = [(e.environment, e.policy, e.mode, {name for name, _ in e.arguments}) for e in LIST]
     assert {(e, p) for e, p, _, _ in met} == set(
         product({*CLOSED, STREET, REPLAY}, CERTIFIED_POLICIES)
@@ -101,9 +106,13 @@ def test_every_fault_of_the_conditions_is_in_the_list():
     assert {name for one in CERTIFIED_FAULTS.values() for name in one} == faults
 
 
-def test_every_built_in_policy_is_in_the_list_or_known_to_be_missing():
+def test_every_environment_is_in_the_list():
+    assert {*CLOSED, STREET, REPLAY} == {*IDS}
+
+
+def test_every_built_in_policy_is_in_the_list():
     """One that is missing is added at the end, and the list is published anew."""
-    assert {*BUILT_IN} == {*CERTIFIED_POLICIES, *NOT_YET_CERTIFIED}
+    assert {*BUILT_IN} == {*CERTIFIED_POLICIES}
 
 
 def test_an_episode_of_the_list_does_not_move():
@@ -112,11 +121,21 @@ def test_an_episode_of_the_list_does_not_move():
 
 
 def test_no_mode_changes_a_trail(source):
-    closed = of([e for e in LIST if e.environment in CLOSED and e.mode == "async"], 4)
+    together = [one for one in CLOSED if one != DRIVE]
+    closed = of([e for e in LIST if e.environment in together and e.mode == "async"], 4)
     trails = [alone(episode) for episode in closed]
     assert {mode: play_in_mode(mode, closed, source) for mode in MODES} == dict.fromkeys(
         MODES, trails
     )
+
+
+def test_drives_play_in_vectors_of_their_own():
+    drives = of([e for e in LIST if e.environment == DRIVE and e.policy not in AS_LISTED], 2)
+    trails = [alone(episode) for episode in drives]
+    assert play_in_mode("sync", drives, "") == play_in_mode("async", drives, "") == trails
+    batches = [{e.environment for e in batch} for batch in episode_batches(LIST)]
+    assert {DRIVE} in batches
+    assert not any(DRIVE in batch and len(batch) > 1 for batch in batches)
 
 
 def test_recordings_and_privileged_policies_play_in_vectors_too(source):
@@ -135,7 +154,7 @@ def test_recordings_and_privileged_policies_play_in_vectors_too(source):
 
 def test_batches_hold_every_episode_once_and_a_street_together():
     made = episode_batches(LIST)
-    assert sorted(episode.number for batch in made for episode in batch) == list(range(1000))
+    assert sorted(episode.number for batch in made for episode in batch) == list(range(len(LIST)))
     streets = [{e.seed for e in batch} for batch in made if batch[0].environment == STREET]
     assert all(len(seeds) == 1 for seeds in streets)
     assert len(streets) == len(design.STREETS)
@@ -162,9 +181,9 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     monkeypatch.setattr(playing, "find_spec", lambda name: None if name == module else name)
     able, (line,) = playable_here(LIST)
     missing = len(LIST) - len(able)
-    assert line.startswith(f"{missing} of 1,000 not played: ")
+    assert line.startswith(f"{missing} of {CERTIFIED_EPISODES:,} not played: ")
     assert f"extra '{extra}'" in line
-    trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(1000)]
+    trails = [bytes([n % 256]) * (DIGEST_BYTES + 2) for n in range(len(LIST))]
     monkeypatch.setattr(
         run, "_played", lambda numbers, _workers: {number: trails[number] for number in numbers}
     )
@@ -173,7 +192,7 @@ def test_what_needs_an_extra_that_is_missing_is_left_out_and_told(
     told = capsys.readouterr()
     assert told.err.splitlines() == [f"care-sim: {line}"]
     left = published.combined([trails[episode.number] for episode in able])
-    assert told.out == f"{len(able)} of 1,000 episodes: {left}, as published\n"
+    assert told.out == f"{len(able):,} of {CERTIFIED_EPISODES:,} episodes: {left}, as published\n"
     lacking = next(one.number for one in LIST if one not in able)
     for config in (CertifyConfig(episode=lacking), CertifyConfig(every=True, write=True)):
         with pytest.raises(MissingExtra, match=f"extra '{extra}'"):
@@ -312,6 +331,16 @@ def test_what_is_broken_in_a_recording_is_named(source, monkeypatch):
     assert first_difference(sound, alone(recorded, source)) == (TRAIL_STAGES[4], 2)
 
 
+def test_a_needless_brake_of_a_drive_is_named(monkeypatch):
+    drive = replace(MADE, environment=DRIVE)
+    sound = alone(drive)
+    calls = []
+    monkeypatch.setattr(
+        NeedlessBraking, "judge", lambda *given: calls.append(given) or len(calls) == 3
+    )
+    assert first_difference(sound, alone(drive)) == (TRAIL_STAGES[5], 2)
+
+
 def test_another_configuration_is_named():
     assert first_difference(alone(MADE), alone(replace(MADE, seed=4))) == (CONFIGURATION, None)
 
@@ -358,6 +387,7 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
         published.read(file)
 
 
+@waits
 def test_some_of_the_list_goes_as_published():
     """A short form of the certificate; `care-sim certify` is the whole."""
     short = [
@@ -368,13 +398,16 @@ def test_some_of_the_list_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
-def test_a_seed_finder_of_the_list_knows_the_dense_street_in_the_cut_in_too():
-    known = 4520
-    assert (drawn(known).environment, drawn(known).policy) == ("CARE-CutIn-v0", "seed-finder")
-    verdict = verdict_of(trails_of([known], 1), published.read())
-    assert verdict.as_published, "\n".join(verdict.lines())
+@pytest.mark.parametrize("name", [one for one in CLOSED if one != DRIVE])
+def test_a_seed_finder_of_the_list_knows_its_episode(name):
+    episode = next(e for e in LIST if (e.environment, e.policy) == (name, "seed-finder"))
+    with gymnasium.make(name, budget=0.03) as env:
+        policy = make_policy("seed-finder", env, **AS_LISTED["seed-finder"])
+        policy(env.reset(seed=episode.seed)[0])
+        assert policy.found == episode.seed
 
 
+@waits
 @pytest.mark.slow
 def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
@@ -382,6 +415,7 @@ def test_an_episode_of_a_street_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
+@waits
 def test_the_readme_tells_the_hash_of_the_list():
     readme = (ROOT / "README.md").read_text()
     told = published.combined(published.read()[:CERTIFIED_EPISODES])

@@ -16,7 +16,7 @@ from care_sim.measure.parity.run import agree, unexplained
 from care_sim.measure.parity.scenes import SCENE_GRIDS, draw_bodies, draw_scene
 from care_sim.measure.parity.tally import GROUPS, AgreementCounts, ray_groups
 from care_sim.measure.parity.verdicts import GRAZING, SAME, TOLERANCE, UNEXPLAINED, Engines, compare
-from care_sim.scenarios import PAPER_SCENARIOS
+from care_sim.scenarios import PAPER_SCENARIOS, SCENARIOS
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.engines import ENGINES
 from care_sim.study.episode_config import EpisodeConfig
@@ -202,6 +202,14 @@ def test_an_episode_goes_the_same_under_both_engines(scenario, changes):
         "other_than_exact": [],
     }  # fmt: skip
     assert outcomes.keyframes > 20
+
+
+@pytest.mark.parametrize("scenario", [name for name in SCENARIOS if name not in PAPER_SCENARIOS])
+def test_an_episode_of_the_other_worlds_begins_the_same_under_both_engines(scenario):
+    outcomes = Outcomes()
+    short = (("duration_s", 1.5),)
+    outcomes.compare(EpisodeConfig(scenario, "care", 0.05, 7, scenario_parameters=short))
+    assert (outcomes.keyframes, outcomes.other_keyframes, outcomes.other_outcomes) == (15, [], [])
 
 
 def test_an_episode_that_goes_otherwise_is_named(monkeypatch):

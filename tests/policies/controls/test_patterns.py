@@ -10,7 +10,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
-from care_sim.policies import make_policy, tags_of
+from care_sim.policies import controls, make_policy, tags_of
 from care_sim.policies.controls.fan import Fan
 from care_sim.policies.controls.place import Place
 from care_sim.policies.controls.rows import Rows, nearest_rows
@@ -53,6 +53,10 @@ def chosen(policy):
 def test_a_control_is_tagged_and_no_contender(name):
     assert "control" in tags_of(name)
     assert name not in care_sim.policies.contenders()
+
+
+def test_these_are_the_controls_that_a_car_can_have():
+    assert {*controls()} == {*CONTROLS}
 
 
 @pytest.mark.parametrize("make", PATTERNS)

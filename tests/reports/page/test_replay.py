@@ -12,8 +12,9 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.reports.page.episodes import Episode, config_of, episodes_to_watch, played_again
 from care_sim.reports.page.replay import SECTORS, fullness, packed, replayed, sightlines
+from care_sim.scenarios import SCENARIOS
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.episode_play import trace
+from care_sim.study.episode_play import run_episode, trace
 from care_sim.study.executors import processes
 
 CONFIG = EpisodeConfig("dartout", "care", 0.1, seed=3)
@@ -40,6 +41,19 @@ def test_the_replay_is_the_episode(replay, played):
     )
     assert replay.story["distance"] == [round(100 * frame.distance_m) for frame in keyframes]
     assert replay.story["contact"] is None
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_an_episode_of_every_world_is_played_again_as_it_was(scenario):
+    config = EpisodeConfig(
+        scenario, "care", 0.03, 2, camera_latency=1, scenario_parameters=(("duration_s", 1.0),)
+    )
+    row = run_episode(config)
+    assert config_of(row) == config
+    watched = replayed(config)
+    assert Episode(row, watched).identical
+    assert len(watched.story["rays"]) == 10
+    json.dumps([watched.story, watched.bodies], allow_nan=False)
 
 
 def test_there_is_a_moment_before_every_keyframe_and_one_after_the_last(replay, played):
