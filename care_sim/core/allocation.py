@@ -106,10 +106,16 @@ class RandomFloor:
         own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
         self._rng = np.random.default_rng(own)
         self._cells = cells
+        self._floor = np.empty(0, np.int64)
+        self._keyframe = -1
 
-    def next(self) -> Cells:
-        """The floor of the coming keyframe. It must be drawn at every keyframe, spent or not."""
-        return self._rng.permutation(self._cells)
+    def at(self, keyframe: int) -> Cells:
+        """The floor of a keyframe, counted from 0, that is not before the last one asked for."""
+        # Those that nobody spent are drawn all the same, so that no action moves the later ones.
+        for _ in range(self._keyframe, keyframe):
+            self._floor = self._rng.permutation(self._cells)
+        self._keyframe = keyframe
+        return self._floor
 
 
 def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:

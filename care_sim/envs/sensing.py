@@ -79,7 +79,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
         self._running: AnyLoop | None = None
-        self._floor: Cells | None = None
+        self._keyframe = 0
         self._over = False
 
     @property
@@ -133,7 +133,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self._running = loop
         self._over = False
         self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
-        self._floor = None
+        self._keyframe = 0
         return self.observed()
 
     def observed(self) -> Observed:
@@ -151,7 +151,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         # A copy, since the caller may write into an action once it is taken.
         self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
         fired = self._fired(scores)
-        self._floor = None
+        self._keyframe += 1
         return fired
 
     def would_fire(self, action: Action) -> Cells:
@@ -163,10 +163,12 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self._fired(checked_scores(action, self.rig.grid.shape))
 
     def _fired(self, scores: Action) -> Cells:
-        # Drawn at every keyframe, used or not: all policies then meet the same floor.
-        if self.conditions.floor and self._floor is None:
-            self._floor = self._floors.next()
-        return fired_cells(scores, self.rig.budget, self._floor)
+        # An action that spends the budget itself needs no floor, and a floor takes longer to draw
+        # than a scan of its cells.
+        scored = np.count_nonzero(scores > 0)
+        needed = self.conditions.floor and scored < self.rig.budget
+        floor = self._floors.at(self._keyframe) if needed else None
+        return fired_cells(scores, self.rig.budget, floor)
 
     def _fired_as_info(self, fired: Cells) -> Cells | list[int]:
         """The fired cells as `info` holds them, a copy.

@@ -98,10 +98,10 @@ def _walking(way: Floats) -> Motion:
     shares = np.arange(between)[:, None] / between
     moved = way[:-1, None, :2] + shares * np.diff(way[:, :2], axis=0)[:, None]
     headings = np.repeat(way[:-1, 2], between)
-    poses = np.column_stack([moved.reshape(-1, 2), headings]).tolist()
+    poses = np.column_stack([moved.reshape(-1, 2), headings])
 
     def pose(time: float) -> Pose:
-        x, y, heading = poses[min(round(time / WORLD_STEP_S), len(poses) - 1)]
+        x, y, heading = poses[min(round(time / WORLD_STEP_S), len(poses) - 1)].tolist()
         return x, y, heading
 
     return pose

@@ -2,8 +2,6 @@
 more.
 """
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from care_sim.core.arrays import Floats, Mask
@@ -49,45 +47,56 @@ def _reach(poses: Floats, sizes: Floats, angle: Floats) -> Floats:
     return np.asarray(np.abs(np.cos(turn)) * sizes[:, 0] + np.abs(np.sin(turn)) * sizes[:, 1]) / 2
 
 
-@dataclass
 class PlacedBodies:
-    """Footprints with their ways: lists that grow together. A way is (1, 3) for what stands, else
-    (t, 3).
+    """Footprints with their ways, a row each in tables that grow. A way is (1, 3) for what stands,
+    else (t, 3); all have one length.
     """
 
-    ways: list[Floats] = field(default_factory=list)
-    sizes: list[Footprint] = field(default_factory=list)
-    berths: list[float] = field(default_factory=list)
+    def __init__(self) -> None:
+        self._ways: Floats = np.empty((0, 1, 3))
+        self._bounds: Floats = np.empty((0, 4))
+        self._sizes: Floats = np.empty((0, 2))
+        self._berths: Floats = np.empty(0)
+        self._reaches: Floats = np.empty(0)
 
     def add(self, way: Floats, size: Footprint, berth: float) -> None:
         """One more footprint, which others pass at `berth` metres or more."""
-        self.ways.append(way)
-        self.sizes.append(size)
-        self.berths.append(berth)
+        ways = self._ways if len(self._ways) else np.empty((0, *way.shape))
+        self._ways = np.concatenate([ways, way[None]])
+        self._bounds = np.vstack([self._bounds, _bounds(way)])
+        self._sizes = np.vstack([self._sizes, size])
+        self._berths = np.append(self._berths, berth)
+        # Rectangles that touch have centres no farther apart than half of both diagonals. The exact
+        # test moves every side out by the berth, and a corner then moves by sqrt(2) berths at most,
+        # at a right angle.
+        self._reaches = np.append(self._reaches, np.hypot(*size) / 2 + np.sqrt(2) * berth)
 
     def meets(self, way: Floats, size: Footprint) -> bool:
         """Whether a footprint on `way` (1, 3) or (t, 3) ever comes closer to one of these than its
         berth, along every axis.
         """
-        if not self.ways:
-            return False
-        sizes = np.array(self.sizes)  # (n, 2)
-        berths = np.array(self.berths)  # (n,)
-        places = np.stack(self.ways)  # (n, 1 or t, 3)
-        # First by centres, which leaves few pairs for the exact test. Rectangles that touch have
-        # centres no farther apart than half of both diagonals. The exact test moves every side out
-        # by the berth, and a corner then moves by sqrt(2) berths at most, at a right angle.
+        # First by what holds the whole ways, then by centres: that leaves few pairs for the exact
+        # test.
+        reaches = self._reaches + np.hypot(*size) / 2
+        bounds = _bounds(way)
+        gaps = np.maximum(self._bounds[:, :2] - bounds[2:], bounds[:2] - self._bounds[:, 2:])
+        (near,) = np.nonzero((gaps < reaches[:, None]).all(axis=1))
+        places = self._ways[near]  # (n, 1 or t, 3)
         apart = np.hypot(places[..., 0] - way[:, 0], places[..., 1] - way[:, 1])
-        reach = (np.hypot(*sizes.T) + np.hypot(*size)) / 2 + np.sqrt(2) * berths
-        who, when = np.nonzero(apart < reach[:, None])
+        who, when = np.nonzero(apart < reaches[near, None])
+        if not len(who):
+            return False
         # What stands has one pose, which holds at every time.
         mine = way[when if len(way) > 1 else np.zeros_like(when)]
         theirs = places[who, when if places.shape[1] > 1 else np.zeros_like(when)]
-        return bool(
-            footprints_meet(
-                mine, np.broadcast_to(size, (len(who), 2)), theirs, sizes[who], berths[who]
-            ).any()
-        )
+        sizes, berths = self._sizes[near[who]], self._berths[near[who]]
+        own = np.broadcast_to(size, sizes.shape)
+        return bool(footprints_meet(mine, own, theirs, sizes, berths).any())
+
+
+def _bounds(way: Floats) -> Floats:
+    """(4,) least x and y, then greatest x and y, of the centres on a way (t, 3)."""
+    return np.concatenate([way[:, :2].min(axis=0), way[:, :2].max(axis=0)])
 
 
 TOUCH_M = 0.01

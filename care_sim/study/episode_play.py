@@ -112,7 +112,8 @@ class EpisodeHash:
 
     def add(self, fired: np.ndarray, observation: Observation, world: World) -> None:
         """Include one keyframe: cells, returned ranges, poses of the ego and every actor."""
-        poses = [world.ego.pose, *(actor.pose_at(world.time) for actor in world.actors)]
+        bodies = np.array([world.ego_body, *(actor.body for actor in world.actors)])
+        poses = world.boxes_of(bodies)[:, [0, 1, 6]]
         self._content.update(
             portable_bytes(np.asarray(fired, np.int64), observation["ranges"], poses)
         )

@@ -56,9 +56,21 @@ class Route:
 
     def places(self, points: Floats) -> Floats:
         """(n, 3) `s`, `d` and the line's heading where it comes nearest to world points (n, 2)."""
-        found = np.stack([leg.places(points) for leg in self._legs])  # (legs, n, 4)
-        nearest = np.argmin(found[:, :, 3], axis=0)
-        return np.asarray(found[nearest, np.arange(len(points)), :3])
+        # All legs at once, as rows of arrays (legs, n): a bend of the protocols is 33 of them.
+        starts, begins, lengths, curvatures = self._columns
+        turned_back = turned(points - starts[:, None, :2], -starts[:, 2, None])
+        x, y = turned_back[..., 0], turned_back[..., 1]
+        along = x.copy()
+        bends = np.abs(curvatures[:, 0]) >= _STRAIGHT_PER_M
+        along[bends] = _along_arc(x[bends], y[bends], lengths[bends], curvatures[bends])
+        along = np.clip(along, 0.0, lengths)
+        heading = curvatures * along
+        foot_x, foot_y = _chord(along, curvatures)
+        off_x, off_y = x - foot_x, y - foot_y
+        d = np.cos(heading) * off_y - np.sin(heading) * off_x
+        found = np.stack([begins + along, d, starts[:, 2, None] + heading], axis=-1)
+        nearest = np.argmin(off_x**2 + off_y**2, axis=0)
+        return np.asarray(found[nearest, np.arange(len(points))])
 
     def _leg(self, s: float) -> "_PlacedLeg":
         return next(leg for leg in self._legs if s < leg.begins + leg.length)
@@ -77,6 +89,17 @@ class Route:
         ]
         return before, *placed, _PlacedLeg(poses[-1], begins[-1], np.inf, 0.0)
 
+    @cached_property
+    def _columns(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of all legs the starts (legs, 3), and (legs, 1) what precedes them, their lengths and
+        their curvatures.
+        """
+        legs = self._legs
+        begins = np.array([[leg.begins] for leg in legs])
+        lengths = np.array([[leg.length] for leg in legs])
+        curvatures = np.array([[leg.curvature] for leg in legs])
+        return np.array([leg.start for leg in legs]), begins, lengths, curvatures
+
 
 @dataclass(frozen=True)
 class _PlacedLeg:
@@ -87,29 +110,21 @@ class _PlacedLeg:
     length: float
     curvature: float
 
-    def places(self, points: Floats) -> Floats:
-        """(n, 4) `s`, `d`, heading and squared distance of the nearest point of the leg."""
-        x, y = turned(points - self.start[:2], -self.start[2]).T
-        if abs(self.curvature) < _STRAIGHT_PER_M:
-            along = np.clip(x, 0.0, self.length)
-        else:
-            # Seen from the centre of the circle, a point's direction says how far along the arc its
-            # foot is. Half a circle either way of the middle: beyond it the other end is nearer.
-            radius = 1.0 / abs(self.curvature)
-            turn = np.arctan2(x, radius - np.sign(self.curvature) * y)
-            middle = self.length / radius / 2
-            turn = middle + np.angle(np.exp(1j * (turn - middle)))
-            along = np.clip(turn * radius, 0.0, self.length)
-        heading = self.curvature * along
-        foot_x, foot_y = _chord(along, self.curvature)
-        off_x, off_y = x - foot_x, y - foot_y
-        d = np.cos(heading) * off_y - np.sin(heading) * off_x
-        return np.column_stack(
-            [self.begins + along, d, self.start[2] + heading, off_x**2 + off_y**2]
-        )
+
+def _along_arc(x: Floats, y: Floats, length: Floats, curvature: Floats) -> Floats:
+    """How far along an arc that starts at the origin along x its foot of a point (x, y) is; below 0
+    or above `length` where an end is nearer.
+    """
+    # Seen from the centre of the circle, a point's direction says how far along the arc its foot
+    # is. Half a circle either way of the middle: beyond it the other end is nearer.
+    radius = 1.0 / np.abs(curvature)
+    turn = np.arctan2(x, radius - np.sign(curvature) * y)
+    middle = length / radius / 2
+    turn = middle + np.angle(np.exp(1j * (turn - middle)))
+    return np.asarray(turn * radius)
 
 
-def _chord(along: Floats | float, curvature: float) -> tuple[Floats, Floats]:
+def _chord(along: Floats | float, curvature: Floats | float) -> tuple[Floats, Floats]:
     """Where an arc that starts at the origin along x is after `along` metres."""
     # NumPy's sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the arc is straight.
     half = np.asarray(along) * curvature / 2

@@ -8,18 +8,16 @@ class RouteCar:
     """The middle of the car is on the route, `along` metres from its start, and points along it."""
 
     along: float
+    pose: Pose
+    """x, y, heading."""
     speed: float
     """m/s along the route."""
 
     def __init__(self, route: Route, speed: float):
         self._route = route
         self.along = 0.0
+        self.pose = route.pose(0.0)
         self.speed = speed
-
-    @property
-    def pose(self) -> Pose:
-        """x, y, heading."""
-        return self._route.pose(self.along)
 
     @property
     def yaw_rate(self) -> float:
@@ -32,4 +30,5 @@ class RouteCar:
         As highway-env moves its vehicles, the step is driven at the speed it begins with.
         """
         self.along += self.speed * dt
+        self.pose = self._route.pose(self.along)
         self.speed = max(self.speed + acceleration * dt, 0.0)

@@ -193,6 +193,18 @@ def test_the_floor_of_a_seed_and_keyframe_is_the_same_whatever_was_fired_before(
     assert floors(4)[2] == after_nothing[0]
 
 
+@pytest.mark.parametrize("scored", [0, 163, 164, 165])
+def test_the_floor_spends_what_an_action_leaves(scored):
+    env = make("CARE-Dartout-v0", budget=0.01)
+    env.reset(seed=0)
+    action = np.zeros((32, 512), np.float32)
+    action.ravel()[:scored] = 1.0
+    fired = env.step(action)[-1]["fired"]
+    env.close()
+    assert len(fired) == 164
+    assert np.count_nonzero(fired < 164) >= min(scored, 164)
+
+
 def test_the_next_episode_of_an_environment_has_another_floor():
     env = make("CARE-Dartout-v0", budget=0.01)
     fired = []

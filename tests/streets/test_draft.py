@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from care_sim.streets.draft import TIMES, Draft, footprints_meet
+from care_sim.streets.draft import TIMES, Draft, PlacedBodies, footprints_meet
 
 SQUARE = np.array([[2.0, 2.0]])
 
@@ -68,3 +70,40 @@ def test_the_obstructed_way_keeps_walkers_off_and_adds_no_body(draft):
     draft.obstruct(straight_way(0.0, 8.0), (4.0, 1.7), 1.0)
     assert not draft.move("pedestrian", straight_way(2.0, 8.0), 0.1)
     assert draft.kinds == []
+
+
+POSE = st.tuples(st.floats(-12, 12), st.floats(-12, 12), st.floats(-4, 4))
+SIZE = st.tuples(st.floats(0.3, 8), st.floats(0.3, 3))
+BERTH = st.floats(0, 1)
+
+
+@given(
+    st.sampled_from([1, 3]),
+    st.sampled_from([1, 3]),
+    st.lists(st.tuples(st.lists(POSE, min_size=3, max_size=3), SIZE, BERTH), max_size=4),
+    st.lists(POSE, min_size=3, max_size=3),
+    SIZE,
+)
+def test_bodies_meet_exactly_where_the_exact_test_says_at_some_time(
+    mine, theirs, placed, way, size
+):
+    bodies = PlacedBodies()
+    way = np.array(way)[:mine]
+    for other, other_size, berth in placed:
+        bodies.add(np.array(other)[:theirs], other_size, berth)
+
+    def at_some_time(other, other_size, berth):
+        times = max(mine, theirs)
+        poses = np.broadcast_to(way, (times, 3))
+        others = np.broadcast_to(np.array(other)[:theirs], (times, 3))
+        sizes, other_sizes = (np.broadcast_to(each, (times, 2)) for each in (size, other_size))
+        return footprints_meet(poses, sizes, others, other_sizes, np.full(times, berth)).any()
+
+    assert bodies.meets(way, size) == any(at_some_time(*each) for each in placed)
+
+
+def test_a_berth_counts_from_end_to_end():
+    bodies = PlacedBodies()
+    bodies.add(np.zeros((1, 3)), (4.0, 0.3), 1.0)
+    assert bodies.meets(np.array([[4.9, 0.0, 0.0]]), (4.0, 0.3))
+    assert not bodies.meets(np.array([[5.1, 0.0, 0.0]]), (4.0, 0.3))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from care_sim.measure.bench.scanning.scans import REFERENCE_ENGINE
-from care_sim.measure.bench.steps import DRIVING, REACHING
+from care_sim.measure.bench.steps import DRIVE, DRIVING, REACHING, TESTS
 
 BenchReport = dict[str, Any]
 FAST = "fast"
@@ -24,6 +24,11 @@ def over(engine: str, other: str) -> str:
     return f"scan, time of {other} over {engine}"
 
 
+def beside(name: str, main: str) -> str:
+    """Name of the ratio of two environments' steps."""
+    return f"steps a CPU second, {name} over {main}"
+
+
 def same_on_grid(engine: str) -> str:
     """Name of the ratio of an engine's scans of the same rays on the smallest and the largest
     grid.
@@ -32,7 +37,8 @@ def same_on_grid(engine: str) -> str:
 
 
 def ratios(report: BenchReport) -> dict[str, float]:
-    """The ratios by name: steps over those of known environments, scans of `fast` over those of
+    """The ratios by name: steps over those of known environments, those of the drive and of a test
+    of Euro NCAP over those of the main environment, scans of `fast` over those of
     every other engine, and two processes over one. Where there is no engine `fast`, Bullet takes
     its place.
     """
@@ -51,6 +57,11 @@ def ratios(report: BenchReport) -> dict[str, float]:
             name: steps[report["main"]] / steps[peer]
             for name, peer in ((OVER_DRIVING, DRIVING), (OVER_REACHING, REACHING))
             if peer in steps
+        },
+        **{
+            beside(name, report["main"]): steps[name] / steps[report["main"]]
+            for name in (TESTS, DRIVE)
+            if name in steps
         },
         **{over(mine, other): scan[other] / scan[mine] for other in scan if other != mine},
         **{

@@ -25,6 +25,12 @@ REACHING = "PandaReach-v3"
 arm, also over PyBullet.
 """
 
+DRIVE_BUDGET = 0.03
+DRIVE = f"CARE-Drive-v0 at {DRIVE_BUDGET:.0%}"
+"""A row of its own: the longest episodes, with six cameras, at a budget that is published."""
+TESTS = ENVIRONMENT_IDS["ncap"]
+"""The shortest episodes, of which a study plays the most."""
+
 Maker = Callable[[], GymEnv]
 
 
@@ -43,6 +49,7 @@ def makers(config: BenchConfig) -> tuple[dict[str, Maker], list[str]]:
     made |= {
         ENVIRONMENT_IDS[name]: partial(driven, replace(chosen, scenario=name)) for name in others
     }
+    made[DRIVE] = partial(driven, replace(chosen, scenario="drive", budget=DRIVE_BUDGET))
     made[DRIVING] = partial(gymnasium.make, f"highway_env:{DRIVING}", disable_env_checker=True)
     try:
         import_panda_gym()

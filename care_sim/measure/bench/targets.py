@@ -18,8 +18,10 @@ from care_sim.measure.bench.ratios import (
     same_on_grid,
 )
 from care_sim.measure.bench.scanning.scans import REFERENCE_ENGINE
+from care_sim.measure.bench.steps import DRIVE
 
 _STEPS_PER_S = 500.0
+_DRIVE_STEPS_PER_S = 300.0
 _WORKER_MB = 250.0
 _STUDY_EPISODES = 245
 """Five seeds of the paper's closed-loop study."""
@@ -83,6 +85,11 @@ def targets(report: BenchReport) -> list[Target]:
             middle(report["speed"][report["main"]]["steps_per_s"]),
             _STEPS_PER_S,
             keyframe,
+        ),
+        *(
+            Target(f"{name}: steps/s", middle(figures["steps_per_s"]), _DRIVE_STEPS_PER_S)
+            for name, figures in report["speed"].items()
+            if name == DRIVE
         ),
         *(
             Target(name, ratios[name], bound, holders.get(name, scan))

@@ -6,8 +6,6 @@ the target has left the ego's, or when the ego is no faster than the target that
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from care_sim.world.route import Route
 from care_sim.world.world import Motion, World
 
@@ -45,7 +43,7 @@ class Crossing:
 
     def is_over(self, world: World) -> bool:
         """Whether no contact can follow."""
-        gone = _gone(world)
+        gone = world.along_m
         stands_before = world.ego.speed == 0.0 and gone < self.enter_m
         return world.time >= self.clear_s or gone > self.leave_m or stands_before
 
@@ -71,9 +69,3 @@ class Meeting:
     end: Crossing | Following
     line_x: float = 0.0
     route: Route | None = None
-
-
-def _gone(world: World) -> float:
-    """Metres that the ego's centre has gone."""
-    x, y, _ = world.ego.pose
-    return x if world.route is None else float(world.route.places(np.array([[x, y]]))[0, 0])

@@ -86,6 +86,7 @@ def render_bodies(
     # first, then its rows in the picture: a part above or below the window costs no more than its
     # corners.
     view = nearest, farthest, left, right
+    greatest = 1.0 / nearest
     for part, owner in enumerate(table.owners):
         if _is_outside(eye, poses[owner], table.reaches[part], optics, view):
             continue
@@ -102,11 +103,13 @@ def render_bodies(
         towards, outline = _outline(planes, table.edges[begin[2] : end[2]])
         for row in range(upper, lower):
             first, last = _span(outline, row + 1.0, left, right)
-            for column in range(first, last):
-                inverse = _surface(towards, column, row + 1.0)
-                if inverse_depths[row - top, column - left] <= inverse <= 1.0 / nearest:
-                    inverse_depths[row - top, column - left] = inverse
-                    ids[row - top, column - left] = owner
+            depth = inverse_depths[row - top, first - left : last - left]
+            line = ids[row - top, first - left : last - left]
+            for n in range(len(line)):
+                inverse = _surface(towards, first + n, row + 1.0)
+                if depth[n] <= inverse <= greatest:
+                    depth[n] = inverse
+                    line[n] = owner
     return ids
 
 
@@ -115,24 +118,30 @@ def visible_boxes(ids: Integers) -> Integers:
     """(n, 6) the bodies in a picture of ids (height, width) in ascending order: id; left, top,
     right, bottom of the box that holds all its pixels; their number.
     """
-    # The highest id tells how large a table is needed.
-    highest = -1
-    for body in ids.flat:
-        highest = max(highest, int(body))
-
     # One row per possible id: ids are small, and a table is faster than a search.
+    rows, columns = ids.shape
+    highest = NO_BODY
+    for row in range(rows):
+        for column in range(columns):
+            highest = max(highest, ids[row, column])
     found = np.zeros((highest + 1, 6), np.int64)
-    for row, line in enumerate(ids):
-        for column, body in enumerate(line):
-            if body >= 0:
+
+    # Stretch by stretch of equal ids, of which there are far fewer than pixels.
+    for row in range(rows):
+        column = 0
+        while column < columns:
+            body, first = ids[row, column], column
+            while column < columns and ids[row, column] == body:
+                column += 1
+            if body != NO_BODY:
                 one = found[body]
                 if one[5] == 0:
-                    one[:5] = body, column, row, column, row
+                    one[:3] = body, first, row
                 # Rows come in order, so the top stays as it began, and the bottom is this row's.
-                one[1] = min(one[1], column)
-                one[3] = max(one[3], column + 1)
+                one[1] = min(one[1], first)
+                one[3] = max(one[3], column)
                 one[4] = row + 1
-                one[5] += 1
+                one[5] += column - first
     return found[found[:, 5] > 0]
 
 
@@ -241,24 +250,34 @@ def _planes(faces: Floats, body: BodyInCamera, lens: Lens) -> Floats:
 
 @compiled()
 def _outline(planes: Floats, edges: Integers) -> tuple[Floats, Floats]:
-    """The rows of `planes` that are turned towards the camera, and the outline of the body.
+    """The inverse depths (t, 3) of the faces that are turned towards the camera, columns 0 to 2 of
+    their rows in `planes`, and the outline of the body.
 
     The outline is lines (m, 3): per column, per row, and at pixel (0, 0), a number that is positive
     inside, 0 on the line and negative outside.
     """
+    # Number by number: to pick or subtract rows would make an array each time.
+    towards = np.empty((len(planes), 3))
+    facing = 0
+    for n in range(len(planes)):
+        if planes[n, 3] < 0.0:
+            for k in range(3):
+                towards[facing, k] = planes[n, k]
+            facing += 1
+
     # An edge is on the outline where one of its two faces is turned towards the camera (distance
     # below 0) and the other is not. Along the edge both have one inverse depth, so that their
     # difference is 0 there; inside, the face towards the camera has the smaller one.
-    lines = np.empty((len(edges), 3))
+    outline = np.empty((len(edges), 3))
     count = 0
-    for one, other in edges:
-        if planes[one, 3] < 0.0 <= planes[other, 3]:
-            lines[count] = planes[one, :3] - planes[other, :3]
+    for n in range(len(edges)):
+        one, other = edges[n, 0], edges[n, 1]
+        if (planes[one, 3] < 0.0) != (planes[other, 3] < 0.0):
+            near, away = (one, other) if planes[one, 3] < 0.0 else (other, one)
+            for k in range(3):
+                outline[count, k] = planes[near, k] - planes[away, k]
             count += 1
-        elif planes[other, 3] < 0.0 <= planes[one, 3]:
-            lines[count] = planes[other, :3] - planes[one, :3]
-            count += 1
-    return planes[planes[:, 3] < 0.0], lines[:count]
+    return towards[:facing], outline[:count]
 
 
 @compiled(error_model="numpy")

@@ -21,7 +21,7 @@ from care_sim.measure.bench.keyframe import (
 )
 from care_sim.measure.bench.ratios import TWO_OVER_ONE
 from care_sim.measure.bench.run import bench_report, run_bench
-from care_sim.measure.bench.steps import DRIVING, REACHING, makers
+from care_sim.measure.bench.steps import DRIVE, DRIVING, REACHING, makers
 from care_sim.measure.bench.tables import bench_tables
 from care_sim.scenarios import PAPER_SCENARIOS
 from care_sim.sensors.engines import ENGINES
@@ -77,8 +77,8 @@ def test_a_peer_without_its_library_is_left_out_in_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "panda_gym", None)
     made, (skipped,) = makers(BenchConfig())
     assert next(iter(made)) == "CARE-Dense-v0"
-    assert {*CLOSED_LOOP, DRIVING} <= set(made)
-    assert len(made) == len(CLOSED_LOOP) + len(ENGINES)
+    assert {*CLOSED_LOOP, DRIVE, DRIVING} <= set(made)
+    assert len(made) == len({*CLOSED_LOOP, DRIVE, DRIVING}) + len(ENGINES) - 1
     assert skipped.startswith(
         f"{REACHING}: panda-gym needs the extra 'bench': pip install 'care-sim[bench]'"
     )

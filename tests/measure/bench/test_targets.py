@@ -6,10 +6,12 @@ from care_sim.measure.bench.ratios import (
     OVER_DRIVING,
     OVER_REACHING,
     TWO_OVER_ONE,
+    beside,
     over,
     ratios,
     same_on_grid,
 )
+from care_sim.measure.bench.steps import DRIVE, TESTS
 from care_sim.measure.bench.targets import targets
 
 
@@ -28,6 +30,8 @@ def report():
                 "steps_per_s": [250.0, 400.0, 900.0],
                 "steps_per_cpu_s": [500.0, 600.0, 900.0],
             },
+            DRIVE: {"steps_per_s": [200.0], "steps_per_cpu_s": [240.0]},
+            TESTS: {"steps_per_s": [290.0], "steps_per_cpu_s": [300.0]},
             "highway-fast-v0": {"steps_per_s": [20.0], "steps_per_cpu_s": [30.0]},
             "PandaReach-v3": {"steps_per_s": [250.0], "steps_per_cpu_s": [300.0]},
         },
@@ -52,6 +56,8 @@ def test_ratios_are_of_medians_and_larger_is_better(report):
         {
             OVER_DRIVING: 20.0,
             OVER_REACHING: 2.0,
+            beside(TESTS, "CARE-Dense-v0"): 0.5,
+            beside(DRIVE, "CARE-Dense-v0"): 0.4,
             over("fast", "bullet"): 20.0,
             over("fast", "Embree (Open3D)"): 2.5,
             same_on_grid("fast"): 0.5,
@@ -64,6 +70,7 @@ def test_what_is_missed_names_what_holds_it(report):
     made = targets(report)
     assert {target.name: target.holder for target in made if not target.met} == {
         "CARE-Dense-v0: steps/s": "camera, 60%",
+        f"{DRIVE}: steps/s": "",
         OVER_DRIVING: "camera, 60%",
         over("fast", "Embree (Open3D)"): "poses, 60%",
         same_on_grid("fast"): "poses, 60%",
@@ -71,7 +78,7 @@ def test_what_is_missed_names_what_holds_it(report):
         "a worker, MB": "libraries, 69%",
         "a worker, MB gained by resets": "",
     }
-    assert len(made) == 11
+    assert len(made) == 12
     assert made[-1].figure == pytest.approx(50.0)
 
 
@@ -80,6 +87,8 @@ def test_without_engine_and_peer_nothing_is_said_of_them(report):
         report["scans"]["engines"]["fast"],
         report["growth"]["grid"]["ms"]["fast"],
         report["speed"]["PandaReach-v3"],
+        report["speed"][DRIVE],
+        report["speed"][TESTS],
     )
     report["ratios"] = ratios(report)
     assert set(report["ratios"]) == {

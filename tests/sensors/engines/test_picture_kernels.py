@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
@@ -9,6 +12,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.sensors.camera import FRONT_CAMERA, Picture
 from care_sim.sensors.engines.bullet import Bullet
 from care_sim.sensors.engines.fast import Fast
+from care_sim.sensors.engines.picture_kernels import visible_boxes
 from care_sim.world.bodies import CATALOGUE, BodyKind, Part
 from care_sim.world.bullet import NO_BODY, BulletWorld
 from care_sim.world.polyhedra import directions, polyhedron
@@ -144,3 +148,16 @@ def test_directions_are_spread_over_the_sphere():
     assert len(directions()) == 42
     assert np.allclose(np.linalg.norm(directions(), axis=1), 1)
     assert np.allclose(np.rad2deg(np.arccos(cosines.max(axis=1))), 31.717, atol=0.01)
+
+
+@given(
+    arrays(np.int64, st.tuples(st.integers(0, 5), st.integers(0, 6)), elements=st.integers(-1, 3))
+)
+def test_a_box_holds_all_pixels_of_its_body_and_no_other_line(ids):
+    expected = []
+    for body in range(4):
+        rows, columns = np.nonzero(ids == body)
+        if len(rows):
+            corners = columns.min(), rows.min(), columns.max() + 1, rows.max() + 1
+            expected.append([body, *corners, len(rows)])
+    assert visible_boxes(ids).tolist() == expected
