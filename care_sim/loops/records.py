@@ -101,6 +101,8 @@ class EncounterOutcome:
     """From which it comes, "left" or "right"."""
     along_m: float
     """Where on the route its line is."""
+    way: str
+    """How the route runs while it is due in sight: "straight", "bend" or "turn"."""
     course: str
     """"conflict", "near-miss" or "stop": what comes of it if the ego drives on as it means to."""
     occluder: str
