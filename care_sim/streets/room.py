@@ -47,8 +47,8 @@ def keep_walkers_off(
     encounters: Sequence[Encounter],
     span: Span,
 ) -> None:
-    """Let nobody else walk where the ego drives over pavements and carriageways, nor through those
-    who are met. `span` is that of the main road.
+    """Let nobody else walk or cycle where the ego drives over pavements, cycle lanes and
+    carriageways, nor through those who are met. `span` is that of the main road.
     """
     main = plan.main
     kept = []
@@ -58,7 +58,8 @@ def keep_walkers_off(
     if turned_into is not None:
         side, road = main.side(turned_into.sign), turned_into.road
         mouth = (-road.right.kerb_m, road.left.kerb_m)
-        kept.append(_rectangle(road.curve, (side.kerb_m, side.boundary_m), mouth))
+        # With the cycle lane: nobody who cycles along the main road is to give way to the ego.
+        kept.append(_rectangle(road.curve, (side.lane_edge_m, side.boundary_m), mouth))
     for one in encounters:
         length, width, _ = CATALOGUE[one.who].size
         to_d = one.from_d - one.side * one.walk.length_m
