@@ -111,11 +111,15 @@ def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
     return groups.get((setting.for_full(), "full", 1.0))
 
 
-def detection(row: Row) -> Reading:
-    """Detection distance in metres; of an actor never detected, the most it can have been.
+def detection(row: Row) -> Reading | None:
+    """Detection distance in metres; of an actor never detected, the most it can have been. None of
+    a drive that meets nobody: it has no first-sighting actor.
 
-    Raises InvalidInput for a row that has neither.
+    Raises InvalidInput for any other row that has neither.
     """
+    met = row.get("encounters")
+    if met is not None and not len(met):
+        return None
     distance = row["detection_distance_m"]
     most = row["undetected_to_m"]
     if distance is None and most is None:
@@ -126,6 +130,17 @@ def detection(row: Row) -> Reading:
     return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
 
 
+def detections(rows: Sequence[Row]) -> list[Reading]:
+    """Those of all rows that have a first-sighting actor."""
+    return [found for found in map(detection, rows) if found is not None]
+
+
+def is_missed(row: Row) -> bool:
+    """Whether there was a first-sighting actor who was never detected."""
+    found = detection(row)
+    return found is not None and found.censored
+
+
 _FullScans = dict[tuple[Setting, int], Row]
 
 
@@ -133,7 +148,8 @@ def with_added_columns(rows: Sequence[Row]) -> list[Row]:
     """The rows with three more columns.
 
     `tags` of the policy, joined by '+'. `regret_m`: detection distance of the full scan of the same
-    world and seed minus that of this row, 0 at best, None where the full scan was not run.
+    world and seed minus that of this row, 0 at best, None where the full scan was not run and where
+    nobody is met.
     `censored`: the policy, or that full scan, never detected the actor, so that `regret_m` takes
     the most that its distance can have been and is a bound.
     """
@@ -148,8 +164,7 @@ def with_tags(rows: Sequence[Row]) -> list[Row]:
 
 def _regret(row: Row, full: _FullScans) -> Row:
     bound = full.get((setting_of(row).for_full(), row["seed"]))
-    ours = detection(row)
-    if bound is None:
-        return {"regret_m": None, "censored": ours.censored}
-    theirs = detection(bound)
+    ours, theirs = detection(row), detection(bound) if bound else None
+    if ours is None or theirs is None:
+        return {"regret_m": None, "censored": is_missed(row)}
     return {"regret_m": theirs.value - ours.value, "censored": ours.censored or theirs.censored}
