@@ -3,8 +3,10 @@ there, where on the line it passes, and what it sees on the way.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose, turned
@@ -85,7 +87,7 @@ class Approach:
 
     def arrival(self, line: Line, half_width: float) -> Arrival:
         """When the front comes to a line on which who goes takes `half_width` to either side."""
-        ahead, aside = line.local(self._points((EGO_LENGTH_M / 2, 0.0))).T
+        ahead, aside = line.local(_points((EGO_LENGTH_M / 2, 0.0), self.poses)).T
         # Before a turn the ego may be ahead of the line already: the last time it comes to it.
         last = int(np.flatnonzero(ahead < -half_width)[-1])
         share = (-half_width - ahead[last]) / (ahead[last + 1] - ahead[last])
@@ -93,17 +95,18 @@ class Approach:
             float(values[last] + share * (values[last + 1] - values[last]))
             for values in (self.places, self.times, aside)
         )
-        outline = np.stack([self._points(tuple(corner)) for corner in _OUTLINE.tolist()])
-        passing = line.local(outline[:, last:]).reshape(-1, 2)
+        passing = line.local(_points(_OUTLINE, self.poses[last:])).reshape(-1, 2)
         taken = passing[np.abs(passing[:, 0]) <= half_width + SPACING_M, 1]
         return Arrival(place, time, at, (float(taken.min()), float(taken.max())))
 
-    @property
+    @cached_property
     def eyes(self) -> Floats:
         """(n, 2) world places of the LiDAR."""
-        return self._points(LIDAR_POSITION[:2])
+        return _points(LIDAR_POSITION[:2], self.poses)
 
-    def _points(self, on_ego: tuple[float, ...]) -> Floats:
-        """(n, 2) world places of a point in the ego's frame."""
-        offsets = np.broadcast_to(on_ego, (len(self.poses), 2))
-        return self.poses[:, :2] + turned(offsets, self.poses[:, 2])
+
+def _points(on_ego: ArrayLike, poses: Floats) -> Floats:
+    """(..., n, 2) world places of points (..., 2) in the ego's frame when it is at poses (n, 3)."""
+    points = np.asarray(on_ego, dtype=float)[..., None, :]
+    each = np.broadcast_to(points, (*points.shape[:-2], len(poses), 2))
+    return np.asarray(poses[:, :2] + turned(each, poses[:, 2]))

@@ -74,12 +74,19 @@ def draw_hiding(rng: np.random.Generator, spot: Spot, side: Side, who: str) -> H
         return _at_the_corner(spot, side, occluder, gap)
     middle_d, edge_d = _place(side, width, at_kerb)
     d = side.sign * middle_d
-    begins = s - gap - length
+    # A metre along the line of a bend is shorter inside of it and longer outside. A straight body
+    # reaches out into a bend whose inner side it stands on.
+    curvature = spot.road.curve.curvature_at(s - length / 2)
+    bulge = max(curvature * side.sign, 0.0) * (length / 2) ** 2 / 2
+    middle = s - (gap + length / 2) / (1 - curvature * d)
+    begins = middle - length / 2
+    if at_kerb and edge_d - bulge < side.lane_edge_m:
+        return None
     if spot.beside and at_kerb and begins < spot.beside.kerb_m + CORNER_M:
         return None
     if spot.beside and not at_kerb and begins < _plot_from(spot, side, width):
         return None
-    x, y, heading = spot.road.curve.to_world(np.array([begins + length / 2, d, 0.0])).tolist()
+    x, y, heading = spot.road.curve.to_world(np.array([middle, d, 0.0])).tolist()
     return Hiding(occluder, (x, y, heading), s, edge_d)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.streets.curve import Curve
-from care_sim.streets.draft import Draft, Footprint
+from care_sim.streets.draft import Draft, Footprint, PlacedBodies
 from care_sim.streets.encounters import Encounter
 from care_sim.streets.furniture import Span
 from care_sim.streets.layouts import Joining, Plan
@@ -28,9 +28,12 @@ def keep_room(draft: Draft, encounter: Encounter) -> bool:
     end = encounter.from_d - encounter.side * (encounter.walk.length_m + length / 2 + BESIDE_M)
     aside = width / 2 + BESIDE_M
     way = _rectangle(encounter.curve, (s - aside, s + aside), (start, end))
-    if not draft.has_room(*way):
+    free = PlacedBodies()
+    free.add(way[0].reshape(1, 3), way[1], 0.0)
+    occluder = np.array(encounter.occluder_pose)
+    if free.meets(occluder.reshape(1, 3), CATALOGUE[encounter.occluder].size[:2]):
         return False
-    if not draft.stand(encounter.occluder, np.array(encounter.occluder_pose)):
+    if not draft.has_room(*way) or not draft.stand(encounter.occluder, occluder):
         return False
     draft.reserve(*way)
     for eye, seen in encounter.sight.lines:

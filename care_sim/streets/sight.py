@@ -64,9 +64,10 @@ def sight_of(
     The walk begins `lead_s` before the arrival, and `hit_s` later it is where it would be hit.
     """
     since = approach.times - arrival.time_s + lead_s
-    middles = np.array([walk.pose(walk.starts_s + time)[:2] for time in since.tolist()])
     forward = np.array([np.cos(walk.heading), np.sin(walk.heading)])
-    shown = middles + (length / 2 - SHOWN_M) * forward
+    gone = np.zeros(len(since))
+    gone[since > 0] = [walk.covered(walk.starts_s + time) for time in since[since > 0].tolist()]
+    shown = walk.start + (gone[:, None] + length / 2 - SHOWN_M) * forward
     hidden = hides(pose, CATALOGUE[occluder].size[:2], approach.eyes, shown)
 
     before = np.flatnonzero(hidden & (since < hit_s))
@@ -79,8 +80,8 @@ def sight_of(
     seconds = hit_s - float(since[first])
     kept = np.searchsorted(since, np.arange(since[first], hit_s, EVERY_S))
     lines = tuple(
-        (_point(eye), _point(middle))
-        for eye, middle in zip(approach.eyes[kept], middles[kept], strict=True)
+        (_point(eye), _point(front))
+        for eye, front in zip(approach.eyes[kept], shown[kept], strict=True)
     )
     return Sight(
         seconds,
