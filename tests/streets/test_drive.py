@@ -18,32 +18,7 @@ from care_sim.world.bodies import CATALOGUE
 SEEDS = (0, 2, 9, 12, 18, 19, 24, 25)
 """Straight, bent and turning off to both sides, with up to three to meet."""
 
-MANY = (
-    2,
-    7,
-    9,
-    12,
-    16,
-    18,
-    19,
-    24,
-    25,
-    27,
-    28,
-    37,
-    42,
-    44,
-    45,
-    50,
-    56,
-    75,
-    79,
-    91,
-    106,
-    131,
-    136,
-    137,
-)
+MANY = (2, 7, 9, 12, 19, 27, 28, 42)
 """With every course on straights, in bends and in turns to both sides."""
 
 
@@ -125,6 +100,11 @@ def encounters():
     return [(drive, one) for drive in drives for one in drive.encounters]
 
 
+def bends_within(drive, from_m, to_m):
+    places = np.arange(from_m, to_m, 0.25).tolist()
+    return any(drive.plan.route.curvature(place) for place in places)
+
+
 def test_there_are_encounters_in_bends_and_in_turns_to_both_sides_from_both_sides():
     ways = {(one.way, one.side) for _, one in encounters()}
     assert ways == {(way, side) for way in Way for side in (-1, 1)}
@@ -135,10 +115,11 @@ def test_there_are_encounters_in_bends_and_in_turns_to_both_sides_from_both_side
     }
     assert turns == {(turn, side) for turn in (-1, 1) for side in (-1, 1)}
     for drive, one in encounters():
-        # The ego is in a bend when they come into sight, at most MOST_SIGHT_S before.
-        (straight, _), (bent, _), *_ = (*drive.plan.route.legs, (0.0, 0.0))
-        if one.way is not Way.STRAIGHT:
-            assert straight < one.along_m < straight + bent + MOST_SIGHT_S * SPEED_LIMIT_MPS + 5.0
+        # The LiDAR is behind the ego's middle, and where it is, is known every 0.2 s.
+        eyes = np.array([eye for eye, _ in one.sight.lines])
+        places = drive.plan.route.places(eyes)[:, 0]
+        assert bends_within(drive, places.min(), places.max() + 2.5) or one.way is Way.STRAIGHT
+        assert not bends_within(drive, *places[[0, -1]]) or one.way is not Way.STRAIGHT
         assert len(drive.stretches) > 1 or one.way is not Way.TURN
 
 
@@ -151,8 +132,8 @@ def test_who_comes_is_in_sight_for_as_long_as_is_stated_wherever_they_come():
 
 
 def apart_s(drive, one):
-    """0 where the ego touches who comes; else the least seconds by which it must be earlier or later
-    to touch them; inf where 1.2 s are not enough.
+    """0 where the ego touches who comes; else by how many seconds at least it must be earlier or
+    later to touch them; inf where 1.2 s are not enough.
     """
     approach = Approach.along(drive.plan, one.along_m, one.along_m)
     arrives = np.interp(one.arrival_m, approach.places, approach.times)
@@ -182,7 +163,7 @@ def test_an_ego_that_drives_on_hits_in_a_conflict_alone():
     passed = [apart for one, apart in found if one.course is Course.NEAR_MISS]
     # A corner of an ego that turns may come to the line a little before the middle of its front.
     assert all(least - 0.1 <= apart <= most + 0.1 for apart in passed)
-    assert len(passed) > 5
+    assert len(passed) > 3
 
 
 def test_nobody_waits_in_the_egos_way_nor_in_the_way_of_its_sight():

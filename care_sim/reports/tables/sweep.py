@@ -166,8 +166,8 @@ def _nobody_notes(cells: Sequence[Cell]) -> list[str]:
     if not named:
         return []
     return [
-        f"{', '.join(named)} drives meet nobody: they have no first-sighting actor, and first "
-        "detection, never and regret leave them out."
+        f"{', '.join(named)} episodes have no first-sighting actor, since the drive meets nobody: "
+        "first detection, never and regret leave them out."
     ]
 
 

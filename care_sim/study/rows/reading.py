@@ -10,7 +10,6 @@ from dataclasses import fields
 from typing import Any
 
 from care_sim.base.checks import is_number
-from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
@@ -113,21 +112,13 @@ def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
 
 def detection(row: Row) -> Reading | None:
     """Detection distance in metres; of an actor never detected, the most it can have been. None of
-    a drive that meets nobody: it has no first-sighting actor.
-
-    Raises InvalidInput for any other row that has neither.
+    an episode without a first-sighting actor: a drive that meets nobody.
     """
-    met = row.get("encounters")
-    if met is not None and not len(met):
-        return None
     distance = row["detection_distance_m"]
+    if distance is not None:
+        return Reading(float(distance))
     most = row["undetected_to_m"]
-    if distance is None and most is None:
-        raise InvalidInput(
-            f"{row['scenario']} {row['policy']} seed {row['seed']}: one of detection_distance_m "
-            "and undetected_to_m must be given"
-        )
-    return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
+    return None if most is None else Reading(float(most), censored=True)
 
 
 def detections(rows: Sequence[Row]) -> list[Reading]:
