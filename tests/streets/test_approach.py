@@ -48,11 +48,14 @@ def test_where_a_turn_ends_the_front_arrives_outside_of_the_lane(turn, side):
 
 def test_behind_a_sharp_turn_the_last_time_at_a_line_counts():
     # The side street leads back: on its first straight the ego is ahead of the line already.
-    legs = ((40.0, 0.0), (RADIUS_M * np.deg2rad(105.0), 1 / RADIUS_M), (60.0, 0.0))
+    legs = ((60.0, 0.0), (7.0 * np.deg2rad(105.0), 1 / 7.0), (60.0, 0.0))
     plan = SpeedPlan(Route(legs=legs), **EVENLY)
-    foot = plan.route.pose(70.0)
-    arrival = Approach.along(plan, 70.0, 70.0).arrival(Line(foot, 1), HALF_M)
-    assert arrival.place_m == pytest.approx(70.0 - HALF_M - EGO_LENGTH_M / 2, abs=0.01)
+    along = 60.0 + 7.0 * np.deg2rad(105.0) + 1.0
+    line = Line(plan.route.pose(along), 1)
+    approach = Approach.along(plan, along, along)
+    assert line.local(approach.eyes)[0, 0] > 0
+    arrival = approach.arrival(line, HALF_M)
+    assert arrival.place_m == pytest.approx(along - HALF_M - EGO_LENGTH_M / 2, abs=0.3)
 
 
 def test_a_slow_turn_takes_time():

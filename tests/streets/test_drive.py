@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from care_sim.streets.approach import Approach
+from care_sim.streets.approach import EGO_LENGTH_M, EGO_WIDTH_M, Approach
 from care_sim.streets.curve import Curve
 from care_sim.streets.dimensions import SPEED_LIMIT_MPS
 from care_sim.streets.draft import footprints_meet
@@ -164,6 +164,18 @@ def test_an_ego_that_drives_on_hits_in_a_conflict_alone():
     # A corner of an ego that turns may come to the line a little before the middle of its front.
     assert all(least - 0.1 <= apart <= most + 0.1 for apart in passed)
     assert len(passed) > 3
+
+
+def test_a_conflict_hits_between_a_quarter_and_three_quarters_of_the_egos_width():
+    for drive, one in encounters():
+        if one.course is not Course.CONFLICT or one.who == "car":
+            continue
+        x, y, heading = drive.plan.route.pose(one.arrival_m)
+        front = x + EGO_LENGTH_M / 2 * np.cos(heading), y + EGO_LENGTH_M / 2 * np.sin(heading)
+        hit = np.array(one.walk.pose(one.lead_s)[:2]) - front
+        # Along their way: in a turn the ego's front is askew to it.
+        way = np.cos(one.walk.heading), np.sin(one.walk.heading)
+        assert abs(float(hit @ way)) <= EGO_WIDTH_M / 4 + 0.02
 
 
 def test_nobody_waits_in_the_egos_way_nor_in_the_way_of_its_sight():
