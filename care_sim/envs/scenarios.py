@@ -75,7 +75,7 @@ class DriveEnv(ClosedLoopEnv):
     conflict, a near miss or a stop at the edge of the lanes. The episode ends at the end of the
     way, too. The outcome is a `care_sim.loops.records.DriveOutcome`: what the contract says of the
     first-sighting actor is of the first encounter that is a conflict, else of the first; without an
-    encounter there is none, and `undetected_to_m` is 0. See `care_sim.scenarios.drive`.
+    encounter there is none, and `undetected_to_m` is None, too. See `care_sim.scenarios.drive`.
     """
 
     __doc__ = f"{__doc__}\n    {ClosedLoopEnv.__doc__}"

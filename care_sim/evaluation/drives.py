@@ -42,6 +42,7 @@ def _encounter(meeting: Meeting, sights: Sequence[Sight], hit: bool) -> Encounte
         who=meeting.who,
         side=meeting.side,
         along_m=meeting.along_m,
+        way=meeting.way,
         course=meeting.course,
         occluder=meeting.occluder,
         occluder_reported=meeting.occluder_reported,

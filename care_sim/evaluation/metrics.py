@@ -24,7 +24,8 @@ def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
     )
     return Outcome(
         detection_distance_m=first,
-        undetected_to_m=_undetected_to(nearest) if first is None else None,
+        # Without an actor every distance is inf, and there was nobody to detect.
+        undetected_to_m=nearest if first is None and np.isfinite(nearest) else None,
         braked=any(record.braking for record in keyframes),
         min_distance_m=min((record.nearest_m for record in seen), default=None),
         clearance_m=min((record.clearance_m for record in seen), default=None),
@@ -32,8 +33,3 @@ def outcome(keyframes: Sequence[Keyframe]) -> Outcome:
         impact_speed_mps=impact,
         rays_fired=int(np.sum([len(record.fired) for record in keyframes])),
     )
-
-
-def _undetected_to(nearest: float) -> float:
-    # Without an actor every distance is inf, and nobody could have been detected at any.
-    return nearest if np.isfinite(nearest) else 0.0

@@ -73,7 +73,7 @@ class Outcome:
     undetected_to_m: float | None
     """Of an actor that is never detected, the least distance at which a scan passed it by since it
     came into view, or in the whole episode if it never did. It is the most that the detection
-    distance can have been: 0 in an episode without an actor. Else None.
+    distance can have been. Else None, and in an episode without an actor.
     """
     braked: bool
     """Whether the brake was on at any keyframe."""
@@ -101,6 +101,8 @@ class EncounterOutcome:
     """From which it comes, "left" or "right"."""
     along_m: float
     """Where on the route its line is."""
+    way: str
+    """How the route runs while it is due in sight: "straight", "bend" or "turn"."""
     course: str
     """"conflict", "near-miss" or "stop": what comes of it if the ego drives on as it means to."""
     occluder: str

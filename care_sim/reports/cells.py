@@ -11,16 +11,28 @@ from dataclasses import dataclass
 from care_sim.evaluation.censoring import Quartiles, Reading, quartiles
 from care_sim.reports.contrasts import DETECTION, Contrast, contrast
 from care_sim.reports.formatting import marked, tag_notes
-from care_sim.study.rows.reading import Groups, Key, detection, full_of, grouped, tags_of_row
+from care_sim.study.rows.reading import (
+    Groups,
+    Key,
+    detection,
+    detections,
+    full_of,
+    grouped,
+    tags_of_row,
+)
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import Row
+
+NO_ACTOR = Quartiles(None, None, None, 0)
+"""Of a cell whose drives all meet nobody."""
 
 
 @dataclass(frozen=True)
 class Cell:
     """A policy at a budget in a setting. Distances in metres.
 
-    `tags` of the policy; `never` counts the episodes without a detection; `closest_pass` and
+    `tags` of the policy; `met` counts the episodes with a first-sighting actor, `never` those of
+    them without a detection, and `detection` is over them; `closest_pass` and
     `clearance` are over the episodes in which the actor came into the camera's view, None when
     there are none. `regret`: detection distance of the full scan of the same world minus this
     policy's, 0 at best, and `as_full` the episodes in which the policy detects no later; None for
@@ -32,6 +44,7 @@ class Cell:
     budget: float
     tags: tuple[str, ...]
     episodes: int
+    met: int
     never: int
     detection: Quartiles
     braked: int
@@ -59,8 +72,7 @@ def summarise(rows: Sequence[Row]) -> list[Cell]:
 def _cell(key: Key, groups: Groups) -> Cell:
     setting, policy, budget = key
     rows = groups[key]
-    detections = quartiles([detection(row) for row in rows])
-    assert detections is not None
+    found = detections(rows)
     full = None if policy == "full" else full_of(groups, setting)
     # Full minus policy: a policy that detects later than the full scan has positive regret.
     regret = contrast(DETECTION, full, rows)
@@ -70,8 +82,9 @@ def _cell(key: Key, groups: Groups) -> Cell:
         budget=budget,
         tags=tags_of_row(rows[0]),
         episodes=len(rows),
-        never=sum(detection(row).censored for row in rows),
-        detection=detections,
+        met=len(found),
+        never=sum(reading.censored for reading in found),
+        detection=quartiles(found) or NO_ACTOR,
         braked=sum(row["braked"] for row in rows),
         closest_pass=_quartiles(rows, "min_distance_m"),
         clearance=_quartiles(rows, "clearance_m"),
@@ -87,12 +100,12 @@ def _quartiles(rows: Sequence[Row], column: str) -> Quartiles | None:
 
 
 def _no_later(rows: Sequence[Row], full: Sequence[Row]) -> int:
-    bounds = {row["seed"]: detection(row).value for row in full}
-    found = {row["seed"]: detection(row) for row in rows if row["seed"] in bounds}
+    bounds = {row["seed"]: found.value for row in full if (found := detection(row)) is not None}
+    found_in = {row["seed"]: detection(row) for row in rows if row["seed"] in bounds}
     return sum(
         # An actor that neither detected is no success: a censored reading does not count.
-        not reading.censored and reading.value >= bounds[seed]
-        for seed, reading in found.items()
+        reading is not None and not reading.censored and reading.value >= bounds[seed]
+        for seed, reading in found_in.items()
     )
 
 

@@ -14,9 +14,12 @@ from care_sim.reports.controls import best_control, is_control
 from care_sim.study.rows.reading import policy_of, tags_of_row
 from care_sim.study.run_config import FULL, Row
 
-AVOIDANCE = Measure(
-    "Avoided", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not row["collision"]))
-)
+
+def _avoided(row: Row) -> Reading:
+    return Reading(100.0 * (not row["collision"]))
+
+
+AVOIDANCE = Measure("Avoided", "points", 0, GATE_POINTS, _avoided)
 _World = tuple[tuple[str, object], ...]
 
 
@@ -53,9 +56,8 @@ class CollisionRows:
         shared = sorted({*first} & {*second}, key=repr)
         if not shared:
             return None
-        read = AVOIDANCE.read
-        pairs = difference([read(first[w]) for w in shared], [read(second[w]) for w in shared])
-        return Contrast(AVOIDANCE, pairs)
+        of_ours, of_theirs = ([_avoided(cell[w]) for w in shared] for cell in (first, second))
+        return Contrast(AVOIDANCE, difference(of_ours, of_theirs))
 
     def best_control(self, budget: float) -> str | None:
         """The control that avoids most at a budget, on the worlds that all controls have there;

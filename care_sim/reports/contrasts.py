@@ -32,14 +32,18 @@ class Measure:
     unit: str
     decimals: int
     gate: float
-    read: Callable[[Row], Reading]
+    read: Callable[[Row], Reading | None]
+    """None of an episode that has no such quantity."""
+
+
+def _detected(row: Row) -> Reading | None:
+    found = detection(row)
+    return None if found is None else Reading(100.0 * (not found.censored))
 
 
 DETECTION = Measure("First detection", "m", 1, GATE_M, detection)
 BRAKED = Measure("Braked", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * row["braked"]))
-DETECTED = Measure(
-    "Detected", "points", 0, GATE_POINTS, lambda row: Reading(100.0 * (not detection(row).censored))
-)
+DETECTED = Measure("Detected", "points", 0, GATE_POINTS, _detected)
 AVOIDED = Measure(
     "Collision avoided",
     "points",
@@ -104,8 +108,8 @@ class Contrast:
 def contrast(
     measure: Measure, ours: Sequence[Row] | None, theirs: Sequence[Row] | None
 ) -> Contrast | None:
-    """`ours` minus `theirs`, paired by seed; None without shared seeds."""
-    a, b = ({row["seed"]: measure.read(row) for row in rows or ()} for rows in (ours, theirs))
+    """`ours` minus `theirs`, paired by seed; None without shared seeds that have the measure."""
+    a, b = (_read(measure, rows or ()) for rows in (ours, theirs))
     # Only seeds that both have played are pairs. Sorted, they give the same resamples whatever the
     # order of the rows.
     seeds = sorted(set(a) & set(b))
@@ -114,3 +118,9 @@ def contrast(
         if seeds
         else None
     )
+
+
+def _read(measure: Measure, rows: Sequence[Row]) -> dict[int, Reading]:
+    """What was measured, by seed."""
+    found = ((row["seed"], measure.read(row)) for row in rows)
+    return {seed: reading for seed, reading in found if reading is not None}

@@ -70,8 +70,8 @@ def tag_notes(tags: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
 
 
 def median(values: Quartiles | None) -> str:
-    """A median detection distance."""
-    if values is None:
+    """A median detection distance; a dash without episodes that have one."""
+    if values is None or not values.count:
         return "-"
     return NOT_DETECTED if values.median is None else f"{values.median:.1f}"
 

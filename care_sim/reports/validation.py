@@ -12,7 +12,7 @@ from care_sim.base.errors import percent
 from care_sim.reports.contrasts import AVOIDED, DETECTION, Contrast, contrast
 from care_sim.reports.controls import is_control
 from care_sim.study.designs.validate import CAMERA_POLICIES, is_training
-from care_sim.study.rows.reading import detection, setting_of, tags_of_row
+from care_sim.study.rows.reading import detections, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
@@ -148,7 +148,7 @@ def played_worlds(rows: Sequence[Row]) -> list[WorldPlays]:
 
 
 def _rank(rows: Sequence[Row]) -> tuple[int, float]:
-    distances = [detection(row).value for row in rows]
+    distances = [found.value for found in detections(rows)]
     return sum(row["collision"] for row in rows), -float(np.mean(distances or [0.0]))
 
 

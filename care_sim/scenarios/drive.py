@@ -18,7 +18,7 @@ from care_sim.streets.dimensions import LANE_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, Drive, draw_drive
 from care_sim.streets.drive_traffic import DrivenLane
-from care_sim.streets.encounters import EGO_LENGTH_M, Course
+from care_sim.streets.encounters import Course
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.crosser import Crosser, Meeting
 from care_sim.world.lane_flow import LaneFlow
@@ -28,10 +28,6 @@ from care_sim.world.traffic import Traffic
 from care_sim.world.walker import Walk
 from care_sim.world.world import WORLD_STEP_S, Motion, World
 
-SIDEWAYS_MPS2 = 2.0
-"""Through a bend: two thirds of the 3 m/s^2 that UN Regulation 79 allows automated steering."""
-COMFORT_MPS2 = 1.5
-"""Slowing for a bend and gaining speed after it: as the controller gains speed after braking."""
 CLEAR_M = 0.5
 """Who sets off expects to keep at least this much from other traffic."""
 LOOK_AHEAD_STEP_S = 0.1
@@ -59,14 +55,13 @@ class DriveScenario(Scenario):
         # Nobody drives on highway-env's straight road; the lanes of the street have their own
         # flows.
         nobody = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)
-        world = World(nobody, drive.cruise_mps, drive.route)
+        world = World(nobody, drive.plan.cruise_mps, drive.plan.route)
         world.goal_m = drive.goal_m
-        plan = SpeedPlan(drive.route, drive.cruise_mps, SIDEWAYS_MPS2, COMFORT_MPS2)
-        world.speed_plan = plan
+        world.speed_plan = drive.plan
         traffic = StreetTraffic([_flowing(drive, lane) for lane in drive.lanes])
         _add_bodies(world, drive)
         _add_vehicles(world, drive, traffic)
-        _add_encounters(world, drive, plan, traffic)
+        _add_encounters(world, drive, traffic)
         return world
 
 
@@ -119,18 +114,26 @@ def _driving(traffic: StreetTraffic, lane: int, number: int) -> Motion:
     return lambda _time: traffic.pose(lane, number)
 
 
-def _add_encounters(world: World, drive: Drive, plan: SpeedPlan, traffic: StreetTraffic) -> None:
+def _add_encounters(world: World, drive: Drive, traffic: StreetTraffic) -> None:
     """Who comes out. The episode is about the first who would be hit, else the first of all."""
-    for along, one in drive.encounters:
+    for one in drive.encounters:
         free = _may_go(drive, traffic, CATALOGUE[one.who].size[:2])
         crosser = Crosser(one.walk, one.lead_s, free)
         actor = world.add(one.who, one.who, crosser.pose)
-        line_m = along - one.half_width - EGO_LENGTH_M / 2
-        world.at_every_step(_looking(crosser, plan, line_m))
+        world.at_every_step(_looking(crosser, drive.plan, one.arrival_m))
         side = "left" if one.side > 0 else "right"
         occluder = one.occluder, one.occluder_reported
         world.meetings.append(
-            Meeting(actor.body, one.who, side, along, one.course.value, *occluder, crosser)
+            Meeting(
+                actor.body,
+                one.who,
+                side,
+                one.along_m,
+                one.way.value,
+                one.course.value,
+                *occluder,
+                crosser,
+            )
         )
         if world.first_sighting is None:
             world.first_sighting = actor

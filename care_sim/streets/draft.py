@@ -127,15 +127,17 @@ class Draft:
         """Let walkers keep clear of a way (t, 3) on which no body of the draft moves: the ego's."""
         self._moving.add(way, size, berth)
 
+    def has_room(self, pose: Floats, size: Footprint) -> bool:
+        """Whether a rectangle at a pose (3,) is free of all there is, now and later."""
+        way = pose.reshape(1, 3)
+        kept = self._reserved, self._fixed, self._moving
+        return not any(bodies.meets(way, size) for bodies in kept)
+
     def stand(self, kind: str, pose: Floats) -> bool:
         """Put a body at a pose (3,) if there is room. Says whether there was."""
         way = pose.reshape(1, 3)
         size = _footprint(kind)
-        if (
-            self._reserved.meets(way, size)
-            or self._fixed.meets(way, size)
-            or self._moving.meets(way, size)
-        ):
+        if not self.has_room(pose, size):
             return False
         self._fixed.add(way, size, TOUCH_M)
         self._keep(kind, np.repeat(way, len(self.times), axis=0))

@@ -6,11 +6,13 @@ ranges. But nobody crosses a road by chance: every crossing is one of `encounter
 else stays on the pavements.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from care_sim.core.arrays import Floats
+from care_sim.streets.approach import Approach
 from care_sim.streets.dimensions import SPEED_LIMIT_MPS, Range, draw
 from care_sim.streets.draft import Draft
 from care_sim.streets.drive_traffic import (
@@ -22,10 +24,12 @@ from care_sim.streets.drive_traffic import (
 from care_sim.streets.drivers import BEYOND_M
 from care_sim.streets.encounters import Encounter, draw_encounter
 from care_sim.streets.furniture import furnish
+from care_sim.streets.hiding import Spot
 from care_sim.streets.layouts import LAYOUTS, Joining, Plan, Road
 from care_sim.streets.people import populate
-from care_sim.streets.room import VIEW_M, keep_room, keep_walkers_off
+from care_sim.streets.room import keep_room, keep_walkers_off
 from care_sim.world.route import Route, through
+from care_sim.world.speed_plan import SpeedPlan
 
 CRUISE_MPS: Range = (7.0, SPEED_LIMIT_MPS)
 """From what the slowest of the other drivers want to the limit."""
@@ -44,10 +48,18 @@ SHIFT_M: Range = (0.0, 12.0)
 """Places of encounters: five seconds of approach before the first, so that every track settles, and
 as much between two, less what each is shifted by.
 """
-AFTER_BEND_M = 25.0
-"""Behind a turn the ego needs this much to be back at its speed, and before it as much to slow."""
 MOUTH_M = 22.0
-"""No encounter is this near to the middle of a side street, whose mouth must be clear."""
+"""On the main road no encounter is this near to the middle of a side street, whose mouth must be
+clear.
+"""
+EXIT_M = 12.0
+"""Where the ego turns off, who comes crosses the side street this far behind the main road's
+pavement or less: as in Euro NCAP's turning tests (CPTA), 8 to 11 m from its lane, up to the first
+lorry that may park."""
+SIDEWAYS_MPS2 = 2.0
+"""Through a bend: two thirds of the 3 m/s^2 that UN Regulation 79 allows automated steering."""
+COMFORT_MPS2 = 1.5
+"""Slowing for a bend and gaining speed after it: as the controller gains speed after braking."""
 SAMPLE_S = 0.2
 """Between two samples of a walker's way: nobody on a pavement moves further than half of its own
 length in it."""
@@ -69,19 +81,18 @@ class Stretch:
 class Drive:
     """What is drawn of a drive.
 
-    `goal_m` is how far along its `route` the ego goes. `kinds` (n,) stand or walk on `ways`
-    (n, t, 3), sampled every SAMPLE_S seconds. `encounters` come with where on the route their lines
-    are. `stretches` say which road the ego drives on.
+    The ego goes `goal_m` along the route of its `plan`. `kinds` (n,) stand or walk on `ways`
+    (n, t, 3), sampled every SAMPLE_S seconds. `encounters` are in the order of the route.
+    `stretches` say which road the ego drives on.
     """
 
-    route: Route
+    plan: SpeedPlan
     goal_m: float
-    cruise_mps: float
     stretches: tuple[Stretch, ...]
     lanes: tuple[DrivenLane, ...]
     kinds: tuple[str, ...]
     ways: Floats
-    encounters: tuple[tuple[float, Encounter], ...]
+    encounters: tuple[Encounter, ...]
 
 
 def draw_drive(rng: np.random.Generator, duration_s: float) -> Drive:
@@ -96,21 +107,22 @@ def draw_drive(rng: np.random.Generator, duration_s: float) -> Drive:
     goal = draw(plans, LENGTH_M)
     cruise = draw(plans, CRUISE_MPS)
     route, stretches = _way(plan, turned_into, goal + BEYOND_M)
+    speed_plan = SpeedPlan(route, cruise, SIDEWAYS_MPS2, COMFORT_MPS2)
 
     times = SAMPLE_S * np.arange(round(duration_s / SAMPLE_S) + 1, dtype=np.float64)
     draft = Draft(furniture, times)
-    encounters = _encounters(meeting, draft, plan, stretches, goal)
+    encounters = _encounters(meeting, draft, plan, stretches, goal, speed_plan)
     last = min(goal, stretches[0].to_m) + BEYOND_M
     side_m = BEYOND_M + (goal - stretches[-1].offset_m if turned_into else 0.0)
     furnish(draft, plan, (-BEYOND_M, last), side_m)
-    keep_walkers_off(draft, plan, turned_into, [one for _, one in encounters], (-BEYOND_M, last))
+    keep_walkers_off(draft, plan, turned_into, encounters, (-BEYOND_M, last))
     draft.rng = people
     populate(draft, plan.main, (-BEYOND_M, last))
     for joining in plan.joinings:
         populate(draft, joining.road, (plan.main.side(joining.sign).front_m, side_m))
     lanes = _lanes(traffic, plan, turned_into, last, duration_s)
     return Drive(
-        route, goal, cruise, stretches, lanes, tuple(draft.kinds), np.stack(draft.ways), encounters
+        speed_plan, goal, stretches, lanes, tuple(draft.kinds), np.stack(draft.ways), encounters
     )
 
 
@@ -151,41 +163,71 @@ def _way(
 
 
 def _encounters(
-    rng: np.random.Generator, draft: Draft, plan: Plan, stretches: tuple[Stretch, ...], goal: float
-) -> tuple[tuple[float, Encounter], ...]:
-    """Who is met, in the order of the way, with the places along the route."""
+    rng: np.random.Generator,
+    draft: Draft,
+    plan: Plan,
+    stretches: tuple[Stretch, ...],
+    goal: float,
+    speed_plan: SpeedPlan,
+) -> tuple[Encounter, ...]:
+    """Who is met, in the order of the way."""
     places = [
         place + draw(rng, SHIFT_M) for place in np.arange(FIRST_M, goal - SHIFT_M[1], APART_M)
     ]
     wanted = min(int(rng.choice(ENCOUNTERS)), len(places))
-    # All are drawn, then as many are taken as there shall be and have room.
-    found: list[tuple[float, Encounter]] = []
-    for number in rng.permutation(len(places)).tolist():
-        for stretch in stretches:
-            s = places[number] - stretch.offset_m
-            if len(found) < wanted and _is_open(plan, stretch, places[number], s):
-                encounter = draw_encounter(rng, stretch.road, s)
-                if encounter and keep_room(draft, stretch.road, encounter):
-                    found.append((places[number], encounter))
-    return tuple(sorted(found, key=lambda one: one[0]))
+    corner = _corner(rng, plan, stretches)
+    spots = [*corner, *_others(places, corner, plan, stretches)]
+    # All are drawn, then as many are taken as there shall be and have room: first at the corner.
+    order = [*range(len(corner)), *(len(corner) + rng.permutation(len(spots) - len(corner)))]
+    found: list[Encounter] = []
+    for spot in (spots[number] for number in order):
+        if len(found) == wanted:
+            break
+        from_m, to_m = spot.along_m
+        one = draw_encounter(rng, spot, Approach.along(speed_plan, from_m, to_m))
+        if one and keep_room(draft, one):
+            found.append(one)
+    return tuple(sorted(found, key=lambda one: one.along_m))
 
 
-def _is_open(plan: Plan, stretch: Stretch, along: float, s: float) -> bool:
-    """Whether there can be an encounter: in no bend, nor where the ego turns, nor at the mouth of a
-    street.
+def _corner(
+    rng: np.random.Generator, plan: Plan, stretches: tuple[Stretch, ...]
+) -> tuple[Spot, ...]:
+    """Where the ego turns off, the mouth of the side street; else in its bend, if there is one."""
+    main, *into = stretches
+    if into:
+        (leaving,) = into
+        joining = next(one for one in plan.joinings if one.road is leaving.road)
+        beside = plan.main.side(joining.sign)
+        within = beside.boundary_m, beside.boundary_m + EXIT_M
+        return (Spot(leaving.road, within, leaving.offset_m, beside, corner=True),)
+    curve = main.road.curve
+    begins, ends = max(curve.bend_at, FIRST_M), curve.bend_at + curve.bend_length
+    if ends <= begins:
+        return ()
+    s = draw(rng, (begins, ends))
+    return (Spot(main.road, (s, s)),)
+
+
+def _others(
+    places: list[float], corner: tuple[Spot, ...], plan: Plan, stretches: tuple[Stretch, ...]
+) -> Iterator[Spot]:
+    """Where else along the way somebody can be met: away from the corner, and from the mouths of
+    streets.
     """
-    # Sight lines are reckoned for a straight road; no bend is shorter than these steps.
-    curve = stretch.road.curve
-    bends = any(curve.curvature_at(s - back) for back in (VIEW_M, VIEW_M / 2, 0.0))
-    if bends or not stretch.from_m <= along < stretch.to_m:
-        return False
-    # What the ego turns out of, or into, is a stretch that begins or ends within the way.
-    before = AFTER_BEND_M if stretch.from_m > 0 else 0.0
-    if along < stretch.from_m + before:
-        return False
-    if stretch.road is not plan.main:
-        return s > plan.main.right.front_m + MOUTH_M
-    return all(abs(s - joining.at_m) > MOUTH_M for joining in plan.joinings)
+    apart = APART_M - SHIFT_M[1]
+    for along in places:
+        if any(one.along_m[0] - apart < along < one.along_m[1] + apart for one in corner):
+            continue
+        for stretch in stretches:
+            s = along - stretch.offset_m
+            if not stretch.from_m <= along < stretch.to_m:
+                continue
+            if stretch.road is plan.main:
+                if all(abs(s - joining.at_m) > MOUTH_M for joining in plan.joinings):
+                    yield Spot(stretch.road, (s, s))
+            elif s > corner[0].within_m[1]:
+                yield Spot(stretch.road, (s, s), stretch.offset_m, corner[0].beside)
 
 
 def _lanes(

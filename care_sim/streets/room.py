@@ -6,36 +6,40 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.streets.curve import Curve
-from care_sim.streets.draft import Draft, Footprint
+from care_sim.streets.draft import Draft, Footprint, PlacedBodies
 from care_sim.streets.encounters import Encounter
 from care_sim.streets.furniture import Span
-from care_sim.streets.layouts import Joining, Plan, Road
+from care_sim.streets.layouts import Joining, Plan
 from care_sim.world.bodies import CATALOGUE
 
 BESIDE_M = 0.3
 """Kept free on either side of who comes."""
-VIEW_M = 14.0
-"""Who comes from beyond the pavement must be seen over the parking lane, along which nobody parks
-for this long: the sight line of an ego 15 m away enters that lane within it.
-"""
+VIEW_M = 0.6
+"""Kept free along every line of sight: twice what is to be seen of who comes."""
 
 
-def keep_room(draft: Draft, road: Road, encounter: Encounter) -> bool:
-    """Put up the occluder and keep the way of who comes free of what stands. Says whether there was
-    room; without it nothing is changed.
+def keep_room(draft: Draft, encounter: Encounter) -> bool:
+    """Put up the occluder and keep free of what stands the way of who comes, and the lines along
+    which the ego sees them. Says whether there was room; without it nothing is changed.
     """
-    if not draft.stand(encounter.occluder, np.array(encounter.occluder_pose)):
-        return False
-    side = road.side(encounter.side)
     length, width, _ = CATALOGUE[encounter.who].size
     s = encounter.s
     start = encounter.from_d + encounter.side * (length / 2 + BESIDE_M)
     end = encounter.from_d - encounter.side * (encounter.walk.length_m + length / 2 + BESIDE_M)
     aside = width / 2 + BESIDE_M
-    draft.reserve(*_rectangle(road.curve, (s - aside, s + aside), (start, end)))
-    if abs(encounter.from_d) > side.boundary_m:
-        edges = encounter.side * side.lane_edge_m, encounter.side * side.kerb_m
-        draft.reserve(*_rectangle(road.curve, (s - VIEW_M, s), edges))
+    way = _rectangle(encounter.curve, (s - aside, s + aside), (start, end))
+    free = PlacedBodies()
+    free.add(way[0].reshape(1, 3), way[1], 0.0)
+    occluder = np.array(encounter.occluder_pose)
+    if free.meets(occluder.reshape(1, 3), CATALOGUE[encounter.occluder].size[:2]):
+        return False
+    if not draft.has_room(*way) or not draft.stand(encounter.occluder, occluder):
+        return False
+    draft.reserve(*way)
+    for eye, seen in encounter.sight.lines:
+        (x, y), (to_x, to_y) = eye, seen
+        pose = (x + to_x) / 2, (y + to_y) / 2, np.arctan2(to_y - y, to_x - x)
+        draft.reserve(np.array(pose), (float(np.hypot(to_x - x, to_y - y)), VIEW_M))
     return True
 
 
@@ -46,8 +50,8 @@ def keep_walkers_off(
     encounters: Sequence[Encounter],
     span: Span,
 ) -> None:
-    """Let nobody else walk where the ego drives over pavements and carriageways, nor through those
-    who are met. `span` is that of the main road.
+    """Let nobody else walk or cycle where the ego drives over pavements, cycle lanes and
+    carriageways, nor through those who are met. `span` is that of the main road.
     """
     main = plan.main
     kept = []
@@ -57,7 +61,8 @@ def keep_walkers_off(
     if turned_into is not None:
         side, road = main.side(turned_into.sign), turned_into.road
         mouth = (-road.right.kerb_m, road.left.kerb_m)
-        kept.append(_rectangle(road.curve, (side.kerb_m, side.boundary_m), mouth))
+        # With the cycle lane: nobody who cycles along the main road is to give way to the ego.
+        kept.append(_rectangle(road.curve, (side.lane_edge_m, side.boundary_m), mouth))
     for one in encounters:
         length, width, _ = CATALOGUE[one.who].size
         to_d = one.from_d - one.side * one.walk.length_m

@@ -52,6 +52,8 @@ class Meeting:
     """From which it comes, "left" or "right"."""
     along_m: float
     """Where on the route its line is."""
+    way: str
+    """How the route runs while it comes into sight: "straight", "bend" or "turn"."""
     course: str
     """What comes of it if the ego drives on as it means to: "conflict", "near-miss" or "stop"."""
     occluder: str

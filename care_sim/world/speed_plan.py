@@ -10,6 +10,8 @@ from care_sim.world.route import Route
 
 _SPACING_M = 0.25
 """Between two places at which the plan is worked out; a bend begins within it."""
+_AS_PLANNED_MPS = 0.3
+"""A car that lacks no more than this goes as planned: twice what it gains in a keyframe."""
 
 
 @dataclass(frozen=True)
@@ -29,19 +31,23 @@ class SpeedPlan:
 
     def seconds_to(self, here: float, there: float, speed: float, gaining: float) -> float:
         """Seconds from `here` to `there` for a car that has `speed` m/s now and goes on gaining
-        speed by `gaining` m/s^2, 0 or more, where the plan allows it; 0 where it is past, inf for a
-        car that stands and stays.
+        speed by `gaining` m/s^2, 0 or more, where the plan allows it; one that goes as planned goes
+        on as planned. 0 where it is past, inf for a car that stands and stays.
         """
         if there <= here:
             return 0.0
+        # In a bend a car that goes as planned gains nothing, but will after it.
+        if speed > self.at(here) - _AS_PLANNED_MPS:
+            gaining = self.comfort_mps2
         places = np.linspace(here, there, max(int(np.ceil((there - here) / _SPACING_M)), 1) + 1)
         planned = np.interp(places, self._places, self._speeds)
         gained = np.sqrt(speed**2 + 2 * gaining * (places - here))
-        driven = np.minimum(planned, gained)
-        # Even acceleration from place to place: the mean of two speeds is that of the way between.
-        means = (driven[1:] + driven[:-1]) / 2
-        with np.errstate(divide="ignore"):
-            return float(np.sum(np.diff(places) / means))
+        return float(np.sum(_seconds_between(places, np.minimum(planned, gained))))
+
+    def times(self, places: Floats) -> Floats:
+        """(n,) seconds from the first of `places` (n,), ascending, to each, driven as planned."""
+        speeds = np.interp(places, self._places, self._speeds)
+        return np.concatenate([[0.0], np.cumsum(_seconds_between(places, speeds))])
 
     @cached_property
     def _places(self) -> Floats:
@@ -61,3 +67,11 @@ class SpeedPlan:
 
     def _reached(self, speed: float) -> float:
         return float(np.sqrt(speed**2 + 2 * self.comfort_mps2 * _SPACING_M))
+
+
+def _seconds_between(places: Floats, speeds: Floats) -> Floats:
+    """(n - 1,) seconds from each of `places` (n,) to the next for a car that has `speeds` there."""
+    # Even acceleration from place to place: the mean of two speeds is that of the way between.
+    means = (speeds[1:] + speeds[:-1]) / 2
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.diff(places) / means)

@@ -15,7 +15,7 @@ KINDS = {4: "child", 5: "bicycle", 6: "car"}
 def meeting(body, course, went):
     crosser = Crosser(Walk((0.0, 0.0), 0.0, 1.0, 1.0, 1.0), 1.0, lambda _walk: True)
     crosser.went = went
-    return Meeting(body, KINDS[body], "right", 50.0, course, "van", True, crosser)
+    return Meeting(body, KINDS[body], "right", 50.0, "turn", course, "van", True, crosser)
 
 
 def keyframe(index, sights, impact=None, needless=False):
@@ -58,7 +58,8 @@ def test_each_encounter_has_its_first_view_and_detection():
     assert second.detection_distance_m is None
     assert (first.set_off, second.set_off) == (True, False)
     assert (first.hit, second.hit) == (False, False)
-    assert (first.who, first.course, first.occluder_reported) == ("child", "conflict", True)
+    assert (first.who, first.way, first.course) == ("child", "turn", "conflict")
+    assert first.occluder_reported
 
 
 def test_a_drive_without_a_collision():

@@ -86,4 +86,4 @@ def test_rays_are_counted_as_fired(count):
 
 def test_without_an_actor_nobody_could_be_detected():
     result = outcome([keyframe(0, distance_m=np.inf), keyframe(1, distance_m=np.inf)])
-    assert (result.detection_distance_m, result.undetected_to_m) == (None, 0.0)
+    assert (result.detection_distance_m, result.undetected_to_m) == (None, None)

@@ -1,10 +1,12 @@
 import pytest
 
-from care_sim.base.errors import InvalidInput
 from care_sim.evaluation.censoring import Bound
 from care_sim.reports.cells import summarise
 from care_sim.reports.contrasts import BRAKED, DETECTED, DETECTION, contrast
-from care_sim.study.episode_config import EpisodeConfig
+from care_sim.reports.formatting import spread
+from care_sim.reports.tables.sweep import sweep_tables
+from care_sim.study.episode_config import grid
+from care_sim.study.rows.reading import with_added_columns
 from tests.helpers.made_rows import NEAREST_M, STUDY, row, rows
 
 
@@ -47,10 +49,35 @@ def test_against_a_miss_the_difference_is_a_bound():
     assert (gap.mean, gap.difference.bound, gap.counts) == (15.0 - NEAREST_M, Bound.AT_LEAST, True)
 
 
-def test_a_miss_without_its_bound_is_named():
-    blind = row(EpisodeConfig("dense", "care", seed=3), None, undetected_to_m=None)
-    with pytest.raises(InvalidInput, match=r"dense care seed 3: .*undetected_to_m"):
-        DETECTION.read(blind)
+def test_a_drive_that_meets_nobody_has_no_first_detection():
+    met, nobody = {}, {"undetected_to_m": None}
+    ours, theirs = (
+        [
+            row(config, distance, **(nobody if config.seed == 1 else met))
+            for config, distance in zip(
+                grid(["drive"], [policy], [budget], range(3)), distances, strict=True
+            )
+        ]
+        for policy, budget, distances in (
+            ("care", 0.03, [15.0, None, None]),
+            ("full", 1.0, [16.0, None, 16.0]),
+        )
+    )
+    care, _ = summarise([*ours, *theirs])
+    assert (care.episodes, care.met, care.never, care.as_full) == (3, 2, 1, 0)
+    assert care.detection.count == 2
+    assert care.regret.difference.pairs == 2
+    assert contrast(DETECTED, ours, theirs).difference.pairs == 2
+    assert contrast(BRAKED, ours, theirs).difference.pairs == 3
+    assert [each["regret_m"] for each in with_added_columns(ours + theirs)][:3] == [
+        1.0,
+        None,
+        16.0 - NEAREST_M,
+    ]
+    (table,) = sweep_tables(theirs)
+    assert any("1 of 3 episodes have no first-sighting actor" in note for note in table.notes)
+    (alone,) = summarise(theirs[1:2])
+    assert (alone.met, spread(alone.detection)) == (0, "-")
 
 
 def test_regret_is_what_the_full_scan_has_over_a_policy():

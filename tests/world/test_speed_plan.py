@@ -51,6 +51,20 @@ def test_seconds_of_a_car_that_gains_speed():
     assert STRAIGHT.seconds_to(0.0, 29.0, 5.0, 1.5) == pytest.approx(4.0, abs=0.01)
 
 
+def test_a_car_that_goes_as_planned_goes_on_as_planned_behind_a_bend():
+    plan = turning(8.0)
+    # In the bend it gains nothing; behind its end, at 70 m, 12 m at 1.5 m/s^2 make sqrt(52) m/s.
+    planned = plan.times(np.arange(65.0, 82.01, 0.25))[-1]
+    assert planned == pytest.approx(5 / 4 + (np.sqrt(52) - 4) / 1.5, abs=0.1)
+    assert plan.seconds_to(65.0, 82.0, 4.0, 0.0) == pytest.approx(planned)
+    # One that somebody holds up stays as slow.
+    assert plan.seconds_to(65.0, 82.0, 3.0, 0.0) == pytest.approx(17.0 / 3.0)
+
+
+def test_times_on_the_way():
+    assert STRAIGHT.times(np.array([10.0, 18.0, 34.0])).tolist() == pytest.approx([0.0, 1.0, 3.0])
+
+
 def test_a_bend_on_the_way_costs_time():
     plan = turning(8.0)
     straight = 120.0 / CRUISE

@@ -159,7 +159,7 @@ def _open_marker(axes: Axes, cell: Cell, style: Style, aside: float) -> None:
     }
     axes.plot([cell.budget], [0.0], **hollow, clip_on=False, transform=moved, zorder=5)
     axes.annotate(
-        f"{cell.never}/{cell.episodes} never",
+        f"{cell.never}/{cell.met} never",
         (cell.budget, 0.0),
         (aside, 7),
         textcoords="offset points",

@@ -16,7 +16,7 @@ from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.validation import WorldPlays, played_worlds
 from care_sim.study.designs.validate import CAMERA_POLICIES, MEMORISER
-from care_sim.study.rows.reading import detection
+from care_sim.study.rows.reading import detections
 from care_sim.study.run_config import FULL, Row
 
 VALIDATION_FIGURE = "validation"
@@ -38,7 +38,7 @@ class _Measure(NamedTuple):
 
 def _median(rows: Sequence[Row]) -> float:
     """A median that is not detected stands at 0."""
-    found = quartiles([detection(row) for row in rows])
+    found = quartiles(detections(rows))
     return math.nan if found is None else found.median or 0.0
 
 

@@ -102,7 +102,7 @@ def _values(cells: Sequence[Cell], policies: Sequence[str]) -> list[dict[str, An
             "low": cell.detection.low or 0.0,
             "high": cell.detection.high or 0.0,
             "text": spread(cell.detection),
-            "never": f"{cell.never}/{cell.episodes}",
+            "never": f"{cell.never}/{cell.met}",
         }
         for cell in cells
         if cell.policy in policies

@@ -66,7 +66,11 @@ def control_tables(setting: Setting, cells: Sequence[Cell], groups: Groups) -> l
 def _best(setting: Setting, controls: Sequence[str], budget: float, groups: Groups) -> str | None:
     """The best control at a budget at which one was played; None where they share no seed."""
     distances = {
-        control: {row["seed"]: detection(row).value for row in groups[setting, control, budget]}
+        control: {
+            row["seed"]: found.value
+            for row in groups[setting, control, budget]
+            if (found := detection(row)) is not None
+        }
         for control in controls
         if (setting, control, budget) in groups
     }

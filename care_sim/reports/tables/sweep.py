@@ -63,7 +63,7 @@ def levels_table(title: str, cells: Sequence[Cell]) -> Table:
     # A table of full scans alone lacks no regret.
     regretted = any(cell.regret for cell in cells) or all(cell.policy == FULL for cell in cells)
     missing = [] if regretted else ["Regret: full not run."]
-    notes = [*tag_notes(cell.tags for cell in cells), *missing]
+    notes = [*tag_notes(cell.tags for cell in cells), *missing, *_nobody_notes(cells)]
     # Without censored episodes the column holds zeros, and a terminal has no room for them.
     hidden = _FILES_ONLY if any(cell.never for cell in cells) else (*_FILES_ONLY, "never")
     return Table(title, SWEEP_COLUMNS, tuple(lines), tuple(notes), tuple(sentences), hidden, _WHOLE)
@@ -137,7 +137,7 @@ def _line(cell: Cell, published: PublishedResult | None) -> tuple[str, ...]:
         percent(cell.budget),
         marked(cell.policy, cell.tags),
         spread(cell.detection),
-        _share(cell.never, cell),
+        f"{cell.never}/{cell.met}",
         _share(cell.braked, cell),
         _median(cell.closest_pass, cell),
         _median(cell.clearance, cell),
@@ -157,6 +157,18 @@ def _paper(result: PublishedResult) -> str:
         return result.relation.value
     braked = "" if result.braked is None else f", {result.braked}/{PAPER_EPISODES}"
     return f"{result.detection_m:g}{braked}"
+
+
+def _nobody_notes(cells: Sequence[Cell]) -> list[str]:
+    """How many episodes first detections leave out, where there are any."""
+    left_out = sorted({(cell.episodes - cell.met, cell.episodes) for cell in cells})
+    named = [f"{count} of {all_of}" for count, all_of in left_out if count]
+    if not named:
+        return []
+    return [
+        f"{', '.join(named)} episodes have no first-sighting actor, since the drive meets nobody: "
+        "first detection, never and regret leave them out."
+    ]
 
 
 def _share(count: int, cell: Cell) -> str:

@@ -12,7 +12,7 @@ from care_sim.reports.formatting import interval, marked, mean, median, tag_note
 from care_sim.reports.table import Bold, Table
 from care_sim.reports.validation import SEPARATED, Lead, WorldPlays, played_worlds
 from care_sim.study.designs.validate import MEMORISER, is_training
-from care_sim.study.rows.reading import detection
+from care_sim.study.rows.reading import detections, is_missed
 from care_sim.study.run_config import FULL, Row
 
 _Line = tuple[str, ...]
@@ -144,7 +144,7 @@ def _hits(world: WorldPlays, budget: float) -> _Line:
     played = [world.played(policy, budget) if policy else [] for policy in named]
     return (
         percent(budget),
-        _share([row["collision"] or detection(row).censored for row in full]),
+        _share([row["collision"] or is_missed(row) for row in full]),
         *(_share([row["collision"] for row in rows]) for rows in played),
     )
 
@@ -199,5 +199,5 @@ def _level_table(world: WorldPlays) -> Table:
 
 
 def _level(rows: Sequence[Row]) -> str:
-    found = median(quartiles([detection(row) for row in rows]))
+    found = median(quartiles(detections(rows)))
     return f"{found}, {_share([row['collision'] for row in rows])}" if rows else ""

@@ -10,7 +10,6 @@ from dataclasses import fields
 from typing import Any
 
 from care_sim.base.checks import is_number
-from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS
 from care_sim.evaluation.censoring import Reading
 from care_sim.evaluation.sightings import ANNOTATED
@@ -111,19 +110,26 @@ def full_of(groups: Groups, setting: Setting) -> Sequence[Row] | None:
     return groups.get((setting.for_full(), "full", 1.0))
 
 
-def detection(row: Row) -> Reading:
-    """Detection distance in metres; of an actor never detected, the most it can have been.
-
-    Raises InvalidInput for a row that has neither.
+def detection(row: Row) -> Reading | None:
+    """Detection distance in metres; of an actor never detected, the most it can have been. None of
+    an episode without a first-sighting actor: a drive that meets nobody.
     """
     distance = row["detection_distance_m"]
+    if distance is not None:
+        return Reading(float(distance))
     most = row["undetected_to_m"]
-    if distance is None and most is None:
-        raise InvalidInput(
-            f"{row['scenario']} {row['policy']} seed {row['seed']}: one of detection_distance_m "
-            "and undetected_to_m must be given"
-        )
-    return Reading(float(most), censored=True) if distance is None else Reading(float(distance))
+    return None if most is None else Reading(float(most), censored=True)
+
+
+def detections(rows: Sequence[Row]) -> list[Reading]:
+    """Those of all rows that have a first-sighting actor."""
+    return [found for found in map(detection, rows) if found is not None]
+
+
+def is_missed(row: Row) -> bool:
+    """Whether there was a first-sighting actor who was never detected."""
+    found = detection(row)
+    return found is not None and found.censored
 
 
 _FullScans = dict[tuple[Setting, int], Row]
@@ -133,7 +139,8 @@ def with_added_columns(rows: Sequence[Row]) -> list[Row]:
     """The rows with three more columns.
 
     `tags` of the policy, joined by '+'. `regret_m`: detection distance of the full scan of the same
-    world and seed minus that of this row, 0 at best, None where the full scan was not run.
+    world and seed minus that of this row, 0 at best, None where the full scan was not run and where
+    nobody is met.
     `censored`: the policy, or that full scan, never detected the actor, so that `regret_m` takes
     the most that its distance can have been and is a bound.
     """
@@ -148,8 +155,7 @@ def with_tags(rows: Sequence[Row]) -> list[Row]:
 
 def _regret(row: Row, full: _FullScans) -> Row:
     bound = full.get((setting_of(row).for_full(), row["seed"]))
-    ours = detection(row)
-    if bound is None:
-        return {"regret_m": None, "censored": ours.censored}
-    theirs = detection(bound)
+    ours, theirs = detection(row), detection(bound) if bound else None
+    if ours is None or theirs is None:
+        return {"regret_m": None, "censored": is_missed(row)}
     return {"regret_m": theirs.value - ours.value, "censored": ours.censored or theirs.censored}
