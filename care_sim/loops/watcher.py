@@ -19,6 +19,17 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.camera import faultless_detections
+from care_sim.world.world import Actor, World
+
+
+def sought(world: World) -> list[Actor]:
+    """Whom the episode is about: everybody whom a drive lets the ego meet, in the order of the way,
+    else the first-sighting actor; empty without either.
+    """
+    if world.meetings:
+        actors = {actor.body: actor for actor in world.actors}
+        return [actors[one.body] for one in world.meetings]
+    return [world.first_sighting] if world.first_sighting else []
 
 
 @dataclass(frozen=True)
