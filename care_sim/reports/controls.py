@@ -8,8 +8,8 @@ from care_sim.reports.formatting import MARKS
 BEST_CONTROL = "best control"
 """What the line begins with that names it at every budget."""
 IN_HINDSIGHT = (
-    "It is chosen anew at each budget, by the very results that are compared. Such a choice in "
-    "hindsight favours the control, which is the strict reading."
+    f"The {BEST_CONTROL} is chosen anew at each budget, by the very results that are compared. "
+    "Such a choice in hindsight favours the control, which is the strict reading."
 )
 
 

@@ -58,9 +58,9 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
         size=10,
     )
     trained = ", ".join(percent(budget) for budget in config["budget"])
-    drawn = "; thin: each training seed, thick: their mean" if seeds > 1 else ""
+    drawn = "thin: each training seed, thick: their mean\n" if seeds > 1 else ""
     axes.set_xlabel(
-        f"environment steps, in thousands{drawn}\ntrained at budget {trained}\n"
+        f"environment steps, in thousands\n{drawn}trained at budget {trained}\n"
         f"a point is the mean of {config['episodes']} validation episodes at "
         f"{percent(config['budget'][0])}"
     )

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 import numpy as np
 from PIL import Image
 
-from care_sim.core.frames import Frame, Pose
+from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.loops.watcher import way_ahead
 from care_sim.world.bodies import BodyKind, Part, Triple
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
@@ -85,17 +86,6 @@ def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float)
         bar = _slab("bar", (0.15, guarded_m, 0.04), 0.02, _BAR)
         scene.add(bar, way_ahead(world, sensor_x, mark))
     scene.add(world.ego_kind, world.ego.pose)
-
-
-def way_ahead(world: World, sensor_x: float, ahead: float) -> Pose:
-    """World pose of the middle of the way `ahead` metres before the LiDAR, which is `sensor_x`
-    ahead of the car's centre.
-    """
-    if world.route is not None:
-        return world.route.pose(world.along_m + sensor_x + ahead)
-    x, y, yaw = world.ego.pose
-    reach = sensor_x + ahead
-    return x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw
 
 
 def _slab(name: str, size: Triple, middle_z: float, colour: Triple) -> BodyKind:

@@ -12,6 +12,7 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import CLASSES, Tracks
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
+from care_sim.loops.watcher import way_ahead
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.camera_views import (
@@ -34,7 +35,6 @@ from care_sim.viewer.pictures.furnished_world import (
     add_car,
     furnished,
     photograph,
-    way_ahead,
 )
 from care_sim.viewer.pictures.sought import HIT, contact_text, mark_sought
 
