@@ -203,7 +203,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         `info` holds the seed that repeats the episode, unless `scoring_info` is off. There are no
         `options`.
         """
-        self._reseed(seed)
+        self._reseed(seed, options)
         entropy = self._draw_entropy(seed)
         scenario, camera, lidar, floor, odometry = self._streams(entropy, count=5)
         seeds = SensorSeeds(camera, lidar, odometry)

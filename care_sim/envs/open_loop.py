@@ -182,7 +182,7 @@ class FilmEnv(OpenLoopEnv):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin the scene anew. `info` holds what repeats the episode; there are no `options`."""
-        self._reseed(seed)
+        self._reseed(seed, options)
         return self._start(self.film, self._draw_entropy(seed))
 
 

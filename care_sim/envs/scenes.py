@@ -34,7 +34,7 @@ class StreetEnv(OpenLoopEnv):
 
         `info` holds what repeats it; there are no `options`.
         """
-        self._reseed(seed)
+        self._reseed(seed, options)
         entropy = self._draw_entropy(seed)
         return self._start(street_film(entropy, self._secret), entropy)
 

@@ -101,11 +101,17 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         """What privileged policies may ask for; `make_policy` hands it to them alone."""
         return EpisodeTruth(lambda: self.loop)
 
-    def _reseed(self, seed: int | None) -> None:
+    def _reseed(self, seed: int | None, options: dict[str, Any] | None) -> None:
         """Begin the environment's own generator anew if a seed is given.
 
-        Raises InvalidInput unless it is a whole number from 0 to 2^63 - 1.
+        Raises InvalidInput unless it is a whole number from 0 to 2^63 - 1, and for any `options` of
+        `reset`: there are none.
         """
+        if options:
+            raise InvalidInput(
+                f"reset takes no options, got {shown(options)}; what an episode is made of are "
+                "arguments of the environment"
+            )
         if seed is not None:
             check_seed(seed)
             super().reset(seed=int(seed))

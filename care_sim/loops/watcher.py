@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from care_sim.core.actions import shares_of
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.belief import Belief
-from care_sim.core.frames import Frame
+from care_sim.core.frames import Frame, Pose
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.types import Action, Demand, ImageDetections
@@ -19,6 +19,34 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.camera import faultless_detections
+from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.world.world import Actor, World
+
+WAY_M = 40.0
+"""How far ahead of the sensor the car's way is told."""
+_PIECES = 40
+"""Of a way that may bend."""
+
+
+def sought(world: World) -> list[Actor]:
+    """Whom the episode is about: everybody whom a drive lets the ego meet, in the order of the way,
+    else the first-sighting actor; empty without either.
+    """
+    if world.meetings:
+        actors = {actor.body: actor for actor in world.actors}
+        return [actors[one.body] for one in world.meetings]
+    return [world.first_sighting] if world.first_sighting else []
+
+
+def way_ahead(world: World, sensor_x: float, ahead: float) -> Pose:
+    """World pose of the middle of the way `ahead` metres before the LiDAR, which is `sensor_x`
+    ahead of the car's centre.
+    """
+    if world.route is not None:
+        return world.route.pose(world.along_m + sensor_x + ahead)
+    x, y, yaw = world.ego.pose
+    reach = sensor_x + ahead
+    return x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw
 
 
 @dataclass(frozen=True)
@@ -36,6 +64,10 @@ class TrueSituation:
     """The LiDAR in the world."""
     ego: Floats
     """(7,) the box of the car."""
+    way: Floats
+    """(n, 3) world poses on the car's way, the middles of n equal pieces of `WAY_M` metres from the
+    sensor on; one piece where no route bends it.
+    """
     names: tuple[str, ...]
     """(n,) of all actors."""
     labels: tuple[int | None, ...]
@@ -75,6 +107,12 @@ class WatchedKeyframe:
         return cells, grid.directions[cells] * ranges[cells, None]
 
 
+def _way(world: World) -> Floats:
+    pieces = 1 if world.route is None else _PIECES
+    middles = (np.arange(pieces) + 0.5) * WAY_M / pieces
+    return np.array([way_ahead(world, LIDAR_POSITION[0], ahead) for ahead in middles.tolist()])
+
+
 class EpisodeWatcher:
     """Follows the running episode of a loop: `situation` is asked before every keyframe, `watched`
     after it.
@@ -96,6 +134,7 @@ class EpisodeWatcher:
             time_s=world.time,
             sensor=loop.sensor,
             ego=world.boxes_of(np.array([world.ego_body]))[0],
+            way=_way(world),
             names=tuple(actor.name for actor in world.actors),
             labels=tuple(actor.label for actor in world.actors),
             bodies=world.boxes(world.actors).copy(),

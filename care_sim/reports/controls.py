@@ -2,19 +2,30 @@
 
 from collections.abc import Iterable, Mapping
 
+from care_sim.base.errors import percent
 from care_sim.reports.formatting import MARKS
 
 BEST_CONTROL = "best control"
 """What the line begins with that names it at every budget."""
 IN_HINDSIGHT = (
-    "It is chosen anew at each budget, by the very results that are compared. Such a choice in "
-    "hindsight favours the control, which is the strict reading."
+    f"The {BEST_CONTROL} is chosen anew at each budget, by the very results that are compared. "
+    "Such a choice in hindsight favours the control, which is the strict reading."
 )
 
 
 def candidates(controls: Iterable[str]) -> str:
     """Among which controls the best one is chosen, in a sentence."""
     return f"Candidates: {', '.join(controls)}."
+
+
+def named_by_budget(controls: Mapping[float, str]) -> str:
+    """The best control of each budget, in words: each control once, with its budgets."""
+    if len({*controls.values()}) == 1:
+        return f"{next(iter(controls.values()))} at every budget"
+    budgets: dict[str, list[str]] = {}
+    for budget, control in controls.items():
+        budgets.setdefault(control, []).append(percent(budget))
+    return " and ".join(f"{control} at {', '.join(own)}" for control, own in budgets.items())
 
 
 def is_control(tags: tuple[str, ...]) -> bool:

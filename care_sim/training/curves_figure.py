@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from care_sim.base.errors import percent
 from care_sim.policies import tags_of
 from care_sim.reports.figures.styles import FULL_STYLE, styles
 from care_sim.training.curves import TrainingRun
@@ -56,11 +57,12 @@ def _describe(axes: Axes, config: Mapping[str, Any], seeds: int) -> None:
         loc="left",
         size=10,
     )
-    trained = ", ".join(f"{budget:.3g}" for budget in config["budget"])
+    trained = ", ".join(percent(budget) for budget in config["budget"])
+    drawn = "thin: each training seed, thick: their mean\n" if seeds > 1 else ""
     axes.set_xlabel(
-        f"environment steps, in thousands\ntrained at budget {trained}\n"
+        f"environment steps, in thousands\n{drawn}trained at budget {trained}\n"
         f"a point is the mean of {config['episodes']} validation episodes at "
-        f"{config['budget'][0]:.3g}"
+        f"{percent(config['budget'][0])}"
     )
     axes.xaxis.set_major_formatter(lambda steps, _: f"{steps / 1000:g}")
     axes.spines[["top", "right"]].set_visible(False)

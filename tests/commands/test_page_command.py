@@ -39,6 +39,12 @@ def test_a_page_is_written_and_the_folder_left_alone(results, tmp_path, capsys):
     assert "@import" not in page
 
 
+def test_a_page_takes_the_place_of_the_one_before(results, tmp_path, capsys):
+    for _ in range(2):
+        code, _, err = report(capsys, results, "-o", tmp_path / "report.html", "--episodes", 0)
+        assert code == 0, err
+
+
 def test_the_same_results_make_the_same_page(results, tmp_path, capsys):
     for name in ("one.html", "two.html"):
         report(capsys, results, "-o", tmp_path / name, "--episodes", 0)

@@ -10,6 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import care_sim
+from care_sim.base.errors import InvalidInput
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.envs.closed_loop import ClosedLoopEnv
@@ -460,3 +461,12 @@ def test_reward_weights_can_be_changed():
     env = make("CARE-Dartout-v0", reward_weights={"delay": 7.0}).unwrapped
     assert env._weights["delay"] == 7.0
     assert env._weights["collision"] == REWARD_WEIGHTS["collision"]
+
+
+@pytest.mark.parametrize("name", ["CARE-NCAP-v0", "CARE-Street-v0"])
+def test_reset_takes_no_options(name):
+    with (
+        gymnasium.make(name, disable_env_checker=True) as env,
+        pytest.raises(InvalidInput, match=r"reset takes no options, got \{'test': 'CPNA-25'\}"),
+    ):
+        env.reset(seed=0, options={"test": "CPNA-25"})

@@ -8,7 +8,9 @@ import pytest
 
 import care_sim
 from care_sim.envs.wrappers.watching import Watching
+from care_sim.loops.watcher import WAY_M, EpisodeWatcher
 from care_sim.sensors.confidence import MIN_PIXELS
+from care_sim.sensors.lidar import LIDAR_POSITION
 
 
 class Notes(Watching):
@@ -124,3 +126,28 @@ def test_a_refused_action_does_not_confuse_the_witness():
             notes.step(action)
         assert all(not watched.situation.false.any() for watched in notes.moments)
         assert len(notes.moments) == 6
+
+
+def ways(name, seed):
+    """The way at the start, in the sensor frame."""
+    with gymnasium.make(name, disable_env_checker=True) as env:
+        env.reset(seed=seed)
+        situation = EpisodeWatcher(env.unwrapped.loop, 0.0).situation()
+        boxes = np.zeros((len(situation.way), 7))
+        boxes[:, [0, 1, 6]] = situation.way
+        return situation.sensor.boxes_to_local(boxes)
+
+
+def test_the_way_straight_ahead_is_one_piece():
+    ((x, y, *_, yaw),) = ways("CARE-Dartout-v0", 0)
+    assert (x, y, yaw) == pytest.approx((WAY_M / 2, 0.0, 0.0))
+
+
+def test_the_way_follows_the_turn_of_the_route():
+    # The car of this drive turns left after 33.67 m, with a radius of 10 m.
+    way = ways("CARE-Drive-v0", 122)
+    steps = np.hypot(*np.diff(way[:, :2], axis=0).T)
+    assert steps == pytest.approx(np.full(len(way) - 1, WAY_M / len(way)), abs=0.01)
+    assert way[-1, 0] > 35
+    assert way[-1, 6] == pytest.approx((LIDAR_POSITION[0] + WAY_M - 0.5 - 33.671) / 10.0, abs=1e-3)
+    assert way[-1, 1] > 0.5

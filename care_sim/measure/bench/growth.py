@@ -106,6 +106,7 @@ def growth_figure(report: BenchReport) -> Figure:
         axes.set_xticks(curve["values"], curve["labels"])
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel(label)
+    panels[0].yaxis.set_major_formatter("{x:g}")
     panels[0].set_ylabel("a scan, poses included (ms)")
     panels[0].legend(frameon=False, fontsize=8)
     scans = report["scans"]

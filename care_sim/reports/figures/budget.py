@@ -11,7 +11,14 @@ from matplotlib.transforms import ScaledTranslation
 
 from care_sim.base.errors import percent
 from care_sim.reports.cells import Cell, summarise
-from care_sim.reports.figures.styles import CLOSED_LOOP_DODGE, FULL_STYLE, Style, bare_axes, styles
+from care_sim.reports.figures.styles import (
+    APART,
+    CLOSED_LOOP_DODGE,
+    FULL_STYLE,
+    Style,
+    bare_axes,
+    styles,
+)
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.scenarios import SCENARIOS
 from care_sim.study.run_config import Row
@@ -65,9 +72,8 @@ def budget_figure(cells: Sequence[Cell]) -> Figure:
     counts = sorted({cell.episodes for cell in cells})
     seeds = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     axes.set_title(f"{cells[0].setting.world}: {seeds} seeds a point", loc="left", fontsize=10)
-    axes.set_xlabel(
-        "\n".join(["budget (share of cells fired)", *tag_notes(tags for _, tags in policies)])
-    )
+    notes = ["budget (share of cells fired)", APART, *tag_notes(tags for _, tags in policies)]
+    axes.set_xlabel("\n".join(notes))
     axes.set_ylabel("first detection (m, median and quartiles)")
     bare_axes(axes, "0.92")
     return figure

@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.reports.controls import BEST_CONTROL
-from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, bare_axes, styles
+from care_sim.reports.figures.styles import OPEN_LOOP_DODGE, bare_axes, name_outside, styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.protocol.controls import RULE, OverControl, named_controls
 from care_sim.reports.protocol.rows import SettingPlays
 
-_NOTE_WIDTH = 110
+_NOTE_WIDTH = 100
 """Letters of a note in one line below the panels."""
 
 
@@ -39,9 +39,7 @@ def control_figure(plays: SettingPlays, measures: Sequence[OverControl]) -> Figu
         *tag_notes(plays.tags[policy] for policy in measures[0].differences),
     ]
     figure.supxlabel("\n".join(notes), fontsize=9)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
-    )
+    name_outside(figure, panels)
     return figure
 
 

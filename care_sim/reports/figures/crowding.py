@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from care_sim.base.errors import percent
+from care_sim.reports.contrasts import GATE_M
 from care_sim.reports.formatting import mean
 from care_sim.reports.table import Bold
 from care_sim.reports.tables.crowding import COLLAPSE_M, Crowd
@@ -82,7 +83,9 @@ def _finish(axes: Axes, crowd: Crowd) -> None:
     axes.set_ylabel("standing vehicles")
     seeds = len({row["seed"] for row in crowd.study.rows})
     title = (
-        f"dense, {seeds} seeds. Bold: interval without zero; asterisk: gate met; frame: collapsed"
+        f"dense, {seeds} seeds. Bold: interval without zero; asterisk: and at least {GATE_M} m\n"
+        "frame: all-camera collapsed; ≤: at most, where it never detected somebody; ~: where both "
+        "did not"
     )
     axes.set_title(title, loc="left", fontsize=8)
     axes.tick_params(length=0)

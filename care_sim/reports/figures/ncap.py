@@ -44,6 +44,11 @@ def ncap_figure(rows: Sequence[Row]) -> Figure:
     _name_axes([*panels[:, 0]], results, speeds)
     for axes in panels[-1]:
         axes.set_xlabel("test speed (km/h)", fontsize=7)
+    seeds = len({row["seed"] for row in rows})
+    title = f"mean score of {seeds} seeds; pale: no test at this speed"
+    figure.suptitle(title, x=0.01, ha="left", fontsize=8)
+    note = "reported, unreported: whether perception knows the cars that hide the target"
+    figure.supxlabel(note, fontsize=7)
     bar = figure.colorbar(image, ax=panels, fraction=0.02, pad=0.01)
     bar.set_label("score (5 avoided, 0 hit at full speed)", fontsize=7)
     bar.ax.tick_params(labelsize=7)

@@ -2,15 +2,25 @@
 them, and the policies over the best control.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
 from care_sim.reports.figures.controls import control_figure
-from care_sim.reports.figures.styles import FULL_STYLE, OPEN_LOOP_DODGE, Style, bare_axes, styles
+from care_sim.reports.figures.styles import (
+    APART,
+    FULL_STYLE,
+    OPEN_LOOP_DODGE,
+    Style,
+    bare_axes,
+    name_outside,
+    styles,
+)
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.protocol.controls import over_controls
 from care_sim.reports.protocol.paper import published_level
@@ -18,6 +28,7 @@ from care_sim.reports.protocol.rows import SettingPlays, plays_by_setting
 from care_sim.study.rows.settings import SOURCES
 from care_sim.study.run_config import FULL, REFERENCE, Row
 
+_PANELS_A_LINE = 4
 _KINDS = ("pareto", "levels", "controls")
 PROTOCOL_FIGURES = tuple(
     f"{kind}-{source}{rest}" for kind in _KINDS for source in SOURCES for rest in ("", "-*")
@@ -53,8 +64,12 @@ def pareto_figure(plays: SettingPlays) -> Figure:
     What lies below and left of the staircase is beaten in one recall and not better in the other.
     Open markers show what lies under them; that of CARE is filled.
     """
-    figure = Figure(figsize=(8.4, 3.6), layout="constrained")
-    panels = figure.subplots(1, len(plays.budgets), squeeze=False)[0]
+    lines = math.ceil(len(plays.budgets) / _PANELS_A_LINE)
+    figure = Figure(figsize=(8.4, 1.2 + 2.4 * lines), layout="constrained")
+    grid = figure.subplots(lines, math.ceil(len(plays.budgets) / lines), squeeze=False)
+    panels, left_over = grid.flat[: len(plays.budgets)], grid.flat[len(plays.budgets) :]
+    for axes in left_over:
+        axes.set_axis_off()
     drawn = styles(plays.tags.items())
     for axes, budget in zip(panels, plays.budgets, strict=True):
         points = {
@@ -62,8 +77,8 @@ def pareto_figure(plays: SettingPlays) -> Figure:
         }
         _draw_recalls(axes, points, drawn, plays)
         axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
-    panels[0].set_ylabel("first-sighting recall (%)")
-    _name_markers(figure, panels[0], plays)
+    figure.supylabel("first-sighting recall (%)", fontsize=10)
+    _name_markers(figure, [*panels], plays)
     return figure
 
 
@@ -129,25 +144,19 @@ def _staircase(axes: Axes, points: Mapping[str, Point]) -> None:
     axes.set(xlim=(left, right), ylim=(low, high))
 
 
-def _name_markers(figure: Figure, axes: Axes, plays: SettingPlays) -> None:
+def _name_markers(figure: Figure, panels: Sequence[Axes], plays: SettingPlays) -> None:
     """The title, the markers by policy, what the full scan reaches, and what the grey line is."""
     figure.suptitle(plays.title, x=0.01, ha="left", fontsize=10)
     ceiling = recalls(plays, FULL, 1.0) if plays.full else None
     reached = (
-        f"; full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall"
+        [f"full scan: {ceiling[1]:.1f}% of first sightings, {ceiling[0]:.1f}% overall"]
         if ceiling
-        else ""
+        else []
     )
-    line = f"grey line: Pareto frontier of the policies that a car can have{reached}"
-    figure.supxlabel(
-        "\n".join(["overall recall (%)", line, *tag_notes(plays.tags.values())]), fontsize=9
-    )
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
-    )
-
-
-APART = "policies are drawn a little apart sideways, so that equal points stay visible"
+    line = "grey line: Pareto frontier of the policies that a car can have"
+    notes = ["overall recall (%)", line, *reached, *tag_notes(plays.tags.values())]
+    figure.supxlabel("\n".join(notes), fontsize=9)
+    name_outside(figure, panels)
 
 
 def levels_figure(plays: SettingPlays) -> Figure:
@@ -170,9 +179,7 @@ def levels_figure(plays: SettingPlays) -> Figure:
     apart = [APART] if len(plays.tags) > 1 else []
     notes = ["budget (share of cells fired)", *apart, *tag_notes(plays.tags.values())]
     figure.supxlabel("\n".join(notes), fontsize=9)
-    figure.legend(
-        *panels[1].get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9
-    )
+    name_outside(figure, panels)
     return figure
 
 
@@ -199,8 +206,10 @@ def _draw_levels(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:
             zorder=order,
             linewidth=1.4,
         )
-        line[0].set(marker=look.marker, markersize=6, markeredgecolor="white", markeredgewidth=0.5)
-        line[0].set_label(marked(policy, plays.tags[policy]))
+        line[0].set(marker=look.marker, markersize=6, label=marked(policy, plays.tags[policy]))
+        # A thin marker is nothing but its edge.
+        if look.marker in Line2D.filled_markers:
+            line[0].set(markeredgecolor="white", markeredgewidth=0.5)
 
 
 def _draw_published(axes: Axes, plays: SettingPlays, ratio: Ratio) -> None:

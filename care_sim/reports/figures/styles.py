@@ -1,11 +1,12 @@
 """Colours, markers and lines of policies, the same in every figure."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from typing import Literal, NamedTuple
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from care_sim.reports.formatting import MARKS
 
@@ -48,6 +49,11 @@ _MARKERS = ("H", "8", "d", "s", "^")
 FULL_STYLE = Style("0.35", "_", "--")
 
 
+APART = "policies are drawn a little apart sideways, so that equal points stay visible"
+_LEGEND_LINE_INCHES = 0.204
+_LEGEND_FRAME_INCHES = 0.35
+
+
 class Dodge(NamedTuple):
     """How far the curves of policies are moved apart sideways, so that equal ones stay visible.
 
@@ -72,6 +78,22 @@ def bare_axes(axes: Axes, grid: str, lines: Literal["both", "y"] = "y") -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis=lines, color=grid)
     axes.set_axisbelow(True)
+
+
+def name_outside(figure: Figure, panels: Sequence[Axes]) -> None:
+    """A legend right of the panels with everything that any of them names, once; a figure that is
+    too low for it grows.
+    """
+    named = {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        named.values(), named.keys(), loc="outside right upper", frameon=False, fontsize=9
+    )
+    needed = _LEGEND_FRAME_INCHES + _LEGEND_LINE_INCHES * len(named)
+    figure.set_figheight(max(figure.get_figheight(), needed))
 
 
 def styles(policies: Iterable[tuple[str, tuple[str, ...]]]) -> dict[str, Style]:

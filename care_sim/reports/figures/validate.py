@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.censoring import quartiles
-from care_sim.reports.controls import BEST_CONTROL
-from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, styles
+from care_sim.reports.controls import BEST_CONTROL, named_by_budget
+from care_sim.reports.figures.styles import FULL_STYLE, Style, bare_axes, name_outside, styles
 from care_sim.reports.formatting import marked, tag_notes
 from care_sim.reports.validation import WorldPlays, played_worlds
 from care_sim.study.designs.validate import CAMERA_POLICIES, MEMORISER
@@ -21,7 +21,10 @@ from care_sim.study.run_config import FULL, Row
 
 VALIDATION_FIGURE = "validation"
 _SHOWN = ("random", "history", *CAMERA_POLICIES, MEMORISER)
-_CONTROL_STYLE = Style("#CC6677", "8")
+_CONTROL_STYLE = Style("#994F00", "8")
+"""Of no control: the best one differs from budget to budget."""
+_BELOW = 0.05
+"""Share of the height of a panel that is left below zero, so that what stands there is seen."""
 _BAND = 0.7
 """Share of the way from one world to the next that the markers of a world take."""
 
@@ -67,23 +70,28 @@ def validation_figures(rows: Sequence[Row]) -> dict[str, Figure]:
             _draw(axes, worlds, budget, measure, tags)
         line[0].set_ylabel(measure.label)
         # All panels of a line share their heights, and zero is in sight.
-        line[0].set_ylim(0, measure.height)
+        highest = measure.height or line[0].get_ylim()[1]
+        line[0].set_ylim(-_BELOW * highest, highest)
     for axes, budget in zip(panels[0], budgets, strict=True):
         axes.set_title(f"budget {percent(budget)}", loc="left", fontsize=10)
     for axes in panels[-1]:
         axes.set_xticks(range(len(worlds)), _names(worlds), rotation=30, ha="right", fontsize=8)
-    notes = tag_notes(tags[policy] for policy in _SHOWN if policy in tags)
+    marks = tag_notes(tags[policy] for policy in _SHOWN if policy in tags)
     seeds = len({row["seed"] for world in worlds for row in world.test_rows})
-    title = f"{worlds[0].setting.label}, then with one factor changed: {seeds} test seeds"
+    changed = ", then with one factor changed" if len(worlds) > 1 else ""
+    title = f"{worlds[0].setting.label}{changed}: {seeds} test seeds"
     figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-    figure.supxlabel("\n".join(("at 0 m: not detected", *notes)), fontsize=9)
-    figure.legend(
-        *panels[0][0].get_legend_handles_labels(),
-        loc="outside right upper",
-        frameon=False,
-        fontsize=9,
-    )
+    notes = ["at 0 m: not detected", *_control_note(worlds[0]), *marks]
+    figure.supxlabel("\n".join(notes), fontsize=9)
+    name_outside(figure, panels[0])
     return {VALIDATION_FIGURE: figure}
+
+
+def _control_note(world: WorldPlays) -> list[str]:
+    """Which control is the best one of a world, if it has any."""
+    chosen = {budget: world.best_control(budget) for budget in world.budgets}
+    known = {budget: control for budget, control in chosen.items() if control}
+    return [f"{BEST_CONTROL} of {world.setting.world}: {named_by_budget(known)}"] if known else []
 
 
 def _names(worlds: Sequence[WorldPlays]) -> list[str]:

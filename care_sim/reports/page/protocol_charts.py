@@ -9,8 +9,8 @@ import altair as alt
 
 from care_sim.base.errors import percent
 from care_sim.evaluation.scene_contrasts import FIRST_SIGHTING, OVERALL, Ratio
-from care_sim.reports.figures.protocol import APART, Point, frontier, recalls
-from care_sim.reports.figures.styles import OPEN_LOOP_DODGE
+from care_sim.reports.figures.protocol import Point, frontier, recalls
+from care_sim.reports.figures.styles import APART, OPEN_LOOP_DODGE
 from care_sim.reports.formatting import MARKS, marked, tag_notes
 from care_sim.reports.page.chart import (
     FULL_SCAN,

@@ -23,6 +23,7 @@ from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
+from care_sim.loops.watcher import sought
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
@@ -33,6 +34,8 @@ SECTORS = 128
 """Sectors in which fired cells are counted, from azimuth -pi on."""
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 """The digits that say how full a sector is, from none of its cells to all of them."""
+_WAY_STEP_M = 2.0
+"""Between two points of the way: on a turn of 7 m the line between them is 7 cm off."""
 _CENTI = 100
 _MILLI = 1000
 
@@ -74,16 +77,21 @@ class Recorder:
     """
 
     actors: Sequence[Actor] = ()
+    sought: Sequence[Actor] = ()
     first_sighting: Actor | None = None
     ego_size: tuple[float, ...] = ()
     poses: list[list[Pose]] = field(default_factory=list)
     moments: list[dict[str, Any]] = field(default_factory=list)
     rays: list[str] = field(default_factory=list)
+    sights: list[list[str]] = field(default_factory=list)
+    hit: dict[str, Any] | None = None
+    way: list[list[int]] | None = None
     tracked: dict[int, list[Any]] = field(default_factory=dict)
 
     def before(self, loop: ClosedLoop) -> None:
         """Take down the world and the belief at the start."""
         self.actors = loop.world.actors
+        self.sought = sought(loop.world)
         self.first_sighting = loop.world.first_sighting
         self.ego_size = loop.world.ego_kind.size
         self._take(loop)
@@ -91,7 +99,16 @@ class Recorder:
     def after(self, loop: ClosedLoop, frame: Keyframe) -> None:
         """Take down what a keyframe fired, and what there is after it."""
         self.rays.append(fullness(frame.fired, loop.rig.grid))
+        self.sights.append(_sights(loop, frame))
+        if frame.impact:
+            kinds = {actor.body: actor.kind.name for actor in self.actors}
+            self.hit = {
+                "kind": kinds[frame.impact.body],
+                "at_front": frame.impact.at_front,
+                "speed": _whole(frame.impact.speed_mps, _CENTI),
+            }
         self._take(loop)
+        self.way = _way(loop)
 
     def bodies(self) -> list[dict[str, Any]]:
         """Name, class, size and place of every body; `poses` of those that move."""
@@ -104,7 +121,13 @@ class Recorder:
             "size": _whole(np.array(self.ego_size[:2]), _CENTI),
             "sensor": _whole(LIDAR_POSITION[0], _CENTI),
         }
-        return {"ego": ego, "tracked": self.tracked, "rays": self.rays, **columns}
+        # How it stands with each at every keyframe, and whom the strips and distances are of.
+        about = self.first_sighting.kind.name if self.first_sighting else None
+        states = ["".join(each) for each in zip(*self.sights, strict=True)]
+        bodies = [self.actors.index(actor) for actor in self.sought]
+        whole = {"about": about, "sought": [*zip(bodies, states, strict=True)]}
+        told = {"hit": self.hit, "way": self.way, **whole}
+        return {"ego": ego, "tracked": self.tracked, "rays": self.rays, **told, **columns}
 
     def _take(self, loop: ClosedLoop) -> None:
         world = loop.world
@@ -149,11 +172,31 @@ class Recorder:
             "kind": actor.kind.name,
             "size": _whole(np.array(actor.kind.size[:2]), _CENTI),
             "reported": actor.label is not None,
-            "sought": actor is self.first_sighting,
+            "sought": actor in self.sought,
         }
         # In whole centimetres and milliradians: what moves less stands still in the picture.
         still = bool((poses == poses[0]).all())
         return about | ({"pose": poses[0].tolist()} if still else {"poses": poses.tolist()})
+
+
+def _sights(loop: ClosedLoop, frame: Keyframe) -> list[str]:
+    """How it stands with everybody whom the episode is about: "0" out of the cameras' view, "1" in
+    it, "2" detected.
+    """
+    if loop.world.meetings:
+        seen = [(one.in_view, one.detected) for one in frame.sights]
+    else:
+        seen = [(frame.in_view, frame.detected) for _ in sought(loop.world)]
+    return ["2" if detected else str(int(in_view)) for in_view, detected in seen]
+
+
+def _way(loop: ClosedLoop) -> list[list[int]] | None:
+    """Points of the route from its start to where the LiDAR reaches now, None straight ahead."""
+    if loop.world.route is None:
+        return None
+    along = np.arange(0.0, loop.world.along_m + loop.rig.grid.range_m, _WAY_STEP_M)
+    points: list[list[int]] = _whole([loop.world.route.pose(float(m))[:2] for m in along], _CENTI)
+    return points
 
 
 def fullness(fired: Cells, grid: AngularGrid) -> str:

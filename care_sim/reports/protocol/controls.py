@@ -11,6 +11,7 @@ from care_sim.reports.controls import (
     best_control,
     candidates,
     is_control,
+    named_by_budget,
 )
 from care_sim.reports.formatting import interval, marked, tag_notes
 from care_sim.reports.protocol.differences import HEADINGS, MeasuredDifference, PolicyPair
@@ -76,10 +77,12 @@ def named_controls(plays: SettingPlays, measures: Sequence[OverControl]) -> str:
     """The best control of every measure at every budget, in a sentence."""
     named = (
         f"in {each.ratio.name} "
-        + ", ".join(
-            f"{control} at {percent(budget)}"
-            for budget, control in zip(plays.budgets, each.controls, strict=True)
-            if control
+        + named_by_budget(
+            {
+                budget: control
+                for budget, control in zip(plays.budgets, each.controls, strict=True)
+                if control
+            }
         )
         for each in measures
     )

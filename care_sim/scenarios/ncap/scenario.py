@@ -141,7 +141,7 @@ class Ncap(Scenario):
         world = World(traffic, speed, _mirrored_route(meeting.route, side))
         self._add_cars(world, meeting, sizes, side)
         world.first_sighting = world.add(
-            "target", test.target.body, lambda time: _mirrored(meeting.motion(time), side)
+            test.target.body, test.target.body, lambda time: _mirrored(meeting.motion(time), side)
         )
         world.ended = meeting.end.is_over
         return world

@@ -14,14 +14,9 @@ from care_sim.loops.records import Keyframe
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
-from care_sim.viewer.pictures.furnished_world import add_car, furnished
-from care_sim.viewer.pictures.keyframe import (
-    BRAKING_COLOUR,
-    DETECTED_COLOUR,
-    IN_VIEW_COLOUR,
-    mark_first_sighting,
-    mark_tracks,
-)
+from care_sim.viewer.pictures.furnished_world import add_car, furnished, photograph
+from care_sim.viewer.pictures.keyframe import BRAKING_COLOUR, mark_tracks
+from care_sim.viewer.pictures.sought import DETECTED, HIT, IN_VIEW, contact_text, mark_sought
 
 _VIEW_SIZE = (512, 320)
 _CAMERA = PinholeCamera(*_VIEW_SIZE, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
@@ -52,7 +47,8 @@ def draw_panel(name: str, loop: ClosedLoop, frames: Sequence[Keyframe]) -> Image
         drawing.font(14),
     )
     canvas.paste(_cells_ahead(loop), (0, _GRID_TOP))
-    text, colour = verdict_text(frames, loop.rig.keyframe_s)
+    contact = contact_text(loop, frames[-1])
+    text, colour = (contact, HIT.colour) if contact else verdict_text(frames, loop.rig.keyframe_s)
     draw.text((8, _COMPARISON_HEIGHT - 26), text, colour, drawing.font(18))
     return canvas
 
@@ -69,10 +65,10 @@ def _write_header(draw: ImageDraw.ImageDraw, name: str, loop: ClosedLoop, frame:
 def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
     with furnished(loop.world) as scene:
         add_car(scene, loop.world, LIDAR_POSITION[0], loop.guarded_m)
-        view = Image.fromarray(scene.colours(_CAMERA, loop.sensor))
+        view = photograph(scene, _CAMERA, loop.sensor)
     draw = ImageDraw.Draw(view)
     mark_tracks(draw, _CAMERA, loop.belief.tracks)
-    mark_first_sighting(draw, _CAMERA, loop, frame)
+    mark_sought(draw, _CAMERA, loop, frame)
     return view
 
 
@@ -95,11 +91,11 @@ def verdict_text(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, dr
             return "not in view yet", FAINT_INK
         return (
             f"in view for {frames[-1].time_s - seen + keyframe_s:.1f} s, not detected",
-            IN_VIEW_COLOUR,
+            IN_VIEW.colour,
         )
     so_far = outcome(frames)
     late = f", {found - seen:.1f} s late" if seen is not None and found > seen else ""
     clearance = (
         "" if so_far.clearance_m is None else f"; least clearance {so_far.clearance_m:.1f} m"
     )
-    return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED_COLOUR
+    return f"detected at {so_far.detection_distance_m:.1f} m{late}{clearance}", DETECTED.colour

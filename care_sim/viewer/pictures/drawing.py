@@ -70,10 +70,11 @@ def arrow(draw: ImageDraw.ImageDraw, tip: tuple[float, float], text: str, colour
 def image_boxes(
     draw: ImageDraw.ImageDraw, boxes: Floats, names: Iterable[str], colours: Iterable[Colour]
 ) -> None:
-    """Boxes (n, 4: left, top, right, bottom in pixels) with their names."""
+    """Boxes (n, 4: left, top, right, bottom in pixels) with their names, thin ones without."""
     for box, name, colour in zip(boxes.tolist(), names, colours, strict=True):
-        draw.rectangle(box, outline=colour, width=2)
-        label(draw, ((box[0] + box[2]) / 2, box[1]), name, colour, 11)
+        draw.rectangle(box, outline=colour, width=2 if name else 1)
+        if name:
+            label(draw, ((box[0] + box[2]) / 2, box[1]), name, colour, 11)
 
 
 def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: int) -> Image.Image:

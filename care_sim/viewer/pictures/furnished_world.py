@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from PIL import Image
 
-from care_sim.core.frames import Pose
+from care_sim.core.frames import Frame
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.loops.watcher import way_ahead
 from care_sim.world.bodies import BodyKind, Part, Triple
 from care_sim.world.bullet import BulletWorld
 from care_sim.world.world import World
@@ -29,22 +31,40 @@ OVERLAP = 1.3
 cracks show on the outside of a bend.
 """
 
+_REACH_M = 110.0
+"""What is further from the car is a few pixels high and left out: every body costs time."""
+
 _ASPHALT = (0.36, 0.36, 0.38)
 _PATH = (0.47, 0.47, 0.5)
 _BAR = (0.8, 0.8, 0.78)
+_SKY = (128, 147, 166)
+_NOTHING = 255
+"""What the renderer paints where no body is."""
 
 
 @contextmanager
 def furnished(world: World) -> Iterator[BulletWorld]:
-    """A simulator with every actor at its present pose and an asphalt ground; freed at the end."""
+    """A simulator with every actor within sight at its present pose and an asphalt ground; freed at
+    the end.
+    """
     scene = BulletWorld()
     try:
         scene.add(_slab("asphalt", (400.0, 100.0, 0.2), -0.1, _ASPHALT), world.ego.pose)
+        x, y, _ = world.ego.pose
         for actor in world.actors:
-            scene.add(actor.kind, actor.pose_at(world.time))
+            pose = actor.pose_at(world.time)
+            if np.hypot(pose[0] - x, pose[1] - y) < _REACH_M + actor.kind.size[0] / 2:
+                scene.add(actor.kind, pose)
         yield scene
     finally:
         scene.close()
+
+
+def photograph(scene: BulletWorld, camera: PinholeCamera, sensor: Frame) -> Image.Image:
+    """What a camera on a sensor at the frame `sensor` sees, under a sky dark enough for words."""
+    view = scene.colours(camera, sensor).copy()
+    view[(view == _NOTHING).all(axis=2)] = _SKY
+    return Image.fromarray(view)
 
 
 def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float) -> None:
@@ -66,17 +86,6 @@ def add_car(scene: BulletWorld, world: World, sensor_x: float, guarded_m: float)
         bar = _slab("bar", (0.15, guarded_m, 0.04), 0.02, _BAR)
         scene.add(bar, way_ahead(world, sensor_x, mark))
     scene.add(world.ego_kind, world.ego.pose)
-
-
-def way_ahead(world: World, sensor_x: float, ahead: float) -> Pose:
-    """World pose of the middle of the way `ahead` metres before the LiDAR, which is `sensor_x`
-    ahead of the car's centre.
-    """
-    if world.route is not None:
-        return world.route.pose(world.along_m + sensor_x + ahead)
-    x, y, yaw = world.ego.pose
-    reach = sensor_x + ahead
-    return x + reach * float(np.cos(yaw)), y + reach * float(np.sin(yaw)), yaw
 
 
 def _slab(name: str, size: Triple, middle_z: float, colour: Triple) -> BodyKind:

@@ -9,12 +9,18 @@ from PIL import Image, ImageDraw
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.residual import explained
 from care_sim.core.types import CLASSES, Tracks
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
+from care_sim.loops.watcher import way_ahead
 from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.camera_views import (
+    EXPLAINED_COLOUR,
+    ROW_HEIGHT,
+    paste_pictures,
+    take_pictures,
+)
 from care_sim.viewer.pictures.drawing import (
     BACKGROUND,
     FAINT_INK,
@@ -28,15 +34,18 @@ from care_sim.viewer.pictures.furnished_world import (
     METRE_MARKS,
     add_car,
     furnished,
-    way_ahead,
+    photograph,
 )
+from care_sim.viewer.pictures.sought import HIT, contact_text, mark_sought
 
 PICTURE_WIDTH = 960
 PICTURE_HEIGHT = 720
+SURROUND_HEIGHT = PICTURE_HEIGHT + ROW_HEIGHT
+"""Of a rig with several cameras, whose row takes more room."""
 _HEADER = 40
-_PANELS = _HEADER + CHASE_SIZE[1]
-_CAMERA_AT = (20, _PANELS + 30)
-_GRID_AT = (392, _PANELS + 44)
+PANELS_TOP = _HEADER + CHASE_SIZE[1]
+GRID_LEFT = 392
+_GRID_MIDDLE = 224
 _ROW_PIXELS = 4
 _DIRECTIONS = (
     (0.0, "behind", "la"),
@@ -48,42 +57,36 @@ _DIRECTIONS = (
 """Directions below the grid: share of its width, name, anchor of the text."""
 _BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
-TRACKED_COLOUR = (90, 220, 255)
 _COASTING_COLOUR = (120, 140, 190)
-_UNEXPLAINED_COLOUR = (255, 170, 40)
-HIDDEN_COLOUR = (225, 225, 225)
-IN_VIEW_COLOUR = (255, 170, 40)
-DETECTED_COLOUR = (80, 230, 110)
-BRAKING_COLOUR = (255, 80, 70)
+BRAKING_COLOUR = HIT.colour
 
 
 def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]:
-    """A picture (PICTURE_HEIGHT, PICTURE_WIDTH, 3) of the present state of `loop`, and of the scan
-    of the keyframe before, `frame`.
+    """A picture (H, PICTURE_WIDTH, 3) of the present state of `loop`, and of the scan of the
+    keyframe before, `frame`. H is PICTURE_HEIGHT, with several cameras SURROUND_HEIGHT.
 
-    Above, the street from behind the car: tracks as wireframes, an arrow at the first-sighting
-    actor, and on the ground the strip the controller guards. Below, the front camera with its
-    detections, those that no forecast explains in another colour, and the cells that fired,
-    coloured by range. `frame` is None before the first scan. The episode is left as it was.
+    Above, the street from behind the car: tracks as wireframes, arrows at whom the episode is
+    about and at whom the car hit, and on the ground the strip the controller guards. Below, the
+    cameras with their detections, those that no forecast explains in another colour, and the cells
+    that fired, coloured by range. `frame` is None before the first scan. The episode is left as it
+    was.
     """
-    canvas = Image.new("RGB", (PICTURE_WIDTH, PICTURE_HEIGHT), BACKGROUND)
+    cameras = loop.rig.cameras
+    surround = len(cameras) > 1
+    height = SURROUND_HEIGHT if surround else PICTURE_HEIGHT
+    canvas = Image.new("RGB", (PICTURE_WIDTH, height), BACKGROUND)
     with furnished(loop.world) as scene:
-        # The front camera does not see the car that carries it, nor the marks on the ground.
-        camera = Image.fromarray(scene.colours(loop.rig.cameras[0], loop.sensor))
+        # The cameras do not see the car that carries them, nor the marks on the ground.
+        pictures = take_pictures(scene, loop, PICTURE_WIDTH)
         add_car(scene, loop.world, LIDAR_POSITION[0], loop.guarded_m)
-        chase = Image.fromarray(scene.colours(CHASE_CAMERA, loop.sensor))
+        chase = photograph(scene, CHASE_CAMERA, loop.sensor)
     _annotate_chase(chase, loop, frame)
-    _annotate_camera(camera, loop)
-    draw = ImageDraw.Draw(canvas)
-    _write_header(draw, loop, frame)
+    _write_header(ImageDraw.Draw(canvas), loop, frame)
     canvas.paste(chase, (0, _HEADER))
-    canvas.paste(camera, _CAMERA_AT)
-    draw.text((_CAMERA_AT[0], _PANELS + 8), "Front camera:", INK, drawing.font(14))
-    draw.text(
-        (_CAMERA_AT[0] + 104, _PANELS + 8), "explained by a track", TRACKED_COLOUR, drawing.font(14)
-    )
-    draw.text((_CAMERA_AT[0] + 260, _PANELS + 8), "new", _UNEXPLAINED_COLOUR, drawing.font(14))
-    draw_grid(canvas, draw, loop.rig.grid, loop.belief.ranges)
+    paste_pictures(canvas, pictures, cameras, PANELS_TOP)
+    # A row of cameras takes the whole width; the grid lies below it, else beside the one camera.
+    at = (_GRID_MIDDLE, PANELS_TOP + ROW_HEIGHT) if surround else (GRID_LEFT, PANELS_TOP)
+    draw_grid(canvas, at, loop.rig.grid, loop.belief.ranges)
     return np.asarray(canvas)
 
 
@@ -97,7 +100,10 @@ def _write_header(draw: ImageDraw.ImageDraw, loop: ClosedLoop, frame: Keyframe |
         )
     else:
         words.append((330, f"{len(frame.fired)} of {budget} cells fired", INK))
-        if np.isfinite(frame.clearance_m):
+        if contact := contact_text(loop, frame):
+            draw.rounded_rectangle((630, 6, 952, 34), 6, HIT.colour)
+            words.append((640, contact, BACKGROUND))
+        elif np.isfinite(frame.clearance_m):
             words.append((640, f"clearance to {_target_name(loop)} {frame.clearance_m:.1f} m", INK))
         if frame.braking:
             draw.rounded_rectangle((192, 6, 308, 34), 6, BRAKING_COLOUR)
@@ -115,8 +121,8 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
         if at := drawing.point_above(CHASE_CAMERA, ground):
             draw.text(at, f"{metres:.0f} m", INK, drawing.font(12), anchor="rm")
     mark_tracks(draw, CHASE_CAMERA, loop.belief.tracks)
-    mark_first_sighting(draw, CHASE_CAMERA, loop, frame)
-    drawing.label(draw, (0, CHASE_SIZE[1]), _BOXES_MEAN, TRACKED_COLOUR)
+    mark_sought(draw, CHASE_CAMERA, loop, frame)
+    drawing.label(draw, (0, CHASE_SIZE[1]), _BOXES_MEAN, EXPLAINED_COLOUR)
 
 
 def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks) -> None:
@@ -125,64 +131,32 @@ def mark_tracks(draw: ImageDraw.ImageDraw, camera: PinholeCamera, tracks: Tracks
     for box, number, misses in reversed(
         list(zip(tracks.boxes, tracks.classes, tracks.misses, strict=True))
     ):
-        colour = _COASTING_COLOUR if misses else TRACKED_COLOUR
+        colour = _COASTING_COLOUR if misses else EXPLAINED_COLOUR
         drawing.wireframe(draw, camera, box, colour, 1 if misses else 2)
         if at := drawing.point_above(camera, box):
             drawing.label(draw, at, CLASSES[number], colour)
 
 
-def mark_first_sighting(
-    draw: ImageDraw.ImageDraw, camera: PinholeCamera, loop: ClosedLoop, frame: Keyframe | None
-) -> None:
-    """An arrow at the first-sighting actor that says whether it is hidden, in view or detected."""
-    target = loop.world.first_sighting
-    if target is None:
-        return
-    state = "hidden"
-    colour = HIDDEN_COLOUR
-    if frame is not None and frame.detected:
-        state = "detected"
-        colour = DETECTED_COLOUR
-    elif loop.shows(target.body):
-        state = "in view"
-        colour = IN_VIEW_COLOUR
-    (box,) = loop.sensor.boxes_to_local(loop.world.boxes([target]))
-    if at := drawing.point_above(camera, box):
-        drawing.arrow(draw, at, f"{target.name}: {state}", colour)
-
-
-def _annotate_camera(camera: Image.Image, loop: ClosedLoop) -> None:
-    seen = loop.belief.detections
-    known = explained(seen, loop.belief.tracks, loop.rig)
-    # The picture is that of the first camera.
-    (own,) = np.nonzero(seen.cameras == 0)
-    drawing.image_boxes(
-        ImageDraw.Draw(camera),
-        seen.boxes[own],
-        [CLASSES[number] for number in seen.classes[own]],
-        [TRACKED_COLOUR if is_known else _UNEXPLAINED_COLOUR for is_known in known[own]],
-    )
-
-
 def draw_grid(
-    canvas: Image.Image, draw: ImageDraw.ImageDraw, grid: AngularGrid, ranges: NDArray[np.floating]
+    canvas: Image.Image, at: tuple[int, int], grid: AngularGrid, ranges: NDArray[np.floating]
 ) -> None:
-    """The angular grid with a scan (E, A), in the lower right of a picture, with its directions and
-    a legend of its colours.
+    """The angular grid with a scan (E, A), with its left and top words `at` a pixel of a picture,
+    its directions and a legend of its colours.
     """
-    left, top = _GRID_AT
+    left, top = at
+    draw = ImageDraw.Draw(canvas)
     picture = drawing.grid_picture(grid, ranges, _ROW_PIXELS)
-    canvas.paste(picture, _GRID_AT)
-    bottom = top + picture.height
+    canvas.paste(picture, (left, top + 44))
+    bottom = top + 44 + picture.height
     draw.text(
-        (left, _PANELS + 8),
+        (left, top + 8),
         "LiDAR: cells fired in the last scan, all around the car",
         INK,
         drawing.font(14),
     )
     for share, name, anchor in _DIRECTIONS:
-        at = (left + share * grid.columns, bottom + 4)
-        draw.text(at, name, FAINT_INK, drawing.font(13), anchor=anchor)
+        place = (left + share * grid.columns, bottom + 4)
+        draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
     _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
 
 

@@ -13,7 +13,13 @@ from care_sim.loops.open_loop import OpenLoop, OpenLoopKeyframe
 from care_sim.sensors.annotated import Cloud
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
-from care_sim.viewer.pictures.keyframe import PICTURE_HEIGHT, PICTURE_WIDTH, draw_grid
+from care_sim.viewer.pictures.keyframe import (
+    GRID_LEFT,
+    PANELS_TOP,
+    PICTURE_HEIGHT,
+    PICTURE_WIDTH,
+    draw_grid,
+)
 from care_sim.world.bodies import CATALOGUE
 
 _TOP = 40
@@ -65,7 +71,7 @@ def draw_plan(
     ]
     canvas.paste(_map(shot.annotations.boxes, colours, appearing, returned.points), (0, _TOP))
     _write_words(draw, loop, shot.time_s, record, int(found[scored].sum()), int(scored.sum()))
-    draw_grid(canvas, draw, loop.rig.grid, _ranges(loop, returned, record))
+    draw_grid(canvas, (GRID_LEFT, PANELS_TOP), loop.rig.grid, _ranges(loop, returned, record))
     return np.asarray(canvas)
 
 

@@ -10,12 +10,12 @@ from care_sim.core.arrays import Floats
 from care_sim.core.residual import wedge_rays
 from care_sim.core.rig import Rig
 from care_sim.core.types import CLASSES
-from care_sim.loops.watcher import TrueSituation, WatchedKeyframe
+from care_sim.loops.watcher import WAY_M, TrueSituation, WatchedKeyframe
 from care_sim.viewer.recording import entities
 from care_sim.viewer.recording.lane import THIN, Lane, box_batch
 
-_PATH_M = 40.0
-"""Length of the strip that the driver guards, as far as it is drawn."""
+_OVERLAP = 1.3
+"""By how much longer than their share the pieces of a bending strip are: no cracks show."""
 _CORNERS = (1, 2, 4, 3)
 """Places of the corners of an image box among its rays, one after the other around it."""
 _SHARE_COLOURS = np.array(entities.SHARE_COLOURS, np.uint8)
@@ -31,20 +31,17 @@ class SpaceLog:
     def __init__(self, lane: Lane, rig: Rig, guarded_m: float):
         self._lane = lane
         self._rig = rig
+        self._guarded_m = guarded_m
         self._driven: list[Floats] = []
         lane.fix("world", rr.ViewCoordinates.FLU)
-
-        # The strip on the ground that the driver guards, below the sensor.
-        strip = np.array(
-            [[_PATH_M / 2, 0.0, 0.02 - rig.sensor_height_m, _PATH_M, guarded_m, 0.02, 0.0]]
-        )
-        lane.fix(
-            "world/lidar/path", box_batch(strip, colors=entities.PATH_RGB, fill_mode=FillMode.Solid)
-        )
 
         # What stays as it is for the whole episode; places follow with every keyframe.
         lane.fix(
             "world/ego", rr.Boxes3D.from_fields(colors=[entities.EGO_RGB], fill_mode=FillMode.Solid)
+        )
+        lane.fix(
+            "world/lidar/path",
+            rr.Boxes3D.from_fields(colors=[entities.PATH_RGB], fill_mode=FillMode.Solid),
         )
         lane.fix("world/bodies", rr.Boxes3D.from_fields(show_labels=False, fill_mode=_GLASSY))
         lane.fix(
@@ -101,8 +98,23 @@ class SpaceLog:
         self._driven.append(np.array([*situation.ego[:2], 0.03]))
         self._lane.log("world/driven", rr.LineStrips3D([self._driven]))
         sensor = situation.sensor
+        self._log_path(situation)
         turn = rr.Quaternion(xyzw=sensor.rotation.as_quat())
         self._lane.log("world/lidar", rr.Transform3D(translation=sensor.origin, quaternion=turn))
+
+    def _log_path(self, situation: TrueSituation) -> None:
+        """The strip on the ground that the driver guards."""
+        way = situation.way
+        length = WAY_M / len(way) * (_OVERLAP if len(way) > 1 else 1.0)
+        strip = np.column_stack(
+            [
+                way[:, :2],
+                np.full(len(way), 0.02),
+                np.tile([length, self._guarded_m, 0.02], (len(way), 1)),
+                way[:, 2],
+            ]
+        )
+        self._lane.log("world/lidar/path", box_batch(situation.sensor.boxes_to_local(strip)))
 
     def _log_returns(self, watched: WatchedKeyframe) -> None:
         cells, points = watched.returned(self._rig.grid)

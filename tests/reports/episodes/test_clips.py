@@ -23,6 +23,7 @@ from care_sim.study.episode_play import run_episode, trace
 from care_sim.viewer.pictures import comparison as panel
 from care_sim.viewer.pictures import keyframe as picture
 from care_sim.viewer.pictures.clip_files import ENDINGS, write_clip
+from care_sim.viewer.pictures.sought import DETECTED
 
 SIZE = (64, 48)
 COLOURS = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]
@@ -202,7 +203,7 @@ def test_the_verdict_of_a_panel():
     late = panel.verdict_text(keyframes(hidden, seen, seen, found, found), 0.1)
     assert late == (
         "detected at 17.0 m, 0.2 s late; least clearance 14.0 m",
-        picture.DETECTED_COLOUR,
+        DETECTED.colour,
     )
     assert (
         panel.verdict_text(keyframes(hidden, found), 0.1)[0]

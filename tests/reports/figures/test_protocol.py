@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
 
 from care_sim.reports.figures.files import save
 from care_sim.reports.figures.protocol import PROTOCOL_FIGURES, frontier, protocol_figures
+from care_sim.reports.figures.styles import styles
 from tests.helpers.made_plays import study
 
 FOUND = {
@@ -19,6 +21,7 @@ FOUND = {
     "full": (8, 8),
 }
 ROWS = study(FOUND)
+BUDGETS = (0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.35)
 
 
 def test_every_setting_has_its_figures_and_their_names_are_known():
@@ -64,6 +67,20 @@ def test_a_panel_a_budget_and_a_staircase_over_what_a_car_can_have():
         stairs.get_xydata(), [(left, 30.0), (50.0, 30.0), (60.0, 20.0), (60.0, low)]
     )
     assert "full scan: 40.0% of first sightings, 80.0% overall" in figure.get_supxlabel()
+
+
+def test_many_budgets_take_several_lines_of_panels():
+    figure = protocol_figures(study(FOUND, budgets=BUDGETS))["pareto-streets"]
+    drawn = [axes for axes in figure.axes if axes.axison]
+    assert len(drawn) == len(BUDGETS)
+    assert {axes.get_subplotspec().get_geometry()[:2] for axes in drawn} == {(2, 4)}
+
+
+def test_a_thin_marker_is_seen():
+    figure = protocol_figures(study(FOUND | {"rows": (5, 5)}))["levels-streets"]
+    edges = {line.get_label(): to_rgb(line.get_markeredgecolor()) for line in figure.axes[0].lines}
+    assert edges["rows"] == to_rgb(styles([("rows", ("control",))])["rows"].colour)
+    assert edges["care"] == (1.0, 1.0, 1.0)
 
 
 def test_levels_have_a_line_a_policy_and_the_full_scan():

@@ -23,6 +23,13 @@ def test_every_world_has_its_place_with_the_factor_that_is_changed():
     assert "seed-finder §" in heights(found)
 
 
+def test_alone_a_world_has_no_factor_and_what_stands_at_zero_is_in_sight():
+    figure = validation_figures(world(TELLING, TRAINING))["validation"]
+    assert figure.get_suptitle() == "dartout: 6 test seeds"
+    assert "best control of dartout: " in figure.get_supxlabel()
+    assert all(axes.get_ylim()[0] < 0 for axes in figure.axes)
+
+
 def test_the_best_control_is_that_of_each_world():
     fan_is_best = TRAINING | {"rows": (9.0, 3), "fan": (14.0, 0)}
     rows = [*world(TELLING, TRAINING), *world(TELLING, fan_is_best, parameters=MIRRORED)]

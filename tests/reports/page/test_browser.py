@@ -106,6 +106,18 @@ def test_a_page_opens_at_once_and_says_what_was_played(opened, played):
     assert "never" not in page.inner_text("table.episodes")
 
 
+def test_a_drive_shows_its_way_whom_the_car_meets_and_the_collision(opened, tmp_path):
+    (config,) = grid(["drive"], ["care"], [0.01], [100])
+    rows = with_added_columns([run_episode(config)])
+    page = opened(written(tmp_path, rows, "sweep", most=1), READY)
+    page.eval_on_selector(
+        "#moment", "bar => { bar.value = bar.max; bar.dispatchEvent(new Event('input')); }"
+    )
+    assert page.inner_text(".now").endswith("the car hits the pedestrian with 8.1 m/s.")
+    assert page.locator(".view .ring").count() == 3
+    assert page.locator(".view .way").count() == 1
+
+
 def test_a_heading_sorts_its_column_up_and_down(opened, played):
     page = opened(played[0], READY)
     table = "table.sortable >> nth=0"

@@ -87,6 +87,31 @@ def test_distances_are_those_of_the_drawn_places(replay):
         ) == pytest.approx(distance, abs=2)
 
 
+def test_a_drive_tells_whom_it_lets_the_car_meet_its_way_and_whom_it_hit():
+    config = EpisodeConfig("drive", "care", 0.01, seed=100)
+    row, keyframes = trace(config)
+    story = replayed(config).story
+    assert len(story["sought"]) == len(keyframes[0].sights) == 3
+    for number, (_, states) in enumerate(story["sought"]):
+        sights = [frame.sights[number] for frame in keyframes]
+        assert states == "".join(
+            "2" if sight.detected else "1" if sight.in_view else "0" for sight in sights
+        )
+    # The way goes on as far as the LiDAR reaches, also where the drive ends early.
+    (x, y), (end_x, end_y) = story["place"][-1][:2], story["way"][-1]
+    assert 4800 <= np.hypot(end_x - x, end_y - y) <= 5000
+    assert row["collision"]
+    speed = round(100 * row["impact_speed_mps"])
+    assert story["hit"] == {"kind": "pedestrian", "at_front": True, "speed": speed}
+    assert story["about"] == "pedestrian"
+
+
+def test_straight_ahead_there_is_no_way_and_without_contact_no_hit(replay):
+    assert (replay.story["way"], replay.story["hit"]) == (None, None)
+    ((_, states),) = replay.story["sought"]
+    assert [state == "2" for state in states] == [found == "1" for found in replay.story["found"]]
+
+
 def test_a_track_lies_where_the_person_is_and_moves_as_the_person_does(replay):
     (person,) = (body for body in replay.story["moving"] if body["sought"])
     k = replay.story["found"].index("1") + 3

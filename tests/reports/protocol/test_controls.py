@@ -19,8 +19,8 @@ AT_20 = {"care": (6, 5), "seed-finder": (9, 9), "rows": (7, 6), "place": (5, 5)}
 ROWS = [*study(AT_10, budgets=(0.1,)), *study(AT_20, budgets=(0.2,))]
 NAME = "each policy minus the best control"
 NAMED = (
-    "Best control: in first-sighting recall place at 10%, rows at 20%; "
-    "in overall recall rows at 10%, rows at 20%."
+    "Best control: in first-sighting recall place at 10% and rows at 20%; "
+    "in overall recall rows at every budget."
 )
 UNEQUAL = [
     play(f"{n}", policy, found(20, sighted + n * gain), [5] * 20)

@@ -11,16 +11,15 @@ from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.envs import CLOSED_LOOP
 from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.camera_views import EXPLAINED_COLOUR
 from care_sim.viewer.pictures.keyframe import (
     BRAKING_COLOUR,
-    DETECTED_COLOUR,
-    HIDDEN_COLOUR,
-    IN_VIEW_COLOUR,
     PICTURE_HEIGHT,
     PICTURE_WIDTH,
-    TRACKED_COLOUR,
+    SURROUND_HEIGHT,
     draw_keyframe,
 )
+from care_sim.viewer.pictures.sought import DETECTED, IN_VIEW, OUT_OF_VIEW
 
 
 def make(name, **arguments):
@@ -69,12 +68,13 @@ def test_it_has_one_size_before_and_after_the_first_scan(name):
     env.step(policy(observation))
     after = env.render()
     env.close()
+    height = SURROUND_HEIGHT if len(env.unwrapped.rig.cameras) > 1 else PICTURE_HEIGHT
     for picture in (before, after):
-        assert picture.shape == (PICTURE_HEIGHT, PICTURE_WIDTH, 3)
+        assert picture.shape == (height, PICTURE_WIDTH, 3)
         assert picture.dtype == np.uint8
     assert np.any(before != after)
     # Nothing hides the vehicle of a cut-in of UN Regulation 157.
-    assert shows(before, IN_VIEW_COLOUR if "R157" in name else HIDDEN_COLOUR)
+    assert shows(before, IN_VIEW.colour if "R157" in name else OUT_OF_VIEW.colour)
 
 
 def test_rendering_changes_no_observation():
@@ -91,13 +91,13 @@ def test_the_same_keyframe_gives_the_same_picture(dense):
 def test_it_says_what_happened(dense):
     picture = dense.render()
     assert shows(picture, BRAKING_COLOUR, 1000)
-    assert shows(picture, DETECTED_COLOUR, 50)
-    assert shows(picture, TRACKED_COLOUR, 500)
+    assert shows(picture, DETECTED.colour, 50)
+    assert shows(picture, EXPLAINED_COLOUR, 500)
     loop = dense.unwrapped.loop
     frame = dense.unwrapped.keyframes[-1]
     calm = draw_keyframe(loop, replace(frame, braking=False, detected=False))
     assert not shows(calm, BRAKING_COLOUR)
-    assert not shows(calm, DETECTED_COLOUR)
+    assert not shows(calm, DETECTED.colour)
 
 
 def test_the_grid_shows_the_left_on_the_left_and_colours_returns():

@@ -4,6 +4,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const VIEW = { behind: 9, ahead: 41, side: 9.5 };
 const NARROW = { behind: 6, ahead: 26, side: 9.5 };
 const REACH = 50;
+const STATES = ["unseen", "in-view", "found"];
 
 function add(parent, name, attributes = {}, text = "") {
   const element = parent.appendChild(document.createElementNS(SVG, name));
@@ -59,7 +60,7 @@ class View {
     const { side } = this.window;
     // What lies in the world, which turns and moves under a car that always points to the right.
     this.world = add(this.stage, "g");
-    this.turns = this.story.place.some(([, , yaw]) => yaw !== this.story.place[0][2]);
+    this.turns = this.story.way !== null;
     const tens = this.turns ? [] : Array.from({ length: 18 }, (_, n) => 10 * n - 20);
     for (const x of tens) add(this.world, "path", { d: `M${x} ${-side}V${side}`, class: "tick" });
     this.sensor = add(this.world, "g");
@@ -72,12 +73,11 @@ class View {
     for (const body of [...standing, ...moving]) this.addBody(body);
     for (const x of tens) add(this.world, "text", { x: x + 0.2, y: side - 0.4, class: "metres" }, `${x} m`);
     this.tracks = add(this.world, "g");
-    this.ring = add(this.world, "circle", { r: 1.5, class: "ring" });
+    this.rings = this.story.sought.map(() => add(this.world, "circle", { r: 1.5, class: "ring" }));
     this.ego = add(this.world, "g");
     const wide = ego.size[1] / 100 + 0.6;
     if (this.turns) {
-      // Round bends the way is the one that is driven.
-      const way = this.story.place.map(([x, y]) => `${x / 100} ${-y / 100}`).join("L");
+      const way = this.story.way.map(([x, y]) => `${x / 100} ${-y / 100}`).join("L");
       this.world.insertBefore(add(this.world, "path", { d: `M${way}`, class: "way", "stroke-width": wide }), this.sensor);
     } else add(this.ego, "rect", { x: 0, y: -wide / 2, width: REACH - 10, height: wide, class: "path" });
     box(this.ego, ego.size, "ego");
@@ -89,7 +89,6 @@ class View {
     const rect = box(shape, body.size, body.sought ? "sought" : body.reported ? "body" : "mute");
     add(rect, "title", {}, body.kind);
     this.bodies.set(body.n, { body, shape, rect });
-    if (body.sought) this.sought = body;
   }
 
   addStrips() {
@@ -105,16 +104,16 @@ class View {
   }
 
   tale(episode) {
-    const { in_view, found, brake, contact, distance, time } = this.story;
+    const { about, in_view, found, brake, contact, distance, time } = this.story;
     const away = (k) => (distance[k] === null ? "" : ` (${(distance[k] / 100).toFixed(1)} m away)`);
     const when = (k) => `${(time[k] / 100).toFixed(1)} s${away(k)}`;
     const tell = (flags, yes, no) => (flags.includes("1") ? `${yes} at ${when(flags.indexOf("1"))}` : no);
-    const parts = [
-      tell(in_view, "Comes into the camera's view", "Never in the camera's view"),
-      tell(found, "detected by the LiDAR", "never detected by the LiDAR"),
-      tell(brake, "the car brakes", "the car never brakes"),
+    const actor = [
+      tell(in_view, `The ${about} comes into the cameras' view`, `The ${about} is never in the cameras' view`),
+      tell(found, "is detected by the LiDAR", "is never detected by the LiDAR"),
     ];
-    if (contact !== null) parts.push(`collision at ${(time[contact + 1] / 100).toFixed(1)} s`);
+    const parts = [...(about === null ? ["Nobody to meet"] : actor), tell(brake, "the car brakes", "the car never brakes")];
+    if (contact !== null) parts.push(`${this.collision()} at ${(time[contact + 1] / 100).toFixed(1)} s`);
     const otherwise = episode.differences.length ? ` Ends otherwise than in the results: ${episode.differences.join("; ")}.` : "";
     return `${parts.join("; ")}.${otherwise}`;
   }
@@ -130,10 +129,11 @@ class View {
     this.world.setAttribute("transform", `rotate(${-degrees(pose[2])}) translate(${-pose[0] / 100} ${pose[1] / 100})`);
     this.ego.setAttribute("transform", place(pose));
     for (const { body, shape } of this.bodies.values()) if (body.poses) shape.setAttribute("transform", place(at(body.poses, k, share)));
-    if (this.sought) {
-      const [x, y] = at(this.sought.poses ?? [this.sought.pose], k, share);
-      this.ring.setAttribute("transform", `translate(${x / 100} ${-y / 100})`);
-    }
+    story.sought.forEach(([n], number) => {
+      const { body } = this.bodies.get(n);
+      const [x, y] = body.poses ? at(body.poses, k, share) : body.pose;
+      this.rings[number].setAttribute("transform", `translate(${x / 100} ${-y / 100})`);
+    });
     if (this.drawn !== k) this.drawMoment(k, frame);
     this.drawn = k;
     this.heads.forEach((head) => head.setAttribute("x", Math.min(k + share, this.last) - this.last / 500));
@@ -156,17 +156,24 @@ class View {
       add(box(shape, size, coasting ? "track coasting" : "track"), "title", {}, `track of a ${kind}`);
       add(this.tracks, "path", { d: `M${tx / 100} ${-ty / 100}l${vx / 100} ${-vy / 100}`, class: "track" });
     }
-    this.ring.setAttribute("class", `ring ${on("found") ? "found" : on("in_view") ? "in-view" : "unseen"}`);
+    story.sought.forEach(([, states], number) => this.rings[number].setAttribute("class", `ring ${STATES[states[frame]]}`));
     this.lights.style.visibility = on("brake") ? "visible" : "hidden";
     this.now.textContent = this.sentence(k, frame, on);
   }
 
+  collision() {
+    const { kind, at_front, speed } = this.story.hit;
+    return at_front ? `the car hits the ${kind} with ${(speed / 100).toFixed(1)} m/s` : `the ${kind} hits the car`;
+  }
+
   sentence(k, frame, on) {
-    const { time, speed, distance, contact } = this.story;
+    const { about, time, speed, distance, contact } = this.story;
     const now = `${(time[k] / 100).toFixed(1)} s, ${(speed[k] / 100).toFixed(1)} m/s`;
-    if (k === this.last) return `${now}.${contact !== null ? " Collision." : ""}`; // after the last keyframe
-    const away = distance[frame] === null ? "" : `, actor ${(distance[frame] / 100).toFixed(1)} m away`;
-    const state = on("found") ? "detected" : on("in_view") ? "in the camera's view, not detected" : "not in the camera's view, not detected";
-    return `${now}${away}: ${state}${on("brake") ? ", braking" : ""}.`;
+    if (k === this.last) return `${now}${contact !== null ? `: ${this.collision()}` : ""}.`; // after the last keyframe
+    const braking = on("brake") ? ", braking" : "";
+    if (about === null) return `${now}${braking}.`;
+    const away = `, ${about} ${(distance[frame] / 100).toFixed(1)} m away`;
+    const state = on("found") ? "detected" : on("in_view") ? "in the cameras' view, not detected" : "not in the cameras' view, not detected";
+    return `${now}${away}: ${state}${braking}.`;
   }
 }

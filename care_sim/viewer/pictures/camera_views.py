@@ -1,0 +1,94 @@
+"""What the cameras see, with what they detect: one large picture, or a row of several."""
+
+from dataclasses import replace
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from care_sim.core.arrays import Mask
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.residual import explained
+from care_sim.core.types import CLASSES
+from care_sim.loops.closed_loop import ClosedLoop
+from care_sim.viewer.pictures import drawing
+from care_sim.viewer.pictures.drawing import FAINT_INK, INK
+from care_sim.viewer.pictures.furnished_world import photograph
+from care_sim.world.bullet import BulletWorld
+
+EXPLAINED_COLOUR = (90, 220, 255)
+UNEXPLAINED_COLOUR = (255, 170, 40)
+ROW_HEIGHT = 140
+"""Of a row of cameras with its words, pixels."""
+_BEHIND_RAD = np.deg2rad(170.0)
+_AHEAD_RAD = np.deg2rad(10.0)
+
+
+def take_pictures(scene: BulletWorld, loop: ClosedLoop, width: int) -> list[Image.Image]:
+    """What every camera sees, with its detections: those that a forecast explains in one colour,
+    the others in another.
+
+    That of a single camera is as large as the camera's, and the classes stand beside the boxes.
+    Several share `width` pixels and have no room for words. They come in the sequence of the
+    grid's columns in a picture: behind, left, ahead, right.
+    """
+    cameras = loop.rig.cameras
+    known = explained(loop.belief.detections, loop.belief.tracks, loop.rig)
+    if len(cameras) == 1:
+        return [_picture(scene, loop, known, 0, cameras[0].width)]
+    share = width // len(cameras)
+    return [_picture(scene, loop, known, number, share) for number in _from_left(cameras)]
+
+
+def paste_pictures(
+    canvas: Image.Image, pictures: list[Image.Image], cameras: tuple[PinholeCamera, ...], top: int
+) -> None:
+    """Lay the pictures of `take_pictures` and what their colours mean below `top`."""
+    draw = ImageDraw.Draw(canvas)
+    row = len(pictures) > 1
+    words = (
+        (20, "Cameras:" if row else "Front camera:", INK),
+        (124, "explained by a track", EXPLAINED_COLOUR),
+        (280, "new", UNEXPLAINED_COLOUR),
+    )
+    for x, text, colour in words:
+        draw.text((x, top + 8), text, colour, drawing.font(14))
+    if not row:
+        canvas.paste(pictures[0], (20, top + 30))
+        return
+    for place, (picture, number) in enumerate(zip(pictures, _from_left(cameras), strict=True)):
+        left = place * (canvas.width // len(pictures))
+        canvas.paste(picture, (left, top + 30))
+        at = (left + picture.width / 2, top + 32 + picture.height)
+        draw.text(at, _towards(cameras[number].yaw), FAINT_INK, drawing.font(13), anchor="ma")
+
+
+def _picture(
+    scene: BulletWorld, loop: ClosedLoop, known: Mask, number: int, width: int
+) -> Image.Image:
+    """That of camera `number`, `width` pixels wide; `known` (k,) are the explained detections."""
+    camera = loop.rig.cameras[number]
+    scale = width / camera.width
+    small = replace(camera, width=width, height=round(camera.height * scale))
+    picture = photograph(scene, small, loop.sensor)
+    seen = loop.belief.detections
+    (own,) = np.nonzero(seen.cameras == number)
+    drawing.image_boxes(
+        ImageDraw.Draw(picture),
+        scale * seen.boxes[own],
+        [CLASSES[label] if scale == 1 else "" for label in seen.classes[own]],
+        [EXPLAINED_COLOUR if is_known else UNEXPLAINED_COLOUR for is_known in known[own]],
+    )
+    return picture
+
+
+def _from_left(cameras: tuple[PinholeCamera, ...]) -> list[int]:
+    """The numbers of cameras by where they look: behind, left, ahead, right."""
+    return sorted(range(len(cameras)), key=lambda number: -cameras[number].yaw)
+
+
+def _towards(yaw: float) -> str:
+    if abs(yaw) < _AHEAD_RAD:
+        return "ahead"
+    if abs(yaw) > _BEHIND_RAD:
+        return "behind"
+    return f"{abs(np.rad2deg(yaw)):.0f}° to the {'left' if yaw > 0 else 'right'}"

@@ -1,0 +1,51 @@
+"""The row of several cameras: each picture where its camera looks, with its own detections."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from care_sim.viewer.pictures.camera_views import (
+    EXPLAINED_COLOUR,
+    UNEXPLAINED_COLOUR,
+    take_pictures,
+)
+from care_sim.viewer.pictures.furnished_world import furnished
+from care_sim.viewer.pictures.keyframe import PICTURE_WIDTH
+
+FROM_LEFT = (5, 3, 1, 0, 2, 4)
+"""The cameras of the ring: back, back left, front left, front, front right, back right."""
+
+
+@pytest.fixture(scope="module")
+def loop():
+    env = gymnasium.make("CARE-Drive-v0", disable_env_checker=True)
+    env.reset(seed=100)
+    yield env.unwrapped.loop
+    env.close()
+
+
+@pytest.fixture(scope="module")
+def pictures(loop):
+    with furnished(loop.world) as scene:
+        return [np.asarray(picture) for picture in take_pictures(scene, loop, PICTURE_WIDTH)]
+
+
+def test_every_camera_has_its_share_of_the_width(loop, pictures):
+    assert [picture.shape for picture in pictures] == [(90, 160, 3)] * len(loop.rig.cameras)
+
+
+def test_they_come_as_the_columns_of_the_grid_do_and_show_their_own_boxes(loop, pictures):
+    seen = loop.belief.detections
+    # Before the first scan there is no track to explain any.
+    assert len(seen) > 20
+    for picture, number in zip(pictures, FROM_LEFT, strict=True):
+        # The left edge of every box, at half of the camera's size.
+        for left, top, _, bottom in (seen.boxes[seen.cameras == number] / 2).tolist():
+            column = min(round(left), 159)
+            edge = picture[int(top) : int(bottom) + 1, max(column - 1, 0) : column + 2]
+            assert np.any(np.all(edge == UNEXPLAINED_COLOUR, axis=-1))
+        assert not np.any(np.all(picture == EXPLAINED_COLOUR, axis=-1))
+
+
+def test_the_sky_is_darker_than_the_words_on_it(pictures):
+    assert not any(np.any(np.all(picture > 200, axis=-1)) for picture in pictures)
