@@ -10,15 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.base.bounds import bounded
+from care_sim.base.checks import check_flag, check_known
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.dimensions import LANE_WIDTH_M, SPEED_LIMIT_MPS
 from care_sim.streets.draft import footprints_meet
-from care_sim.streets.drive import SAMPLE_S, Drive, draw_drive
+from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
 from care_sim.streets.drive_traffic import DrivenLane
-from care_sim.streets.encounters import Course
+from care_sim.streets.encounters import COMERS, Course, Wanted
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.crosser import Crosser, Meeting
 from care_sim.world.lane_flow import LaneFlow
@@ -37,21 +38,46 @@ END_OF_TURN_M = 4.0
 far before the turn's end."""
 
 
+SIDES = {"left": 1, "right": -1}
+
+
 @dataclass(frozen=True)
 class DriveScenario(Scenario):
     """A drive of 160 to 260 m through a residential street, straight, round a bend or off into a
     side street. The ego follows its route, slows for bends and follows who drives ahead.
 
     Up to three times somebody comes out of hiding: an adult, a child, a cyclist or a car, from
-    either side. See `care_sim.streets.encounters` for who, whence and how it would end.
+    either side. See `care_sim.streets.encounters` for who, whence and how it would end. What is
+    None is drawn by the seed.
     """
 
     cameras = SURROUND_CAMERAS
     duration_s: float = bounded(LONGEST_EPISODE_S, 0.05, LONGEST_EPISODE_S)
+    encounters: int = bounded(3, 0, 3)
+    """The most that a drive holds; how many is drawn evenly from 0 on."""
+    side: str | None = None
+    """left or right: where all come from."""
+    who: str | None = None
+    """pedestrian, child, bicycle or car: who comes."""
+    occluder_reported: bool | None = None
+    """Whether perception reports what hides them. Cyclists and cars come from behind what it does
+    not report, so that with True adults and children alone come."""
+    turn_chance: float = bounded(TURN_CHANCE, 0, 1)
+    """With which the ego turns off where there is a side street."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, known in (("side", SIDES), ("who", COMERS)):
+            if getattr(self, name) is not None:
+                check_known(f"{name} of drive", getattr(self, name), known)
+        if self.occluder_reported is not None:
+            check_flag("occluder_reported of drive", self.occluder_reported)
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
-        drive = draw_drive(rng, self.duration_s)
+        side = None if self.side is None else SIDES[self.side]
+        wanted = Wanted(self.encounters, side, self.who, self.occluder_reported)
+        drive = draw_drive(rng, self.duration_s, wanted, self.turn_chance)
         # Nobody drives on highway-env's straight road; the lanes of the street have their own
         # flows.
         nobody = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=SPEED_LIMIT_MPS)

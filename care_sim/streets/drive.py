@@ -22,7 +22,7 @@ from care_sim.streets.drive_traffic import (
     drive_side_street,
 )
 from care_sim.streets.drivers import BEYOND_M
-from care_sim.streets.encounters import Encounter, draw_encounter
+from care_sim.streets.encounters import ANYBODY, Encounter, Wanted, draw_encounter
 from care_sim.streets.furniture import furnish
 from care_sim.streets.hiding import Spot
 from care_sim.streets.layouts import LAYOUTS, Joining, Plan, Road
@@ -40,8 +40,6 @@ TURN_RADIUS_M = {-1: 7.0, 1: 10.0}
 can turn within, with the room of a lane to the kerb."""
 TURN_CHANCE = 0.75
 """Where there is a side street, so that one drive in four turns off, as many as go round a bend."""
-ENCOUNTERS = (0, 1, 2, 3)
-"""How many a drive has, evenly: in a quarter of them there is nothing to brake for."""
 FIRST_M = 40.0
 APART_M = 42.0
 SHIFT_M: Range = (0.0, 12.0)
@@ -95,15 +93,22 @@ class Drive:
     encounters: tuple[Encounter, ...]
 
 
-def draw_drive(rng: np.random.Generator, duration_s: float) -> Drive:
-    """A drive of at most `duration_s` seconds. Nothing outside the generator enters."""
+def draw_drive(
+    rng: np.random.Generator,
+    duration_s: float,
+    wanted: Wanted = ANYBODY,
+    turn_chance: float = TURN_CHANCE,
+) -> Drive:
+    """A drive of at most `duration_s` seconds that holds `wanted` encounters, and with
+    `turn_chance` turns off where there is a side street. Nothing outside the generator enters.
+    """
     # Each part has a stream of its own, so that a change in one does not draw the others anew.
     plans, meeting, traffic, furniture, people = (
         np.random.default_rng(child)
         for child in np.random.SeedSequence(rng.integers(2**32, size=4).tolist()).spawn(5)
     )
     plan = LAYOUTS[str(plans.choice(list(LAYOUTS)))](plans)
-    turned_into = _turned_into(plans, plan)
+    turned_into = _turned_into(plans, plan, turn_chance)
     goal = draw(plans, LENGTH_M)
     cruise = draw(plans, CRUISE_MPS)
     route, stretches = _way(plan, turned_into, goal + BEYOND_M)
@@ -111,7 +116,7 @@ def draw_drive(rng: np.random.Generator, duration_s: float) -> Drive:
 
     times = SAMPLE_S * np.arange(round(duration_s / SAMPLE_S) + 1, dtype=np.float64)
     draft = Draft(furniture, times)
-    encounters = _encounters(meeting, draft, plan, stretches, goal, speed_plan)
+    encounters = _encounters(meeting, draft, plan, stretches, goal, speed_plan, wanted)
     last = min(goal, stretches[0].to_m) + BEYOND_M
     side_m = BEYOND_M + (goal - stretches[-1].offset_m if turned_into else 0.0)
     furnish(draft, plan, (-BEYOND_M, last), side_m)
@@ -126,9 +131,9 @@ def draw_drive(rng: np.random.Generator, duration_s: float) -> Drive:
     )
 
 
-def _turned_into(rng: np.random.Generator, plan: Plan) -> Joining | None:
+def _turned_into(rng: np.random.Generator, plan: Plan, chance: float) -> Joining | None:
     """The side street that the ego turns into, if it does."""
-    if not plan.joinings or rng.random() >= TURN_CHANCE:
+    if not plan.joinings or rng.random() >= chance:
         return None
     return plan.joinings[int(rng.integers(len(plan.joinings)))]
 
@@ -169,22 +174,24 @@ def _encounters(
     stretches: tuple[Stretch, ...],
     goal: float,
     speed_plan: SpeedPlan,
+    wanted: Wanted,
 ) -> tuple[Encounter, ...]:
     """Who is met, in the order of the way."""
     places = [
         place + draw(rng, SHIFT_M) for place in np.arange(FIRST_M, goal - SHIFT_M[1], APART_M)
     ]
-    wanted = min(int(rng.choice(ENCOUNTERS)), len(places))
+    # How many is drawn evenly: in a quarter of the drives there is nothing to brake for.
+    number = min(int(rng.choice(wanted.most + 1)), len(places))
     corner = _corner(rng, plan, stretches)
     spots = [*corner, *_others(places, corner, plan, stretches)]
     # All are drawn, then as many are taken as there shall be and have room: first at the corner.
     order = [*range(len(corner)), *(len(corner) + rng.permutation(len(spots) - len(corner)))]
     found: list[Encounter] = []
-    for spot in (spots[number] for number in order):
-        if len(found) == wanted:
+    for spot in (spots[place] for place in order):
+        if len(found) == number:
             break
         from_m, to_m = spot.along_m
-        one = draw_encounter(rng, spot, Approach.along(speed_plan, from_m, to_m))
+        one = draw_encounter(rng, spot, Approach.along(speed_plan, from_m, to_m), wanted)
         if one and keep_room(draft, one):
             found.append(one)
     return tuple(sorted(found, key=lambda one: one.along_m))

@@ -22,7 +22,7 @@ from care_sim.core.frames import Pose
 from care_sim.streets.approach import EGO_LENGTH_M, EGO_WIDTH_M, Approach, Arrival, Line
 from care_sim.streets.curve import Curve
 from care_sim.streets.dimensions import Range, draw
-from care_sim.streets.hiding import Hiding, Spot, draw_hiding
+from care_sim.streets.hiding import Hiding, Spot, draw_hiding, is_reported
 from care_sim.streets.layouts import Road, Side
 from care_sim.streets.sight import Sight, sight_of
 from care_sim.world.bodies import CATALOGUE
@@ -87,6 +87,22 @@ COMERS = {
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """Which encounters are wanted: at most `most` in a drive, from 0 on; from the `side` +1 (left)
+    or -1 (right); of `who`, one of `COMERS`; behind what perception reports, or does not. None
+    stands for all.
+    """
+
+    most: int = 3
+    side: int | None = None
+    who: str | None = None
+    reported: bool | None = None
+
+
+ANYBODY = Wanted()
+
+
+@dataclass(frozen=True)
 class Encounter:
     """Somebody of the kind `who` waits behind an `occluder` at `occluder_pose`, beside `s` metres
     along the road's line, and comes from the `side` +1 (left) or -1 (right).
@@ -118,18 +134,24 @@ class Encounter:
     @property
     def occluder_reported(self) -> bool:
         """Whether perception knows the occluder's class."""
-        return CATALOGUE[self.occluder].label is not None
+        return is_reported(self.occluder)
 
 
-def draw_encounter(rng: np.random.Generator, spot: Spot, approach: Approach) -> Encounter | None:
-    """An encounter at a spot from either side, redrawn until an ego on its `approach` sees who
-    comes for as long as is stated; None where it never would after `TRIES`.
+def draw_encounter(
+    rng: np.random.Generator, spot: Spot, approach: Approach, wanted: Wanted = ANYBODY
+) -> Encounter | None:
+    """A `wanted` encounter at a spot, redrawn until an ego on its `approach` sees who comes for as
+    long as is stated; None where it never would after `TRIES`.
     """
     # The side is drawn once: redrawn, it would be the near one more often.
     side = spot.road.sides[int(rng.integers(2))]
+    side = side if wanted.side is None else spot.road.side(wanted.side)
     for _ in range(TRIES):
         who = str(rng.choice(list(COMERS)))
+        who = wanted.who or who
         hiding = draw_hiding(rng, spot, side, who)
+        if hiding and wanted.reported not in (None, is_reported(hiding.occluder)):
+            continue
         drawn = hiding and _coming_out(rng, spot, side, who, hiding, approach)
         if drawn and drawn.sight.spare_s >= 0 and drawn.sight.seconds <= MOST_SIGHT_S:
             return drawn

@@ -59,6 +59,11 @@ class Hiding:
     edge_m: float
 
 
+def is_reported(occluder: str) -> bool:
+    """Whether perception knows the class of a body of the catalogue."""
+    return CATALOGUE[occluder].label is not None
+
+
 def draw_hiding(rng: np.random.Generator, spot: Spot, side: Side, who: str) -> Hiding | None:
     """Somewhere to hide for `who` comes from a side of a spot's road; None where the drawn body may
     not stand.

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from care_sim.base.errors import InvalidInput
 from care_sim.base.random_streams import streams
 from care_sim.scenarios.drive import DriveScenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
@@ -85,3 +86,17 @@ def test_the_episode_is_about_the_first_conflict():
 
 def test_the_car_has_six_cameras():
     assert DriveScenario.cameras == SURROUND_CAMERAS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"side": "both"}, "side of drive 'both'"),
+        ({"who": "bus"}, "who of drive 'bus'"),
+        ({"occluder_reported": "no"}, "occluder_reported of drive must be"),
+        ({"encounters": 4}, "encounters of drive"),
+    ],
+)
+def test_whom_a_drive_does_not_know_is_refused(arguments, told):
+    with pytest.raises(InvalidInput, match=told):
+        DriveScenario(**arguments)

@@ -10,8 +10,8 @@ from care_sim.streets.approach import EGO_LENGTH_M, EGO_WIDTH_M, Approach
 from care_sim.streets.curve import Curve
 from care_sim.streets.dimensions import SPEED_LIMIT_MPS
 from care_sim.streets.draft import footprints_meet
-from care_sim.streets.drive import ENCOUNTERS, LENGTH_M, draw_drive
-from care_sim.streets.encounters import ENCROACHMENT_S, MOST_SIGHT_S, Course, Way
+from care_sim.streets.drive import LENGTH_M, draw_drive
+from care_sim.streets.encounters import ENCROACHMENT_S, MOST_SIGHT_S, Course, Wanted, Way
 from care_sim.streets.sight import hides, needed_s
 from care_sim.world.bodies import CATALOGUE
 
@@ -39,7 +39,7 @@ def test_the_same_generator_draws_the_same_drive():
 def test_encounters_lie_on_the_way_and_apart(seed):
     drive = drawn(seed)
     places = [one.along_m for one in drive.encounters]
-    assert len(places) in ENCOUNTERS
+    assert len(places) <= 3
     assert LENGTH_M[0] <= drive.goal_m <= LENGTH_M[1]
     assert drive.plan.route.length > drive.goal_m
     assert all(40.0 <= place < drive.goal_m for place in places)
@@ -203,3 +203,41 @@ def test_lanes_lie_on_the_drives_roads_and_hold_somebody():
             assert isinstance(lane.curve, Curve)
             assert len(lane.kinds) == len(lane.places) == len(lane.speeds) > 0
             assert list(lane.places) == sorted(lane.places)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "holds"),
+    [
+        (Wanted(side=1), lambda one: one.side == 1),
+        (Wanted(side=-1), lambda one: one.side == -1),
+        (Wanted(who="child"), lambda one: one.who == "child"),
+        (Wanted(reported=True), lambda one: one.occluder_reported),
+        (Wanted(reported=False), lambda one: not one.occluder_reported),
+    ],
+)
+def test_only_what_is_wanted_is_met(wanted, holds):
+    met = [
+        one
+        for seed in SEEDS
+        for one in draw_drive(np.random.default_rng(seed), 6.0, wanted).encounters
+    ]
+    assert len(met) >= 4
+    assert all(map(holds, met))
+
+
+def test_no_more_are_met_than_wanted():
+    for most in (0, 1):
+        drives = [draw_drive(np.random.default_rng(seed), 6.0, Wanted(most)) for seed in SEEDS]
+        assert {len(drive.encounters) for drive in drives} <= set(range(most + 1))
+
+
+def test_the_ego_turns_off_where_it_always_shall_and_never_where_not():
+    plans = [
+        [
+            len(draw_drive(np.random.default_rng(seed), 6.0, turn_chance=chance).stretches)
+            for seed in SEEDS
+        ]
+        for chance in (0.0, 1.0)
+    ]
+    assert set(plans[0]) == {1}
+    assert 2 in plans[1]
