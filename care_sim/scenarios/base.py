@@ -41,7 +41,7 @@ class Scenario(ABC):
     duration_s: float = bounded(6.0, 0.05, LONGEST_EPISODE_S)
 
     def __post_init__(self) -> None:
-        check_fields(self, f" of {type(self).__name__.lower()}")
+        check_fields(self, f" of {type(self).__name__.removesuffix('Scenario').lower()}")
 
     @abstractmethod
     def build(self, rng: np.random.Generator) -> World:

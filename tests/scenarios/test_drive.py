@@ -94,7 +94,7 @@ def test_the_car_has_six_cameras():
         ({"side": "both"}, "side of drive 'both'"),
         ({"who": "bus"}, "who of drive 'bus'"),
         ({"occluder_reported": "no"}, "occluder_reported of drive must be"),
-        ({"encounters": 4}, "encounters of drive"),
+        ({"encounters": 4}, "encounters of drive must be"),
     ],
 )
 def test_whom_a_drive_does_not_know_is_refused(arguments, told):

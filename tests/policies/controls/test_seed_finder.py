@@ -112,8 +112,8 @@ def test_it_knows_the_parameters_of_the_scenario(make):
 def test_in_a_drive_it_knows_all_whom_the_ego_is_to_meet():
     env = gymnasium.make("care_sim:CARE-Drive-v0", disable_env_checker=True, budget=0.01)
     with env:
-        finder = care_sim.make_policy("seed-finder", env, seeds=4, hidden_first=True)
-        observation, _ = env.reset(seed=3)
+        finder = care_sim.make_policy("seed-finder", env, seeds=7, hidden_first=True)
+        observation, _ = env.reset(seed=6)
         finder.reset()
         for _ in range(8):
             loop = env.unwrapped.loop

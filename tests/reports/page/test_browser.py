@@ -107,13 +107,13 @@ def test_a_page_opens_at_once_and_says_what_was_played(opened, played):
 
 
 def test_a_drive_shows_its_way_whom_the_car_meets_and_the_collision(opened, tmp_path):
-    (config,) = grid(["drive"], ["care"], [0.01], [100])
+    (config,) = grid(["drive"], ["care"], [0.01], [105])
     rows = with_added_columns([run_episode(config)])
     page = opened(written(tmp_path, rows, "sweep", most=1), READY)
     page.eval_on_selector(
         "#moment", "bar => { bar.value = bar.max; bar.dispatchEvent(new Event('input')); }"
     )
-    assert page.inner_text(".now").endswith("the car hits the pedestrian with 8.1 m/s.")
+    assert page.inner_text(".now").endswith("the car hits the bicycle with 7.7 m/s.")
     assert page.locator(".view .ring").count() == 3
     assert page.locator(".view .way").count() == 1
 
