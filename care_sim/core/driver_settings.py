@@ -37,7 +37,7 @@ class DriverSettings:
     """The way must have been free this long before the brake is released, seconds."""
     brake_for_oncoming: bool = False
     """Whether a track that comes towards the ego counts where it will be, not where it is
-    (`care_sim.driving.braking`).
+    (`care_sim.driving.braking`). In the Euro NCAP tests it always does.
     """
     comfort_mps2: float = bounded(1.5, 0.01, 10)
     """Acceleration back to cruising speed, m/s^2."""

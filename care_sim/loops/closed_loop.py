@@ -1,5 +1,7 @@
 """One keyframe of the closed loop: fire, detect, track, act, let the world move, look."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -87,7 +89,10 @@ class ClosedLoop:
         length, width, _ = world.ego_kind.size
         front_m = length / 2 - LIDAR_POSITION[0]
         cruise_mps = world.ego_motion.speed
-        self._driver = make_driver(conditions, cruise_mps, front_m, width / 2, rig.keyframe_s)
+        rules = replace(
+            conditions, brake_for_oncoming=conditions.brake_for_oncoming or world.has_oncoming
+        )
+        self._driver = make_driver(rules, cruise_mps, front_m, width / 2, rig.keyframe_s)
         self.guarded_m = self._driver.guarded_m
         plan = world.speed_plan
         comfort = CruisingRules(comfort_mps2=conditions.comfort_mps2)

@@ -11,6 +11,7 @@ import numpy as np
 
 from care_sim.base.bounds import bounded
 from care_sim.base.checks import check_flag, check_known
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
@@ -20,6 +21,7 @@ from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
 from care_sim.streets.drive_traffic import DrivenLane
 from care_sim.streets.encounters import COMERS, Course, Wanted
+from care_sim.streets.hiding import AT_KERB
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.crosser import Crosser, Meeting
 from care_sim.world.lane_flow import LaneFlow
@@ -56,7 +58,8 @@ class DriveScenario(Scenario):
     encounters: int = bounded(3, 0, 3)
     """The most that a drive holds; how many is drawn evenly from 0 on."""
     side: str | None = None
-    """left or right: where all come from."""
+    """left or right: where all come from. Few cars and cyclists can come from the left: they would
+    be in sight for too long."""
     who: str | None = None
     """pedestrian, child, bicycle or car: who comes."""
     occluder_reported: bool | None = None
@@ -72,6 +75,11 @@ class DriveScenario(Scenario):
                 check_known(f"{name} of drive", getattr(self, name), known)
         if self.occluder_reported is not None:
             check_flag("occluder_reported of drive", self.occluder_reported)
+        if self.occluder_reported and self.who is not None and self.who not in AT_KERB:
+            raise InvalidInput(
+                f"who of drive must be one of {', '.join(AT_KERB)} where perception reports what "
+                f"hides them, got {self.who}"
+            )
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""

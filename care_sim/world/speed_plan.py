@@ -11,7 +11,8 @@ from care_sim.world.route import Route
 _SPACING_M = 0.25
 """Between two places at which the plan is worked out; a bend begins within it."""
 _AS_PLANNED_MPS = 0.3
-"""A car that lacks no more than this goes as planned: twice what it gains in a keyframe."""
+"""A car that lacks no more than this goes as planned: twice what it gains in 0.1 s. One that brakes
+hard lacks more after one keyframe."""
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,10 @@ class World:
     unless its scenario sets another. Like all that a world calls, it is handed the world and does
     not hold it: a world that holds itself keeps its client of PyBullet until garbage is collected.
     """
+    has_oncoming: bool
+    """Whether somebody may come towards the ego into its way, so that its brake has to foresee it;
+    its scenario sets it.
+    """
     meetings: list[Meeting]
     """Whom the scenario lets the ego meet, in the order of the way."""
 
@@ -95,6 +99,7 @@ class World:
         self.speed_plan = None
         self.goal_m = np.inf
         self.ended = lambda world: world.along_m >= world.goal_m
+        self.has_oncoming = False
         self.meetings = []
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []

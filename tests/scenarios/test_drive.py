@@ -94,6 +94,7 @@ def test_the_car_has_six_cameras():
         ({"side": "both"}, "side of drive 'both'"),
         ({"who": "bus"}, "who of drive 'bus'"),
         ({"occluder_reported": "no"}, "occluder_reported of drive must be"),
+        ({"who": "car", "occluder_reported": True}, "who of drive must be one of child"),
         ({"encounters": 4}, "encounters of drive must be"),
     ],
 )

@@ -129,7 +129,7 @@ _OPEN_KEYFRAMES = (2, 4, 4, 8, 8, 12, 40)
 """Numbers of keyframes that are played: mostly few, sometimes the whole episode."""
 STREETS = (3000, 3001)
 """Seeds of streets of the first `CERTIFIED_EPISODES`, which share two because a street takes
-seconds to make. They are none of a split.
+seconds to make. No published street is of the validation split, of which they are.
 """
 _MORE_STREETS = tuple(range(3000, 3012))
 """Seeds of streets of the others."""

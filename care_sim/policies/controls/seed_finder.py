@@ -106,14 +106,19 @@ class SeedFinder(Policy):
         return alike
 
     def _expected(self) -> Floats:
-        """(n, 7) boxes in the sensor frame of all who come out of hiding, none if not known."""
+        """(n, 7) boxes in the sensor frame of all who come out of hiding, ahead and within the
+        sensor's reach; none if not known.
+        """
         if self._twin is None:
             return np.empty((0, 7))
         hidden = {one.body for one in self._twin.meetings}
         if self._twin.first_sighting is not None:
             hidden.add(self._twin.first_sighting.body)
         sensor = Frame.mounted(self._twin.ego.pose, LIDAR_POSITION)
-        return sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
+        boxes = sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
+        # Who was passed, or is too far to be detected, would take the cells of who matters.
+        near = np.hypot(boxes[:, 0], boxes[:, 1]) <= self.rig.grid.range_m
+        return np.asarray(boxes[near & (boxes[:, 0] > 0)])
 
 
 @lru_cache(maxsize=10_000)

@@ -1,5 +1,6 @@
 """A Euro NCAP test as a scenario: test and speeds are arguments, the seed draws the rest."""
 
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -114,7 +115,8 @@ class Ncap(Scenario):
         """
         if self.speed_kph:
             return self
-        own = rng.spawn(1)[0]
+        # Of a copy, since a generator counts what it spawns.
+        own = deepcopy(rng).spawn(1)[0]
         name = str(own.choice(list(TESTS))) if self.test == DRAWN else self.test
         known = TESTS[name].variations
         speeds = known[int(own.integers(len(known)))]
@@ -139,6 +141,7 @@ class Ncap(Scenario):
         meeting = _meeting(test, self._variation(), Ego(speed, length, width, start_s))
         traffic = Traffic((1,), ego_lane=0, lane_width=LANE_WIDTH_M, speed_limit=NO_LIMIT_MPS)
         world = World(traffic, speed, _mirrored_route(meeting.route, side))
+        world.has_oncoming = True
         self._add_cars(world, meeting, sizes, side)
         world.first_sighting = world.add(
             test.target.body, test.target.body, lambda time: _mirrored(meeting.motion(time), side)

@@ -68,8 +68,8 @@ def ncap_study(
     budgets: Sequence[float] = NCAP_BUDGETS,
     step_kph: float = NCAP_STEP_KPH,
 ) -> list[EpisodeConfig]:
-    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default. The driver
-    brakes for who comes towards it, as the turn across an oncoming car asks for.
+    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default. Rows tell
+    that the driver brakes for who comes towards it, as in every one of these worlds.
     """
     return [
         config
