@@ -89,6 +89,7 @@ class ClosedLoop:
         length, width, _ = world.ego_kind.size
         front_m = length / 2 - LIDAR_POSITION[0]
         cruise_mps = world.ego_motion.speed
+        # Where somebody may come towards the ego into its way, the scenario asks for foresight.
         rules = replace(
             conditions, brake_for_oncoming=conditions.brake_for_oncoming or world.has_oncoming
         )

@@ -250,6 +250,14 @@ def test_a_drawn_test_is_the_world_of_that_test():
         np.testing.assert_array_equal(*boxes)
 
 
+def test_one_seed_draws_one_test_however_often_it_is_asked():
+    """A seed sequence counts what it spawns, also for the generators that are made of it."""
+    scenario = make_scenario("ncap", test="drawn", speed_kph=0)
+    seed = np.random.SeedSequence(5)
+    drawn = {scenario.drawn(np.random.default_rng(seed)) for _ in range(4)}
+    assert len(drawn) == 1
+
+
 def test_every_test_and_each_of_its_speeds_is_drawn_as_often():
     scenario = make_scenario("ncap", test="drawn", speed_kph=0)
     drawn = [scenario.drawn(np.random.default_rng(seed)) for seed in range(4000)]

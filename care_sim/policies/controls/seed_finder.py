@@ -34,7 +34,7 @@ class SeedFinder(Policy):
     same. It then finds the seed, and fires where they would be in the scenario that it knows.
 
     With `hidden_first` it asks for these hulls before anything else and gives its tracks what is
-    left: the most that memory of the seeds can do.
+    left. It knows nothing of the traffic, so that in drives others may hit less.
 
     It is a control, no contender: what it reaches without a camera is what the seeds give away.
     """

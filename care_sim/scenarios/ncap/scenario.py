@@ -53,7 +53,7 @@ class Ncap(Scenario):
     left-hand traffic.
 
     With `test="drawn", speed_kph=0` the seed draws a test too, each as often as the others, and one
-    of its pairs of speeds: no pattern can be laid out for a world of all tests.
+    of its pairs of speeds, so that a map of a single test does not fit.
 
     These cars are of one of the five classes. With `occluder_reported=False` perception does not
     report them. Ranges are drawn uniformly by the seed.

@@ -20,8 +20,8 @@ from care_sim.study.run_config import FULL, Row
 CAMERA_POLICIES = ("all-camera", "care", "care-sightlines")
 """The causal policies with a camera; the best of them has to beat the best control."""
 MEMORISER = "seed-finder"
-"""It looks the test seed up: what memory of the seeds can reach. Its figure is published, and it is
-nothing to beat.
+"""It looks the test seed up: what memory of who comes out can reach. Its figure is published, and
+it is nothing to beat.
 """
 _BLIND = ("history", "random")
 
