@@ -11,6 +11,7 @@ import numpy as np
 from care_sim.base.checks import check_flag, check_whole
 from care_sim.core.arrays import Floats
 from care_sim.core.belief import Belief
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
@@ -117,7 +118,7 @@ class SeedFinder(Policy):
         sensor = Frame.mounted(self._twin.ego.pose, LIDAR_POSITION)
         boxes = sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
         # Who was passed, or is too far to be detected, would take the cells of who matters.
-        near = np.hypot(boxes[:, 0], boxes[:, 1]) <= self.rig.grid.range_m
+        near = planar_ranges(boxes) <= self.rig.grid.range_m
         return np.asarray(boxes[near & (boxes[:, 0] > 0)])
 
 
