@@ -16,6 +16,7 @@ import care_sim
 from care_sim.base.errors import counted
 from care_sim.base.extras import vega_bundle
 from care_sim.base.files import HTML, replacing
+from care_sim.reports.captions import caption
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.chart import Chart
 from care_sim.reports.page.crowding_charts import crowding_charts
@@ -48,13 +49,16 @@ class Findings:
 
     charts: Sequence[Chart]
     tables: Sequence[Table]
+    reading: str
+    """How to read the tables."""
     closing: Sequence[str]
 
     @classmethod
     def of(cls, study: Study, rows: Sequence[Row]) -> "Findings":
-        """Charts, tables and closing sentences."""
+        """Charts, tables and sentences."""
         charts = CHARTS.get(study.name, _no_charts)(rows)
-        return cls(charts, study.tables(rows), study.closing(rows))
+        tables = study.tables(rows)
+        return cls(charts, tables, caption(study.caption, tables), study.closing(rows))
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ class Page:
                 # A page without charts needs no Vega.
                 vega=Markup(vega_bundle()) if charts else "",
                 tables=[(table, blocks(table)) for table in self.findings.tables],
+                reading=self.findings.reading,
                 closing=self.findings.closing,
                 groups=self.groups(),
                 replays=_embedded(replay_data(self.episodes)),

@@ -1,5 +1,7 @@
 """What a page is made of, and in which order."""
 
+from html import unescape
+
 import pytest
 
 from care_sim.base.errors import InvalidInput
@@ -7,6 +9,7 @@ from care_sim.reports.page import build
 from care_sim.reports.page.budget_charts import budget_charts
 from care_sim.reports.page.build import CHARTS, write_page
 from care_sim.reports.page.crowding_charts import crowding_charts
+from care_sim.reports.report import StudyReport
 from care_sim.reports.studies import STUDIES
 from care_sim.study.rows.parquet import write_rows
 from tests.helpers.made_rows import CROWD, STUDY, rows
@@ -42,3 +45,11 @@ def test_one_is_singular(tmp_path):
     write_rows(once[:1], tmp_path / "episodes.parquet")
     write_page(tmp_path, tmp_path / "report.html", 0, 1)
     assert "<small>1 configuration, 1 seed</small>" in (tmp_path / "report.html").read_text()
+
+
+def test_the_page_tells_how_to_read_its_tables_as_the_report_does(tmp_path):
+    write_rows(STUDY, tmp_path / "episodes.parquet")
+    write_page(tmp_path, tmp_path / "report.html", 0, 1)
+    page = unescape((tmp_path / "report.html").read_text())
+    reading, *_ = StudyReport.of(STUDY).texts["tables.md"].splitlines()
+    assert f"<p>{reading}</p>" in page
