@@ -1,4 +1,4 @@
-"""The trail that an episode leaves: a byte of a running hash after every stage, which tells the
+"""The trail that an episode leaves: some bytes of a running hash after every stage, which tell the
 first stage at which two episodes differ.
 """
 
@@ -31,6 +31,8 @@ TRAIL_STAGES = (
 last.
 """
 DIGEST_BYTES = 8
+STAGE_BYTES = 3
+"""By chance one of 16.8 million differences is named a stage late."""
 
 
 class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -55,8 +57,8 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     @property
     def played(self) -> bytes | str:
-        """The trail: `DIGEST_BYTES` of the hash over all, then a byte per stage; or in one line
-        why there is none.
+        """The trail: `DIGEST_BYTES` of the hash over all, then `STAGE_BYTES` per stage; or in one
+        line why there is none.
         """
         if not self.over:
             return "it did not come to its end"
@@ -112,9 +114,9 @@ class Trail(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._note(*_detected(self.env.unwrapped))
 
     def _note(self, *parts: Any) -> None:
-        # The hash runs on: once two episodes differ, every later byte differs too, but for chance.
+        # The hash runs on: once two episodes differ, so does every later stage.
         self._content.update(portable_bytes(*parts))
-        self._stages.append(self._content.digest()[-1])
+        self._stages += self._content.digest()[-STAGE_BYTES:]
 
 
 class _Gained:
@@ -146,18 +148,12 @@ class _Gained:
 
 
 def first_difference(trail: bytes, other: bytes) -> tuple[str, int | None]:
-    """The first stage at which two trails differ, and the keyframe, None of what belongs to none.
-
-    One time in 256 two different hashes have the same byte, and a later stage is named.
-    """
-    one = trail[DIGEST_BYTES:]
-    two = other[DIGEST_BYTES:]
+    """The first stage at which two trails differ, and the keyframe, None of what belongs to none."""
+    one, two = _stages(trail), _stages(other)
     last = min(len(one), len(two)) - 1
-    place = next(
-        (n for n, pair in enumerate(zip(one, two, strict=False)) if pair[0] != pair[1]), last
-    )
+    place = next((n for n in range(last) if one[n] != two[n]), last)
 
-    # The first byte is the configuration's, the last the outcome's, and between them the stages of
+    # The first stage is the configuration, the last the outcome, and between them come those of
     # keyframe after keyframe.
     if place <= 0:
         return CONFIGURATION, None
@@ -165,6 +161,11 @@ def first_difference(trail: bytes, other: bytes) -> tuple[str, int | None]:
         return OUTCOME, None
     keyframe, number = divmod(place - 1, len(TRAIL_STAGES))
     return TRAIL_STAGES[number], keyframe
+
+
+def _stages(trail: bytes) -> list[bytes]:
+    stages = trail[DIGEST_BYTES:]
+    return [stages[n : n + STAGE_BYTES] for n in range(0, len(stages), STAGE_BYTES)]
 
 
 def _moving(loop: ClosedLoop) -> tuple[Any, ...]:

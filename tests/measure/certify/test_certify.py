@@ -332,8 +332,7 @@ def test_what_is_broken_in_a_recording_is_named(source, monkeypatch):
 
 
 def test_a_needless_brake_of_a_drive_is_named(monkeypatch):
-    # In one of 256 drives the byte that tells of a stage is the same by chance, as with seed 3.
-    drive = replace(MADE, environment=DRIVE, seed=4)
+    drive = replace(MADE, environment=DRIVE)
     sound = alone(drive)
     calls = []
     monkeypatch.setattr(
