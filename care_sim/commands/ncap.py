@@ -25,7 +25,9 @@ class Ncap(EpisodeStudy):
     """Play the Euro NCAP tests of emergency braking: avoided, mitigated or hit, and a score."""
 
     seeds: tuple[int, ...] = (10,)
-    """One number: that many seeds, from 0. Several numbers: these seeds, of one split."""
+    """One number: that many seeds, from 0. Several numbers: these seeds, of one split; 7 7 is seed
+    7 alone.
+    """
     tests: tuple[str, ...] = ("all",)
     """Names of tests, as on the page of CARE-NCAP-v0; `all` stands for all of them."""
     policies: tuple[str, ...] = NCAP_POLICIES

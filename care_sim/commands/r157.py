@@ -16,7 +16,9 @@ class R157(FixedStudy):
     """
 
     seeds: tuple[int, ...] = (1,)
-    """One number: that many seeds, from 0. Several numbers: these seeds, of one split."""
+    """One number: that many seeds, from 0. Several numbers: these seeds, of one split; 7 7 is seed
+    7 alone.
+    """
     driver: str = FIXED
     """fixed, or careful-human: the regulation's driver at the wheel."""
     out: Path = Path("runs/r157")

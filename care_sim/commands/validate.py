@@ -25,7 +25,9 @@ class Validate(EpisodeStudy):
     world: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="WORLD")]
     """dartout, dense or cutin; `care-sim scenarios` lists them."""
     seeds: tuple[int, ...] = (20,)
-    """The test seeds. One number: that many, from 0. Several numbers: these, below 2,000."""
+    """The test seeds. One number: that many, from 0. Several numbers: these, below 2,000; 7 7 is
+    seed 7 alone.
+    """
     training_seeds: int = bounded(10, 1, 1000)
     """Number of training seeds, from 10,000 on: on them the best are chosen and places learned."""
     budgets: tuple[float, ...] = (0.01, 0.03, 0.1)

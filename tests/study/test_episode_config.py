@@ -182,3 +182,7 @@ def test_a_parameter_may_be_one_policys_own():
     assert care.policy_parameters == history.policy_parameters == ()
     with pytest.raises(InvalidInput, match="unknown policy 'carre'"):
         grid(["dense"], ["care"], [0.1], [0], policy_parameters=(("carre.k_safe", 1.0),))
+
+
+def test_a_seed_that_is_given_twice_is_one_seed():
+    assert [config.seed for config in grid(["dense"], ["care"], [0.1], [7, 7])] == [7]

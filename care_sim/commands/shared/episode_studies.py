@@ -21,7 +21,9 @@ class EpisodeStudy(StudyCommand):
     """A study of the closed loop."""
 
     seeds: tuple[int, ...] = (5,)
-    """One number: that many seeds, from 0. Several numbers: these seeds, of one split."""
+    """One number: that many seeds, from 0. Several numbers: these seeds, of one split; 7 7 is seed
+    7 alone.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,16 +46,16 @@ DEFAULT_OPTIONS = Options()
 
 
 def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
-    """The seeds that are meant by one number (that many, from 0) or by several (these). Raises
-    InvalidInput for a number below one or above that of the test seeds, and for seeds of several
-    splits (`care_sim.base.seed_ranges`).
+    """The seeds that are meant by one number (that many, from 0) or by several (these; twice the
+    same is that seed alone). Raises InvalidInput for a number below one or above that of the test
+    seeds, and for seeds of several splits (`care_sim.base.seed_ranges`).
     """
     if len(numbers) != 1:
         split_of(numbers)
         return numbers
     if not 1 <= numbers[0] <= VALIDATION:
         raise InvalidInput(
-            f"seeds must be a number of seeds from 1 to {VALIDATION:,}, as many as there are for "
-            f"tests, or a list of seeds, got {shown(numbers[0])}"
+            f"seeds must be one number, a count from 1 to {VALIDATION:,} (that many, from 0), or a "
+            f"list of two or more seeds (7 7 is seed 7 alone), got the count {shown(numbers[0])}"
         )
     return range(numbers[0])
