@@ -68,18 +68,9 @@ def ncap_study(
     budgets: Sequence[float] = NCAP_BUDGETS,
     step_kph: float = NCAP_STEP_KPH,
 ) -> list[EpisodeConfig]:
-    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default. Rows tell
-    that the driver brakes for who comes towards it, as in every one of these worlds.
-    """
+    """Every case, policy and budget: 140 cases, 2,240 configurations a seed by default."""
     return [
         config
         for case in ncap_cases(tests, step_kph)
-        for config in grid(
-            ["ncap"],
-            policies,
-            budgets,
-            seeds,
-            scenario_parameters=case.parameters,
-            brake_for_oncoming=True,
-        )
+        for config in grid(["ncap"], policies, budgets, seeds, scenario_parameters=case.parameters)
     ]
