@@ -148,7 +148,7 @@ class _Gained:
 
 
 def first_difference(trail: bytes, other: bytes) -> tuple[str, int | None]:
-    """The first stage at which two trails differ, and the keyframe, None of what belongs to none."""
+    """The first stage at which two trails differ, and its keyframe, None if it belongs to none."""
     one, two = _stages(trail), _stages(other)
     last = min(len(one), len(two)) - 1
     place = next((n for n in range(last) if one[n] != two[n]), last)
