@@ -82,6 +82,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `speed_mps` | the car's true speed; the observation's is what odometry reads | scoring alone |
     | `reward_terms` | `care_sim.envs.reward.terms` | scoring alone |
     | `seed` | from `reset`: it repeats the episode, and so tells all of it | scoring alone |
+    | `drawn` | from `reset`: scenario parameters that the seed drew, if any | scoring alone |
     | `outcome` | at the end: a dict of `care_sim.loops.records.Outcome` | scoring alone |
 
     (1) An array of B, with `floor=False` a list of at most B, because Gymnasium's vector
@@ -200,8 +201,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     ) -> tuple[Observed, dict[str, Any]]:
         """Begin an episode. Scenario, camera, noise and floor have independent streams of the seed.
 
-        `info` holds the seed that repeats the episode, unless `scoring_info` is off. There are no
-        `options`.
+        `info` holds the seed that repeats the episode and the parameters that it drew, unless
+        `scoring_info` is off. There are no `options`.
         """
         self._reseed(seed, options)
         entropy = self._draw_entropy(seed)
@@ -213,7 +214,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self._reward = rewards.EpisodeReward(self._weights)
         self.keyframes = []
         loop = ClosedLoop(world, self.rig, self.conditions, seeds, pool, self._detector)
-        return self._begin(loop, floor), self._info_of({}, {"seed": entropy})
+        drawn = {"drawn": dict(world.drawn)} if world.drawn else {}
+        return self._begin(loop, floor), self._info_of({}, {"seed": entropy, **drawn})
 
     def step(self, action: Action) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
         """Fire the cells that `action` scores highest and go on to the next keyframe.

@@ -21,7 +21,7 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.policies.base import Policy
 from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.run_config import Row
+from care_sim.study.run_config import Row, flat
 from care_sim.world.world import World
 
 _Result = TypeVar("_Result")
@@ -53,8 +53,9 @@ def result_or_reason(play: Callable[..., _Result], *arguments: object) -> _Resul
 def run_episode(config: EpisodeConfig) -> Row:
     """Play an episode and return its row.
 
-    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; the fields
-    of `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
+    Every parameter of `EpisodeConfig.row`; `version` and `digest` of the configuration; as
+    `drawn.NAME` the parameters of the scenario that the seed drew; the fields of
+    `care_sim.loops.records.Outcome`; `keyframes`; `wall_s`; `peak_rss_mb` of the process so far;
     and `episode_hash` over cells fired, ranges returned and poses (`care_sim.base.portable_hash`).
     """
     return trace(config)[0]
@@ -91,10 +92,12 @@ def trace(
                 watch(played.loop, played.keyframes[-1])
             ended = terminated or truncated
         keyframes = played.keyframes
+        drawn = played.loop.world.drawn
     row = {
         **config.row(),
         "version": care_sim.__version__,
         "digest": config.digest(),
+        **flat("drawn", tuple(drawn.items())),
         **info["outcome"],
         "keyframes": len(keyframes),
         "wall_s": time.perf_counter() - started,

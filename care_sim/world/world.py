@@ -1,6 +1,6 @@
 """The world of one episode: every body, who moves it, and what the scoring reads off it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +78,10 @@ class World:
     """
     meetings: list[Meeting]
     """Whom the scenario lets the ego meet, in the order of the way."""
+    drawn: Mapping[str, float | str]
+    """Parameters of the scenario that the seed drew, by name; its scenario sets them. For scoring:
+    they are truth.
+    """
 
     def __init__(self, traffic: Traffic, ego_speed: float, route: Route | None = None):
         self.bullet = BulletWorld()
@@ -101,6 +105,7 @@ class World:
         self.ended = lambda world: world.along_m >= world.goal_m
         self.has_oncoming = False
         self.meetings = []
+        self.drawn = {}
         self._moving: list[Actor] = []
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._every_step: list[Callable[[World], None]] = []

@@ -1,8 +1,12 @@
 """The environment of the Euro NCAP tests, with its real parts."""
 
+from contextlib import closing
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import SyncVectorEnv
 
 import care_sim
 from care_sim.scenarios.ncap.table import TESTS
@@ -44,6 +48,39 @@ def test_a_car_that_sees_nothing_hits():
     assert ended["impact_speed_mps"] == pytest.approx(41 / 3.6, abs=1 / 3.6)
     assert terminated
     assert steps in (40, 41)
+
+
+def test_a_drawn_test_is_told_to_the_scoring_and_its_world_is_that_test():
+    with make(budget=0.03, test="drawn", speed_kph=0) as env:
+        begun, info = env.reset(seed=4)
+        poses = [actor.pose_at(1.0) for actor in env.unwrapped.loop.world.actors]
+    assert set(info["drawn"]) == {"test", "speed_kph", "target_kph"}
+    with make(budget=0.03, **info["drawn"]) as env:
+        same, told = env.reset(seed=4)
+        assert poses == [actor.pose_at(1.0) for actor in env.unwrapped.loop.world.actors]
+    np.testing.assert_equal(begun, same)
+    # What is given is not drawn, and what the seed drew is no one else's.
+    assert told == {"seed": 4}
+    with make(budget=0.03, test="drawn", speed_kph=0, scoring_info=False) as env:
+        assert env.reset(seed=4)[1] == {}
+
+
+def test_speeds_alone_are_told_where_the_test_is_given():
+    with make(budget=0.03, test="CCFtap", speed_kph=0) as env:
+        _, info = env.reset(seed=1)
+    assert set(info["drawn"]) == {"speed_kph", "target_kph"}
+
+
+def test_vectors_tell_what_every_world_drew():
+    drawn = partial(make, budget=0.03, test="drawn", speed_kph=0)
+    with closing(SyncVectorEnv([drawn] * 2)) as vector:
+        _, together = vector.reset(seed=4)
+    for n in range(2):
+        with drawn() as env:
+            alone = env.reset(seed=4 + n)[1]["drawn"]
+        assert {name: values[n] for name, values in together["drawn"].items() if name in alone} == (
+            alone
+        )
 
 
 def test_the_readings_differ_in_what_is_known_of_the_cars_alone():

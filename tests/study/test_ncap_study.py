@@ -6,6 +6,8 @@ import pytest
 
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.study.designs.ncap import NCAP_POLICIES, NcapCase, ncap_cases, ncap_study
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.episode_play import run_episode
 
 
 def test_the_protocols_speeds_are_played_in_steps():
@@ -39,10 +41,25 @@ def test_the_configurations_of_a_seed_are_as_many_as_stated():
     assert len(configs) == 16
     assert {config.policy for config in configs} == set(NCAP_POLICIES)
     assert {config.seed for config in configs} == {4}
-    assert all(config.brake_for_oncoming for config in configs)
 
 
 @pytest.mark.parametrize("reported", [True, False, None])
 def test_every_row_tells_the_reading(reported):
     names = dict(NcapCase("CPNCO-50", 20.0, 5.0, reported).parameters)
     assert names.get("occluder_reported") is reported
+
+
+def test_a_row_tells_the_test_that_its_seed_drew_and_others_have_no_such_column():
+    short = ("duration_s", 0.1)
+    drawn = (("test", "drawn"), ("speed_kph", 0.0), short)
+    rows = [
+        run_episode(EpisodeConfig("ncap", "fan", 0.01, seed, scenario_parameters=drawn))
+        for seed in range(3)
+    ]
+    for row in rows:
+        pairs = {(each.ego_kph, each.target_kph) for each in TESTS[row["drawn.test"]].variations}
+        assert (row["drawn.speed_kph"], row["drawn.target_kph"]) in pairs
+        assert row["scenario.test"] == "drawn"
+    assert len({row["drawn.test"] for row in rows}) > 1
+    given = run_episode(EpisodeConfig("ncap", "fan", 0.01, scenario_parameters=(short,)))
+    assert not [name for name in given if name.startswith("drawn")]

@@ -124,7 +124,13 @@ class Ncap(Scenario):
 
     def build(self, rng: np.random.Generator) -> World:
         """A fresh world at time zero."""
-        return self.drawn(rng)._build(rng)
+        own = self.drawn(rng)
+        world = own._build(rng)
+        if not self.speed_kph:
+            world.drawn = {"speed_kph": own.speed_kph, "target_kph": own.target_kph}
+        if self.test == DRAWN:
+            world.drawn = {"test": own.test, **world.drawn}
+        return world
 
     def _build(self, rng: np.random.Generator) -> World:
         # The order of the draws is part of what a seed means. All are made for every test.

@@ -1,6 +1,6 @@
 """UN Regulation 157: a slower vehicle changes over from the lane beside into the ego's."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -97,6 +97,9 @@ class R157(Scenario):
         start = (start_x, lane_m if case.side == "left" else -lane_m)
         change = LaneChange(start, case.other_mps, lead_s, case.lateral_mps, to_y=0.0)
         world.first_sighting = world.add(case.kind, case.kind, change.pose)
+        world.drawn = {
+            name: value for name, value in asdict(case).items() if getattr(self, name) is None
+        }
         return world
 
     def draw_case(self, rng: np.random.Generator) -> CutInCase:

@@ -52,6 +52,20 @@ def test_an_ego_that_never_brakes_is_touched_unless_the_case_is_harmless(side):
         assert (word == "harmless") == (gap_m <= 25)
 
 
+def test_a_world_tells_what_was_drawn_of_its_case():
+    world = build(seed=3)
+    case = make_scenario("r157").draw_case(np.random.default_rng(3))
+    assert world.drawn == vars(case)
+    world.close()
+    world = build(seed=3, kind="van", ego_kph=60.0)
+    assert set(world.drawn) == {"relative_kph", "gap_m", "lateral_mps", "side"}
+    given = {"kind": "van", "ego_kph": 60.0} | dict(world.drawn)
+    world.close()
+    world = build(seed=3, **given)
+    assert world.drawn == {}
+    world.close()
+
+
 def test_what_is_not_given_is_drawn_among_the_preventable_cases():
     drawn = [make_scenario("r157").draw_case(np.random.default_rng(seed)) for seed in range(200)]
     assert {*verdicts(drawn)} == {"preventable"}
