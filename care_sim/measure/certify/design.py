@@ -1,8 +1,8 @@
 """The list of episodes: what the episode of a number is made of.
 
 Everything is drawn independently, so that the first `CERTIFIED_EPISODES` hold every pair of an
-environment, a policy, a fault, a setting and a mode that can meet. The order of the draws is a part
-of the list.
+environment, a policy, a fault, a setting, a driver and a mode that can meet. The order of the draws
+is a part of the list.
 
 The open loop detects with the paper's proxy. The detector `cluster` fits the road by iteration,
 which ends a little differently on another processor.
@@ -19,13 +19,14 @@ from care_sim.policies.makers import is_privileged
 CERTIFIED_EPISODES = 1_800
 """What is played unless more is asked for. With 28 policies the last pair meets in number 1,784."""
 
+NCAP = "CARE-NCAP-v0"
 DRIVE = "CARE-Drive-v0"
 CLOSED = (
     "CARE-Dartout-v0",
     "CARE-Dense-v0",
     "CARE-CutIn-v0",
     "CARE-R157-v0",
-    "CARE-NCAP-v0",
+    NCAP,
     DRIVE,
 )
 STREET = "CARE-Street-v0"
@@ -113,14 +114,39 @@ CERTIFIED_SETTINGS: dict[str, dict[str, Any]] = {
     "azimuth_margin": {"azimuth_margin": 4},
     "elevation_margin": {"elevation_margin": 0},
     "cell_order": {"cell_order": "core-spread"},
-    "driver": {"driver": "careful-human"},
+    "reward_weights": {"reward_weights": {"gain": 1.0}},
 }
+CERTIFIED_DRIVERS: dict[str, dict[str, Any]] = {
+    "driver": {"driver": "careful-human"},
+    "brake_for_oncoming": {"brake_for_oncoming": True},
+    "braking": {
+        "brake_mps2": 8.0,
+        "brake_reaction_s": 0.1,
+        "brake_standstill_m": 1.0,
+        "brake_horizon_s": 3.0,
+        "brake_side_margin_m": 0.6,
+        "brake_release_s": 0.2,
+        "comfort_mps2": 2.5,
+    },
+}
+"""One of them at most, since the careful human does not know the rules of the fixed driver."""
+_USUAL: dict[str, Any] = {}
+DRAWN_TEST = {"test": "drawn", "speed_kph": 0}
+CERTIFIED_WORLDS: dict[str, tuple[dict[str, Any], ...]] = {
+    NCAP: (_USUAL, DRAWN_TEST, DRAWN_TEST),
+    DRIVE: (
+        _USUAL,
+        {"encounters": 2, "side": "left", "turn_chance": 1.0},
+        {"who": "child", "occluder_reported": True},
+    ),
+}
+"""Parameters of scenarios; the others play with their own defaults."""
 _CLOSED_ALONE = (
     "camera_rotation_sigma_deg",
     "camera_position_sigma_m",
     "engine",
     "keyframe_s",
-    "driver",
+    "reward_weights",
 )
 """Faults and settings that the open loop does not have."""
 
@@ -170,6 +196,9 @@ def drawn(number: int) -> Drawn:
         possible = [name for name in choices if closed or name not in _CLOSED_ALONE]
         for name in rng.sample(possible, rng.choice(most)):
             arguments |= choices[name]
+    if closed:
+        arguments |= rng.choice((_USUAL, _USUAL, *CERTIFIED_DRIVERS.values()))
+    arguments |= rng.choice(CERTIFIED_WORLDS.get(environment, (_USUAL,)))
 
     if environment == STREET:
         seed = rng.choice(STREETS if number < CERTIFIED_EPISODES else _MORE_STREETS)
