@@ -180,8 +180,7 @@ def _looking(crosser: Crosser, plan: SpeedPlan, line_m: float) -> Callable[[Worl
     """Somebody who watches the ego, whose middle is on the line `line_m` along the route."""
 
     def look(world: World) -> None:
-        if crosser.went is None:
-            crosser.look(world.time, _seconds_left(world, plan, line_m))
+        crosser.look(world.time, lambda: _seconds_left(world, plan, line_m))
 
     return look
 

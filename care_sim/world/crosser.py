@@ -24,14 +24,17 @@ class Crosser:
         self._lead_s = lead_s
         self._may_go = may_go
 
-    def look(self, time: float, seconds_left: float) -> None:
-        """Decide at `time`, seconds from the start, at which the ego has `seconds_left`; to be
-        called at every world step until it has decided.
+    def look(self, time: float, seconds_left: Callable[[], float]) -> None:
+        """Decide at `time`, seconds from the start; to be called at every world step.
+        `seconds_left` tells what the ego has, and is asked only until the decision: it takes long.
         """
-        if self.went is not None or seconds_left > self._lead_s:
+        if self.went is not None:
+            return
+        left = seconds_left()
+        if left > self._lead_s:
             return
         # World steps are short but not endless: it set off a moment ago, when the time was right.
-        self.walk = self.walk.setting_off(time - (self._lead_s - seconds_left))
+        self.walk = self.walk.setting_off(time - (self._lead_s - left))
         self.went = self._may_go(self.walk)
 
     def pose(self, time: float) -> Pose:
