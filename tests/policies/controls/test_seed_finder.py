@@ -1,5 +1,7 @@
 """What an agent does that looks the episode up, and that a secret leaves it nothing to look up."""
 
+from dataclasses import dataclass
+
 import gymnasium
 import numpy as np
 import pytest
@@ -8,8 +10,16 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.selection import expanded
 from care_sim.core.belief import Belief
+from care_sim.core.rig import Rig
 from care_sim.policies import contenders, policy_names, tags_of
+from care_sim.policies.controls.rehearsal import rehearsal
 from care_sim.policies.controls.seed_finder import SeedFinder
+from care_sim.scenarios.base import Scenario
+from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.world.crosser import Crosser, Meeting
+from care_sim.world.traffic import Traffic
+from care_sim.world.walker import Walk
+from care_sim.world.world import World
 
 BLIND = {"budget": 0.03, "false_negative_rate": 1.0}
 ENVIRONMENTS = {"dartout": "CARE-Dartout-v0", "dense": "CARE-Dense-v0", "cutin": "CARE-CutIn-v0"}
@@ -125,6 +135,40 @@ def test_in_a_drive_it_knows_all_whom_the_ego_is_to_meet():
             action = finder(observation)
             np.testing.assert_allclose(finder._expected(), [near], atol=0.05)
             observation, *_ = env.step(action)
+
+
+@dataclass(frozen=True)
+class ThreeBesideTheWay(Scenario):
+    """Three people stand 6, 20 and 54 m down the way of an ego that drives on at 10 m/s."""
+
+    def build(self, rng):
+        world = World(Traffic((1,), 0, 3.5, 14.0), 10.0)
+        for x in (6.0, 20.0, 54.0):
+            body = world.add("adult", "adult", (x, -3.0, 0.0)).body
+            waits = Crosser(Walk((x, -3.0), 0.0, 1.0, 1.0, 1.0), 0.0, lambda _walk: False)
+            world.meetings.append(
+                Meeting(body, "adult", "right", x, "straight", "stop", "hedge", False, waits)
+            )
+        return world
+
+
+def test_whom_it_has_passed_and_who_is_out_of_reach_it_leaves_out():
+    """A keyframe is a metre of the way. The sensor begins 0.445 m before it and reaches 50 m."""
+    rig = Rig(cameras=(FRONT_CAMERA,), budget=100)
+    finder = SeedFinder(rig, ThreeBesideTheWay(), seeds=1)
+    loop = rehearsal(ThreeBesideTheWay(), 0, rig)
+    expected = []
+    for _ in range(24):
+        finder.remember(loop.belief)
+        places = finder._expected()[:, 0] + loop.sensor.x
+        expected.append(places.round(3).tolist())
+        loop.keyframe(np.array([], np.int64))
+    finder.reset()
+    loop.world.close()
+    assert expected[:5] == [[6.0, 20.0]] * 5
+    assert expected[5:7] == [[6.0, 20.0, 54.0]] * 2
+    assert expected[7:21] == [[20.0, 54.0]] * 14
+    assert expected[21:] == [[54.0]] * 3
 
 
 def test_of_seeds_that_share_a_speed_it_takes_the_one_whose_picture_it_sees(make):
