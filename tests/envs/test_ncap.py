@@ -50,6 +50,14 @@ def test_a_car_that_sees_nothing_hits():
     assert steps in (40, 41)
 
 
+def test_its_worlds_ask_for_foresight_themselves():
+    """The left turn before an oncoming car, which a brake without it does not avoid."""
+    turn = {"test": "CCFtap", "speed_kph": 10.0, "target_kph": 30.0}
+    usual = outcome("full", **turn)
+    assert usual == outcome("full", brake_for_oncoming=True, **turn)
+    assert not usual[0]["collision"]
+
+
 def test_a_drawn_test_is_told_to_the_scoring_and_its_world_is_that_test():
     with make(budget=0.03, test="drawn", speed_kph=0) as env:
         begun, info = env.reset(seed=4)
