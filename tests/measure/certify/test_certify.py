@@ -38,6 +38,7 @@ from care_sim.measure.certify.trail import (
     CONFIGURATION,
     DIGEST_BYTES,
     OUTCOME,
+    STAGE_BYTES,
     TRAIL_STAGES,
     first_difference,
 )
@@ -288,6 +289,21 @@ def test_a_needless_brake_of_a_drive_is_named(monkeypatch):
         NeedlessBraking, "judge", lambda *given: calls.append(given) or len(calls) == 3
     )
     assert first_difference(sound, alone(drive)) == (TRAIL_STAGES[5], 2)
+
+
+def test_every_byte_of_a_stage_counts():
+    """A configuration, two keyframes of six stages, an outcome."""
+    sound = bytes(DIGEST_BYTES + 14 * STAGE_BYTES)
+    for byte in range(STAGE_BYTES):
+        for stage, where in (
+            (0, (CONFIGURATION, None)),
+            (1, (TRAIL_STAGES[0], 0)),
+            (8, (TRAIL_STAGES[1], 1)),
+            (13, (OUTCOME, None)),
+        ):
+            other = bytearray(sound)
+            other[DIGEST_BYTES + stage * STAGE_BYTES + byte] = 1
+            assert first_difference(sound, bytes(other)) == where
 
 
 def test_another_configuration_is_named():
