@@ -93,31 +93,6 @@ def taken_by_stage(demand: Demand, budget: int, reserve_fraction: float) -> list
     return np.split(chosen, ends)
 
 
-class RandomFloor:
-    """The shared random floor: at every keyframe a permutation of all cells, the same for every
-    policy that plays the episode. Number 0 is the seed's own floor, the others are drawn from its
-    children.
-    """
-
-    def __init__(self, seed: np.random.SeedSequence, number: int, cells: int):
-        # What `seed.spawn` would give its child `number - 1`, without spawning those before it and
-        # without moving the seed's own count of children.
-        children = (number - 1,) if number else ()
-        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *children))
-        self._rng = np.random.default_rng(own)
-        self._cells = cells
-        self._floor = np.empty(0, np.int64)
-        self._keyframe = -1
-
-    def at(self, keyframe: int) -> Cells:
-        """The floor of a keyframe, counted from 0, that is not before the last one asked for."""
-        # Those that nobody spent are drawn all the same, so that no action moves the later ones.
-        for _ in range(self._keyframe, keyframe):
-            self._floor = self._rng.permutation(self._cells)
-        self._keyframe = keyframe
-        return self._floor
-
-
 def _sequence(name: str, form: str, given: Any) -> Sequence[Any]:
     """A part of a demand. Raises InvalidInput unless it is a sequence."""
     is_sequence = given.ndim if isinstance(given, np.ndarray) else isinstance(given, Sequence)

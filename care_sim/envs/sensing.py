@@ -16,11 +16,12 @@ from care_sim.base.checks import check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.random_streams import check_secret, streams
 from care_sim.core.actions import fired_cells
-from care_sim.core.allocation import RandomFloor, budget_cells
+from care_sim.core.allocation import budget_cells
 from care_sim.core.belief import OBSERVED
 from care_sim.core.conditions import Conditions
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
