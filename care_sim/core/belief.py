@@ -121,21 +121,14 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
     for rows that are neither padding nor of a known class, and for what no sensor says.
     """
     table = _array(observation, key, (None, len(columns)))
-    first = table[:, 0]
-    rows: Floats = table[first >= 0].astype(np.float64)
-    if len(rows) and not (rows.min() >= -HIGHEST and rows.max() <= HIGHEST):
+    rows: Floats = table[table[:, 0] != -1].astype(np.float64)
+    if not len(rows):
+        return rows
+    if not (rows.min() >= -HIGHEST and rows.max() <= HIGHEST):
         raise _beyond(key)
-
-    # A row is padding or begins with 0 or more. What begins otherwise, with another number below 0
-    # or with NaN, is counted as neither.
-    padding = int(np.count_nonzero(first == -1))
     leads = rows[:, 0].tolist()
     labels = rows[:, columns.index("class")].tolist()
-    if (
-        padding + len(rows) != len(table)
-        or not _LABELS.issuperset(labels)
-        or not all(map(float.is_integer, leads))
-    ):
+    if not (_LABELS.issuperset(labels) and all(one >= 0 and one.is_integer() for one in leads)):
         raise InvalidInput(
             f"{key} of an observation: a row must begin with a whole number, -1 where it is"
             f" padding, and be of a class 0 to {len(CLASSES) - 1}"

@@ -15,7 +15,9 @@ Pose = tuple[float, float, float]
 
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
-    """Vectors (..., 2) or (..., 3) turned by `yaw` radians about z: one angle, or one each."""
+    """Vectors (..., k) turned by `yaw` radians about z: one angle, or one each. x and y come first;
+    the other numbers stay as they are.
+    """
     # Written out: a matrix product may round differently from one processor to the next.
     cos, sin = np.cos(yaw), np.sin(yaw)
     result: Floats = np.array(vectors, dtype=float)
@@ -96,7 +98,7 @@ class Frame:
         plane.
         """
         if self._upright:
-            return _centres_turned(boxes - self._offset, -self.yaw)
+            return turned(boxes - self._offset, -self.yaw)
         centres = self.vectors_to_local(boxes[:, :3] - self.origin)
         return _boxes_turned(boxes, centres, self.vectors_to_local)
 
@@ -105,7 +107,7 @@ class Frame:
         ground.
         """
         if self._upright:
-            return _centres_turned(boxes, self.yaw) + self._offset
+            return turned(boxes, self.yaw) + self._offset
         centres = self.origin + self.vectors_to_world(boxes[:, :3])
         return _boxes_turned(boxes, centres, self.vectors_to_world)
 
@@ -117,11 +119,6 @@ class Frame:
     @property
     def _offset(self) -> Floats:
         return np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0, self.yaw])
-
-
-def _centres_turned(boxes: Floats, yaw: float) -> Floats:
-    """Boxes (n, 7) whose centres are turned about the origin; headings as they are."""
-    return np.concatenate([turned(boxes[:, :3], yaw), boxes[:, 3:]], axis=1)
 
 
 def _boxes_turned(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:

@@ -105,15 +105,30 @@ class ImageDetections:
             yaw_changes=table[:, cls.YAW_CHANGE],
         )
 
+    def aged(self, age_s: float, yaw_change: float) -> "ImageDetections":
+        """The same detections of a picture that was taken `age_s` seconds ago, since when the car
+        has turned by `yaw_change` radians.
+        """
+        ages = np.full(len(self), age_s)
+        yaw_changes = np.full(len(self), yaw_change)
+        return ImageDetections(
+            self.classes, self.confidences, self.boxes, self.cameras, ages, yaw_changes
+        )
+
     def rows(self) -> Floats:
         """(n, 9) table in the order of `COLUMNS`, read-only."""
         return self._rows
 
     @cached_property
     def _rows(self) -> Floats:
-        return _table(
-            self.classes, self.confidences, self.boxes, self.cameras, self.ages, self.yaw_changes
-        )
+        table = np.empty((len(self), len(self.COLUMNS)))
+        table[:, self.CLASS] = self.classes
+        table[:, self.CONFIDENCE] = self.confidences
+        table[:, self.BOX] = self.boxes
+        table[:, self.CAMERA] = self.cameras
+        table[:, self.AGE] = self.ages
+        table[:, self.YAW_CHANGE] = self.yaw_changes
+        return _shared(table)
 
 
 @dataclass(frozen=True)
@@ -195,7 +210,14 @@ class Tracks:
 
     @cached_property
     def _rows(self) -> Floats:
-        return _table(self.ids, self.classes, self.boxes, self.velocities, self.misses, self.hits)
+        table = np.empty((len(self), len(self.COLUMNS)))
+        table[:, self.ID] = self.ids
+        table[:, self.CLASS] = self.classes
+        table[:, self.BOX] = self.boxes
+        table[:, self.VELOCITY] = self.velocities
+        table[:, self.MISSES] = self.misses
+        table[:, self.HITS] = self.hits
+        return _shared(table)
 
 
 def _check_whole_columns(what: str, numbers: Floats) -> None:
@@ -205,9 +227,8 @@ def _check_whole_columns(what: str, numbers: Floats) -> None:
         raise InvalidInput(f"{what} must be numbers up to {_EXACT:g}, none of them NaN")
 
 
-def _table(*columns: NDArray[np.generic]) -> Floats:
-    table: Floats = np.column_stack(columns)
-    # It is kept and handed to all who ask.
+def _shared(table: Floats) -> Floats:
+    """A table that is kept and handed to all who ask, and so is read-only."""
     table.flags.writeable = False
     return table
 

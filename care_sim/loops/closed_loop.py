@@ -256,7 +256,8 @@ class ClosedLoop:
         return target is not None and self.shows(target.body)
 
     def _distance_to_first_sighting(self, sensor: Frame) -> float:
-        if self.world.first_sighting is None:
+        target = self.world.first_sighting
+        if target is None:
             return float("inf")
-        x, y, _ = self.world.first_sighting.pose_at(self.world.time)
+        ((x, y),) = self.world.boxes([target])[:, :2].tolist()
         return float(np.hypot(x - sensor.x, y - sensor.y))

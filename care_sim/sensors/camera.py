@@ -14,7 +14,7 @@ from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
-from care_sim.sensors.engines.picture_kernels import visible_boxes
+from care_sim.sensors.engines.box_kernels import visible_boxes
 from care_sim.sensors.false_boxes import FalseBoxes
 from care_sim.world.bullet import PixelWindow
 
@@ -78,7 +78,9 @@ def faultless_detections(
                 rows.append((labels[body], confidence_of(pixels), *box, camera, 0.0, 0.0))
                 bodies.append(body)
     table = np.array(rows, float).reshape(-1, len(ImageDetections.COLUMNS))
-    return IdentifiedDetections(ImageDetections.from_rows(table), np.array(bodies, np.int64))
+    return IdentifiedDetections(
+        ImageDetections.from_checked_rows(table), np.array(bodies, np.int64)
+    )
 
 
 class CameraDetector:
@@ -134,7 +136,7 @@ class CameraDetector:
         reported = np.flatnonzero(sure & (not self._sensing.black_at(time_s)))
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
         order = reported[np.lexsort((rows[reported, ImageDetections.LEFT], -confidences[reported]))]
-        detections = ImageDetections.from_rows(rows[order])
+        detections = ImageDetections.from_checked_rows(rows[order])
         return self._delay.newest(IdentifiedDetections(detections, objects[order]), heading)
 
 

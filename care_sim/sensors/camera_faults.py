@@ -114,14 +114,9 @@ class Delay:
         return self._aged(self._sent[0], heading)
 
     def _aged(self, picture: _SentPicture, heading: float) -> IdentifiedDetections:
-        count = len(picture.seen)
         age_s = (self._keyframe - picture.keyframe) * self.keyframe_s
-        detections = replace(
-            picture.seen.detections,
-            ages=np.full(count, age_s),
-            yaw_changes=np.full(count, heading - picture.heading),
-        )
-        return replace(picture.seen, detections=detections)
+        detections = picture.seen.detections.aged(age_s, heading - picture.heading)
+        return IdentifiedDetections(detections, picture.seen.objects)
 
 
 def mounted(camera: PinholeCamera, faults: CameraFaults, rng: np.random.Generator) -> PinholeCamera:

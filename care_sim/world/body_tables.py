@@ -23,36 +23,39 @@ class Footprints:
 
     def __init__(self) -> None:
         self.boxes = np.empty((0, 7))
-        self._halves = np.empty((0, 2))
+        self._radii = np.empty(0)
 
     def add(self, body: int, size: Triple, pose: Pose) -> None:
         """Take in a body of a size on the ground plane."""
         # PyBullet numbers bodies upwards, the ground among them: rows between stay NaN.
         missing = body + 1 - len(self.boxes)
         self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
-        self._halves = np.vstack([self._halves, np.full((missing, 2), np.nan)])
+        self._radii = np.append(self._radii, np.full(missing, np.nan))
         self.boxes[body, 2:6] = size[2] / 2, *size
+        self._radii[body] = np.hypot(*size[:2]) / 2
         self.move_all(np.array([body]), np.array([pose]))
 
     def move_all(self, bodies: Integers, poses: Floats) -> None:
         """Put bodies (n,) at poses (n, 3): x, y, heading."""
-        boxes = self.boxes[bodies]
-        boxes[:, :2] = poses[:, :2]
-        boxes[:, 6] = poses[:, 2]
-        self.boxes[bodies] = boxes
-        self._halves[bodies] = np.stack(half_extents(boxes), axis=1)
+        self.boxes[bodies, :2] = poses[:, :2]
+        self.boxes[bodies, 6] = poses[:, 2]
 
     def near(self, body: int, within: float) -> Integers:
         """Ids of the other bodies that may be within `within` metres of one. None of those is
         missing; some may be further away, since rectangles along x and y stand for the footprints.
         """
-        gaps = np.abs(self.boxes[:, :2] - self.boxes[body, :2]) - (
-            self._halves + self._halves[body]
-        )
-        # NaN, where there is no body, is close to nothing.
-        close = (gaps[:, 0] <= within) & (gaps[:, 1] <= within)
-        close[body] = False
-        return np.flatnonzero(close)
+        # First by the circles that hold the footprints, which leave few for the rectangles. NaN,
+        # where there is no body, is close to nothing.
+        x, y = self.boxes[body, :2].tolist()
+        apart = np.hypot(self.boxes[:, 0] - x, self.boxes[:, 1] - y)
+        close = np.flatnonzero(apart <= self._radii + (self._radii[body] + within))
+        if len(close) == 1:
+            return close[close != body]
+        half_x, half_y = half_extents(self.boxes[close])
+        own = close == body
+        gap_x = np.abs(self.boxes[close, 0] - x) - (half_x + half_x[own])
+        gap_y = np.abs(self.boxes[close, 1] - y) - (half_y + half_y[own])
+        return close[(gap_x <= within) & (gap_y <= within) & ~own]
 
 
 class Primitives:

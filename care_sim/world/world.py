@@ -238,10 +238,10 @@ class World:
         ]
         nearest = clearance = np.inf
         if self.first_sighting is not None:
-            x, y, _ = self.first_sighting.pose_at(self.time)
-            ego_x, ego_y, _ = self.ego.pose
-            nearest = float(np.hypot(x - ego_x, y - ego_y))
-            clearance = self.bullet.clearance(self.ego_body, self.first_sighting.body)
+            target = self.first_sighting.body
+            own, other = self.boxes_of(np.array([self.ego_body, target])).tolist()
+            nearest = float(np.hypot(other[0] - own[0], other[1] - own[1]))
+            clearance = self.bullet.clearance(self.ego_body, target)
         impact = None
         if touched:
             (box,) = self.boxes_of(np.array(touched[:1]))
