@@ -34,7 +34,7 @@ def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Cells |
     there are fewer, `floor` tops them up; None leaves the rest unspent.
     """
     flat = scores.ravel().astype(np.float32, copy=False)
-    chosen = np.flatnonzero(flat > 0)
+    (chosen,) = (flat > 0).nonzero()
     if len(chosen) > budget:
         # Negated, a stable ascending sort puts the highest first and leaves ties in their order.
         chosen = chosen[np.argsort(-flat[chosen], kind="stable")[:budget]]

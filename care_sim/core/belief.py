@@ -50,14 +50,14 @@ class Belief:
         Raises InvalidInput for anything else: another structure, another shape, numbers that no
         sensor says.
         """
-        if not (isinstance(observation, Mapping) and all(key in observation for key in OBSERVED)):
+        if not (isinstance(observation, Mapping) and observation.keys() >= {*OBSERVED}):
             raise InvalidInput(
                 "an observation of CARE-Sim's environments is needed,"
                 " as they give it without wrappers"
             )
         ego = _vector(observation, "ego", 3)
         (budget,) = _vector(observation, "budget", 1)
-        ranges = _array(observation, "ranges", (None, None)).astype(np.float32, copy=False)
+        ranges = _array(observation, "ranges", 2, None).astype(np.float32, copy=False)
         if not ranges.size:
             raise InvalidInput("ranges of an observation must hold a cell at least")
         # NaN fails both comparisons, so that finite numbers need no check of their own.
@@ -92,16 +92,14 @@ class Belief:
         }
 
 
-def _array(observation: Observation, key: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """An array of an observation; None in `shape` is any length. Raises InvalidInput for another
-    shape or type.
+def _array(observation: Observation, key: str, axes: int, width: int | None) -> NDArray[Any]:
+    """An array of an observation with so many axes, the last `width` long; None is any length.
+    Raises InvalidInput for another shape or type.
     """
     array = as_array(f"{key} of an observation", observation[key])
-    fits = array.ndim == len(shape) and all(
-        n in (None, m) for n, m in zip(shape, array.shape, strict=True)
-    )
+    fits = array.ndim == axes and width in (None, array.shape[-1])
     if not (fits and array.dtype.kind in "iuf"):
-        wanted = " x ".join("any" if n is None else str(n) for n in shape)
+        wanted = "any x " * (axes - 1) + ("any" if width is None else str(width))
         raise InvalidInput(
             f"{key} of an observation must be {wanted} numbers, got {array.dtype} of {array.shape}"
         )
@@ -110,7 +108,7 @@ def _array(observation: Observation, key: str, shape: tuple[int | None, ...]) ->
 
 def _vector(observation: Observation, key: str, size: int) -> list[float]:
     """A vector of an observation. Raises InvalidInput for what no sensor says."""
-    numbers: list[float] = _array(observation, key, (size,)).tolist()
+    numbers: list[float] = _array(observation, key, 1, size).tolist()
     if not all(-HIGHEST <= number <= HIGHEST for number in numbers):
         raise _beyond(key)
     return numbers
@@ -120,7 +118,7 @@ def _rows(observation: Observation, key: str, columns: Sequence[str]) -> Floats:
     """The rows of a table that are no padding, checked here once and for all. Raises InvalidInput
     for rows that are neither padding nor of a known class, and for what no sensor says.
     """
-    table = _array(observation, key, (None, len(columns)))
+    table = _array(observation, key, 2, len(columns))
     rows: Floats = table[table[:, 0] != -1].astype(np.float64)
     if not len(rows):
         return rows

@@ -8,10 +8,13 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
 
 Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
+
+Numbers4 = tuple[float, float, float, float]
 
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
@@ -98,7 +101,8 @@ class Frame:
         plane.
         """
         if self._upright:
-            return turned(boxes - self._offset, -self.yaw)
+            back = np.cos(-self.yaw), np.sin(-self.yaw)
+            return _seen_from(np.ascontiguousarray(boxes, dtype=float), back, self._place)
         centres = self.vectors_to_local(boxes[:, :3] - self.origin)
         return _boxes_turned(boxes, centres, self.vectors_to_local)
 
@@ -107,7 +111,8 @@ class Frame:
         ground.
         """
         if self._upright:
-            return turned(boxes, self.yaw) + self._offset
+            turn = np.cos(self.yaw), np.sin(self.yaw)
+            return _placed_at(np.ascontiguousarray(boxes, dtype=float), turn, self._place)
         centres = self.origin + self.vectors_to_world(boxes[:, :3])
         return _boxes_turned(boxes, centres, self.vectors_to_world)
 
@@ -117,8 +122,40 @@ class Frame:
         return self.roll == 0 and self.pitch == 0
 
     @property
-    def _offset(self) -> Floats:
-        return np.array([self.x, self.y, self.z, 0.0, 0.0, 0.0, self.yaw])
+    def _place(self) -> Numbers4:
+        # Floats, so that compiled code is compiled once.
+        return float(self.x), float(self.y), float(self.z), float(self.yaw)
+
+
+# NumPy's sine and cosine are handed over: those of compiled code differ in the last bits.
+@compiled()
+def _seen_from(boxes: Floats, turn: tuple[float, float], place: Numbers4) -> Floats:
+    """World boxes (n, 7) seen from a `place` (x, y, z, yaw) on the ground; `turn` is the cosine and
+    the sine of -yaw.
+    """
+    seen = boxes.copy()
+    cos, sin = turn
+    for box in seen:
+        x, y = box[0] - place[0], box[1] - place[1]
+        box[0], box[1] = cos * x - sin * y, sin * x + cos * y
+        box[2] -= place[2]
+        box[6] -= place[3]
+    return seen
+
+
+@compiled()
+def _placed_at(boxes: Floats, turn: tuple[float, float], place: Numbers4) -> Floats:
+    """Boxes (n, 7) seen from a `place` (x, y, z, yaw) in the world; `turn` is the cosine and the
+    sine of yaw.
+    """
+    placed = boxes.copy()
+    cos, sin = turn
+    for box in placed:
+        x, y = box[0], box[1]
+        box[0], box[1] = cos * x - sin * y + place[0], sin * x + cos * y + place[1]
+        box[2] += place[2]
+        box[6] += place[3]
+    return placed
 
 
 def _boxes_turned(boxes: Floats, centres: Floats, turn: Callable[[Floats], Floats]) -> Floats:

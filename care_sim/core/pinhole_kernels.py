@@ -88,6 +88,9 @@ def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
     spans = np.empty((len(boxes), 4))
     corners = np.empty((8, 3))
     for n, box in enumerate(boxes):
+        if _is_behind(box, camera, nearest):
+            spans[n] = math.nan
+            continue
         # Beyond the near plane, the picture of a box is the convex hull of those of its corners,
         # so these bound it.
         _lay_corners(box, camera, corners)
@@ -168,6 +171,18 @@ def _ray(u: float, v: float, camera: CameraModel) -> tuple[float, float, float]:
         axes[0, 1] + left * axes[1, 1] + up * axes[2, 1],
         axes[0, 2] + left * axes[1, 2] + up * axes[2, 2],
     )
+
+
+@compiled()
+def _is_behind(box: Floats, camera: CameraModel, depth: float) -> bool:
+    """Whether the ball that holds a box (7,) lies wholly before a depth: most boxes around a car
+    are behind any one of its cameras.
+    """
+    place = camera.position
+    x, y, z = box[0] - place[0], box[1] - place[1], box[2] - place[2]
+    radius = math.sqrt(box[3] ** 2 + box[4] ** 2 + box[5] ** 2) / 2
+    # A millimetre is room for rounding.
+    return _along(camera.axes[0], x, y, z) + radius + 0.001 < depth
 
 
 @compiled()

@@ -58,8 +58,7 @@ class BrakingController:
             tracks, self._front_m, self.guarded_m / 2, self._rules.brake_horizon_s
         )
         if self._braking_s is None:
-            stopping = self._stopping_distances(tracks, ego.speed)
-            if np.any(counting & (self._gaps(tracks) <= stopping)):
+            if counting.any() and self._is_due(tracks.take(counting), ego.speed):
                 self._braking_s = 0.0
                 self._free_s = 0.0
         else:
@@ -69,6 +68,10 @@ class BrakingController:
             if self._free_s > self._rules.brake_release_s - LAST_BITS_S:
                 self._braking_s = None
         return self._act(ego.speed)
+
+    def _is_due(self, counting: Tracks, speed: float) -> bool:
+        """Whether the gap to a track that counts is at most what the ego needs to stop."""
+        return bool(np.any(self._gaps(counting) <= self._stopping_distances(counting, speed)))
 
     def _act(self, speed: float) -> Command:
         if self._braking_s is None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -58,7 +59,11 @@ class Picture:
 
     def shows(self, body: int) -> bool:
         """Whether enough of a body is visible for a box."""
-        return bool(((self.bodies == body) & (self.pixels >= MIN_PIXELS)).any())
+        return body in self._shown
+
+    @cached_property
+    def _shown(self) -> frozenset[int]:
+        return frozenset(self.bodies[self.pixels >= MIN_PIXELS].tolist())
 
 
 def faultless_detections(

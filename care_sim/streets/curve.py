@@ -33,8 +33,9 @@ class Curve:
 
     def to_world(self, places: Floats) -> Floats:
         """World poses (..., 3: x, y, heading) of places (..., 3: s, d, heading) on the road."""
-        s, d, heading = np.moveaxis(np.asarray(places, dtype=float), -1, 0)
-        along = np.clip(s - self.bend_at, 0.0, self.bend_length)
+        places = np.asarray(places, dtype=float)
+        s, d, heading = places[..., 0], places[..., 1], places[..., 2]
+        along = np.minimum(np.maximum(s - self.bend_at, 0.0), self.bend_length)
         turn = self.curvature * along
         # The chord of a circle's arc, 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
         # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.
@@ -43,10 +44,13 @@ class Curve:
         after = np.maximum(s - self.bend_at - self.bend_length, 0.0)
         # Three parts, one after the other: the straight before lies along x, the chord at half the
         # turn, the straight after at the whole turn. d goes to the left of where the line points.
-        x = before + chord * np.cos(turn / 2) + after * np.cos(turn) - d * np.sin(turn)
-        y = chord * np.sin(turn / 2) + after * np.sin(turn) + d * np.cos(turn)
-        world = turned(np.stack([x, y], axis=-1), self.start[2]) + self.start[:2]
-        return np.concatenate([world, (self.start[2] + turn + heading)[..., None]], axis=-1)
+        cos, sin = np.cos(turn), np.sin(turn)
+        world = np.empty(places.shape)
+        world[..., 0] = before + chord * np.cos(turn / 2) + after * cos - d * sin
+        world[..., 1] = chord * np.sin(turn / 2) + after * sin + d * cos
+        world[..., 2] = self.start[2] + turn + heading
+        world[..., :2] = turned(world[..., :2], self.start[2]) + self.start[:2]
+        return world
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,8 @@ def footprints_meet(
             + (others[:, 1] - poses[:, 1]) * np.sin(angle)
         )
         meet &= apart < _reach(poses, size, angle) + _reach(others, other_sizes, angle) + gap
+        if not meet.any():
+            break
     return meet
 
 

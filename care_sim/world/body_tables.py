@@ -3,12 +3,13 @@
 Who asks about many bodies at once, such as a compiled engine, reads these instead of PyBullet.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.boxes import half_extents
 from care_sim.core.frames import Pose
 from care_sim.world.bodies import Part, Shape, Triple
 
@@ -23,16 +24,13 @@ class Footprints:
 
     def __init__(self) -> None:
         self.boxes = np.empty((0, 7))
-        self._radii = np.empty(0)
 
     def add(self, body: int, size: Triple, pose: Pose) -> None:
         """Take in a body of a size on the ground plane."""
         # PyBullet numbers bodies upwards, the ground among them: rows between stay NaN.
         missing = body + 1 - len(self.boxes)
         self.boxes = np.vstack([self.boxes, np.full((missing, 7), np.nan)])
-        self._radii = np.append(self._radii, np.full(missing, np.nan))
         self.boxes[body, 2:6] = size[2] / 2, *size
-        self._radii[body] = np.hypot(*size[:2]) / 2
         self.move_all(np.array([body]), np.array([pose]))
 
     def move_all(self, bodies: Integers, poses: Floats) -> None:
@@ -44,18 +42,38 @@ class Footprints:
         """Ids of the other bodies that may be within `within` metres of one. None of those is
         missing; some may be further away, since rectangles along x and y stand for the footprints.
         """
+        return _near(self.boxes, body, within)
+
+
+@compiled()
+def _near(boxes: Floats, body: int, within: float) -> Integers:
+    """See `Footprints.near`."""
+    found = np.empty(len(boxes), np.int64)
+    count = 0
+    own = boxes[body]
+    for other in range(len(boxes)):
+        box = boxes[other]
         # First by the circles that hold the footprints, which leave few for the rectangles. NaN,
         # where there is no body, is close to nothing.
-        x, y = self.boxes[body, :2].tolist()
-        apart = np.hypot(self.boxes[:, 0] - x, self.boxes[:, 1] - y)
-        close = np.flatnonzero(apart <= self._radii + (self._radii[body] + within))
-        if len(close) == 1:
-            return close[close != body]
-        half_x, half_y = half_extents(self.boxes[close])
-        own = close == body
-        gap_x = np.abs(self.boxes[close, 0] - x) - (half_x + half_x[own])
-        gap_y = np.abs(self.boxes[close, 1] - y) - (half_y + half_y[own])
-        return close[(gap_x <= within) & (gap_y <= within) & ~own]
+        apart = math.hypot(box[0] - own[0], box[1] - own[1])
+        reach = (math.hypot(box[3], box[4]) + math.hypot(own[3], own[4])) / 2
+        if other != body and apart <= reach + within and _rectangles_near(own, box, within):
+            found[count] = other
+            count += 1
+    return found[:count]
+
+
+@compiled()
+def _rectangles_near(one: Floats, other: Floats, within: float) -> bool:
+    """Whether rectangles along x and y around two footprints are within `within` metres."""
+    half_x, half_y = 0.0, 0.0
+    for box in (one, other):
+        # The sides of a turned rectangle, each projected on the axis.
+        cos, sin = abs(math.cos(box[6])), abs(math.sin(box[6]))
+        half_x += (box[3] * cos + box[4] * sin) / 2
+        half_y += (box[3] * sin + box[4] * cos) / 2
+    gap_x, gap_y = abs(one[0] - other[0]) - half_x, abs(one[1] - other[1]) - half_y
+    return bool(gap_x <= within and gap_y <= within)
 
 
 class Primitives:

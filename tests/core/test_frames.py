@@ -115,3 +115,13 @@ def test_a_frame_knows_its_rotation():
     assert Frame.turned_by(frame.rotation, frame.origin) == Frame(
         *(pytest.approx(v) for v in (1, 2, 3, 0.5, -0.1, 0.2))
     )
+
+
+@given(st.lists(st.tuples(*[st.floats(-100, 100)] * 7), max_size=4), st.floats(-7, 7))
+def test_boxes_turn_as_vectors_do_to_the_last_bit(rows, yaw):
+    """Compiled code turns boxes, NumPy vectors: published episodes hold both."""
+    boxes = np.array(rows, float).reshape(-1, 7)
+    frame = Frame(12.3, -4.5, 1.8, yaw)
+    offset = np.array([12.3, -4.5, 1.8, 0, 0, 0, yaw])
+    assert np.array_equal(frame.boxes_to_local(boxes), turned(boxes - offset, -yaw))
+    assert np.array_equal(frame.boxes_to_world(boxes), turned(boxes, yaw) + offset)

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_sim.core.boxes import box_corners
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import NEAR_M, PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import box_rays
@@ -155,3 +156,13 @@ def test_a_rig_may_have_no_camera():
         (2,),
         (2, 2),
     ]
+
+
+@given(st.floats(-4, 4), st.floats(-4, 4), st.floats(-np.pi, np.pi), st.floats(0.1, 6))
+def test_a_box_has_a_rectangle_if_a_corner_lies_before_the_camera(x, y, yaw, length):
+    """Around the camera, where the ball that holds a box and the box itself differ most."""
+    box = np.array([x, y, 0.3, length, 1.5, 1.2, yaw])
+    camera = PinholeCamera(yaw=0.4)
+    depths = (box_corners(box[None])[0] - camera.position) @ camera.axes[0]
+    seen = not np.isnan(camera.project_boxes(box[None])).any()
+    assert seen == bool(depths.max() >= NEAR_M)

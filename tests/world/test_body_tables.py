@@ -64,3 +64,12 @@ def test_whatever_touches_is_near(pose, others):
         world.close()
     assert bodies == list(range(1, len(placed) + 1))
     assert set(within) <= set(near)
+
+
+def test_footprints_are_near_by_their_rectangles_not_by_the_circles_around_them():
+    """Two buses side by side, 3 m of room between them: the circles overlap by far."""
+    beside = BUS.size[1] + 3.0
+    assert not len(footprints((BUS, (0.0, 0.0, 0.0)), (BUS, (0.0, beside, 0.0))).near(1, 0.5))
+    assert footprints((BUS, (0.0, 0.0, 0.0)), (BUS, (0.0, beside, 0.0))).near(1, 3.1).tolist() == [
+        2
+    ]
