@@ -14,7 +14,7 @@ from care_sim.core.arrays import Floats
 Pose = tuple[float, float, float]
 """x, y (metres, world frame) and heading (radians, from x towards y) of a body on the ground."""
 
-Numbers4 = tuple[float, float, float, float]
+_Place = tuple[float, float, float, float]
 
 
 def turned(vectors: Floats, yaw: float | Floats) -> Floats:
@@ -122,14 +122,14 @@ class Frame:
         return self.roll == 0 and self.pitch == 0
 
     @property
-    def _place(self) -> Numbers4:
+    def _place(self) -> _Place:
         # Floats, so that compiled code is compiled once.
         return float(self.x), float(self.y), float(self.z), float(self.yaw)
 
 
-# NumPy's sine and cosine are handed over: those of compiled code differ in the last bits.
+# The sines and cosines are handed over: as in `turned` they are NumPy's, on every machine.
 @compiled()
-def _seen_from(boxes: Floats, turn: tuple[float, float], place: Numbers4) -> Floats:
+def _seen_from(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats:
     """World boxes (n, 7) seen from a `place` (x, y, z, yaw) on the ground; `turn` is the cosine and
     the sine of -yaw.
     """
@@ -144,7 +144,7 @@ def _seen_from(boxes: Floats, turn: tuple[float, float], place: Numbers4) -> Flo
 
 
 @compiled()
-def _placed_at(boxes: Floats, turn: tuple[float, float], place: Numbers4) -> Floats:
+def _placed_at(boxes: Floats, turn: tuple[float, float], place: _Place) -> Floats:
     """Boxes (n, 7) seen from a `place` (x, y, z, yaw) in the world; `turn` is the cosine and the
     sine of yaw.
     """
