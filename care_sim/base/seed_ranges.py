@@ -2,12 +2,13 @@
 
 | seeds | for |
 |---|---|
-| 0 to 1,999 | the benchmark; of streets 0 to 149 for evaluation, 1,000 to 1,019 for calibration |
+| 0 to 999 | test: the benchmark; of streets 0 to 149 are for evaluation |
+| 1,000 to 1,999 | calibration: what is set before the evaluation; of streets 1,000 to 1,019 |
 | 2,000 to 9,999 | validation: the learning curve, and which weights are kept |
 | 10,000 and up | training |
 
 No training episode can have a seed below 10,000, whatever `--seed` is, and nothing is chosen by a
-seed below 2,000 but by the streets of the calibration. A study of several seeds takes them of one
+seed below 1,000. A study of several seeds takes them of one
 split; one episode, of a command or of an environment that is reset by hand, takes any. Where
 episodes differ by the recording and not by the seed (`CARE-Replay-v0`), hold out recordings.
 """
@@ -17,12 +18,14 @@ from collections.abc import Iterable, Sequence
 from care_sim.base.checks import check_seed
 from care_sim.base.errors import InvalidInput
 
+CALIBRATION = 1_000
 VALIDATION = 2_000
 TRAINING = 10_000
 LAST = 2**31 - 1
 """Training seeds lie below it."""
 SPLITS = {
-    "test": range(VALIDATION),
+    "test": range(CALIBRATION),
+    "calibration": range(CALIBRATION, VALIDATION),
     "validation": range(VALIDATION, TRAINING),
     "train": range(TRAINING, LAST),
 }
@@ -60,8 +63,8 @@ def check_benchmark_seeds(seeds: Sequence[int]) -> None:
     """
     if split_of(seeds) != "test":
         raise InvalidInput(
-            f"seeds of a test must lie below {VALIDATION:,}, got {max(seeds)}: policies are chosen "
-            f"and trained on those from {VALIDATION:,} on"
+            f"seeds of a test must lie below {CALIBRATION:,}, got {max(seeds)}: policies are "
+            f"chosen and trained on those from {CALIBRATION:,} on"
         )
 
 

@@ -27,7 +27,9 @@ class Order(EitherLoopStudy):
         "care",
         "care-sbf",
         "care-sightlines",
+        "care-sector",
         "learned-scorer",
+        "history-place",
         "full",
     )
     """With --source: names of `care-sim policies`; `all` stands for all but the controls. `full`

@@ -25,7 +25,7 @@ class Validate(EpisodeStudy):
     world: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="WORLD")]
     """dartout, dense or cutin; `care-sim scenarios` lists them."""
     seeds: tuple[int, ...] = (20,)
-    """The test seeds. One number: that many, from 0. Several numbers: these, below 2,000; 7 7 is
+    """The test seeds. One number: that many, from 0. Several numbers: these, below 1,000; 7 7 is
     seed 7 alone.
     """
     training_seeds: int = bounded(10, 1, 1000)

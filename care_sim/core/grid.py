@@ -83,16 +83,23 @@ class AngularGrid:
         return elevations
 
     @cached_property
+    def azimuths(self) -> Floats:
+        """(columns,) azimuth of the rays of every column, the middle of its sector, radians."""
+        middles = np.arange(self.columns, dtype=np.float64) + 0.5
+        azimuths = np.asarray(middles * self.column_width - np.pi)
+        azimuths.flags.writeable = False
+        return azimuths
+
+    @cached_property
     def fan(self) -> tuple[Floats, Floats]:
         """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of
         every row (rows, 2).
         """
         # A column is a sector, and its ray runs through the middle. A row is a ring: its elevation
         # is that of the ray itself.
-        azimuths = -np.pi + (np.arange(self.columns) + 0.5) * self.column_width
         across, down = (
             np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            for angles in (azimuths, self.elevations)
+            for angles in (self.azimuths, self.elevations)
         )
         across.flags.writeable = down.flags.writeable = False
         return across, down

@@ -13,6 +13,7 @@ from care_sim.policies.controls.fan import Fan
 from care_sim.policies.controls.history_place import HistoryPlace
 from care_sim.policies.controls.history_rows import HistoryRows
 from care_sim.policies.controls.place import Place
+from care_sim.policies.controls.place_hulls import PlaceHulls
 from care_sim.policies.controls.rows import Rows
 from care_sim.policies.controls.stride import Stride
 from care_sim.policies.controls.sweep import Sweep
@@ -24,6 +25,7 @@ from care_sim.policies.makers import (
     is_privileged,
     policy_faults,
 )
+from care_sim.policies.own.care_sector import CareSector
 from care_sim.policies.own.care_sightlines import CareSightlines
 from care_sim.policies.own.care_spread import CareSpread
 from care_sim.policies.paper.all_camera import AllCamera
@@ -73,6 +75,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         PpoDartoutPolicy,
         CareSpread,
         CareSightlines,
+        CareSector,
         Rows,
         Fan,
         Stride,
@@ -80,6 +83,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         Place,
         HistoryRows,
         HistoryPlace,
+        PlaceHulls,
     )
 }
 # Loaded when they are asked for, as those of installed packages are: they play scenarios by

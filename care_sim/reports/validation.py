@@ -16,6 +16,8 @@ from care_sim.study.rows.reading import detections, setting_of, tags_of_row
 from care_sim.study.rows.settings import Setting
 from care_sim.study.run_config import FULL, Row
 
+_Cells = dict[tuple[str, float], list[Row]]
+"""The rows of every policy at every budget."""
 SEPARATED = ("care", "all-camera", "history")
 """The paper's reserves, of which each pair has to be told apart."""
 
@@ -48,7 +50,8 @@ class Lead:
 class WorldPlays:
     """The rows of a validation of one world, by policy and budget.
 
-    The choices are by training seeds and everything else is of test seeds.
+    The choices are by training seeds and everything else is of test seeds, the choice in hindsight
+    included.
     """
 
     def __init__(self, setting: Setting, rows: Sequence[Row]):
@@ -65,11 +68,17 @@ class WorldPlays:
 
     def best_camera(self, budget: float) -> str | None:
         """The best policy with a camera, by the training seeds."""
-        return self._best(CAMERA_POLICIES, budget)
+        return _best(self._training, CAMERA_POLICIES, budget)
 
     def best_control(self, budget: float) -> str | None:
         """The best control that a car can have, by the training seeds."""
-        return self._best([name for name, tags in self.tags.items() if is_control(tags)], budget)
+        return _best(self._training, self._controls, budget)
+
+    def hindsight_control(self, budget: float) -> str | None:
+        """The best control that a car can have, by the very test seeds it is then compared on: a
+        choice in its favour.
+        """
+        return _best(self._test, self._controls, budget)
 
     def lead(self, ours: str | None, theirs: str | None, budget: float) -> Lead:
         """What one policy has over another at a budget; nothing where one of them is None."""
@@ -81,6 +90,10 @@ class WorldPlays:
     def camera_lead(self, budget: float) -> Lead:
         """What the best policy with a camera has over the best control."""
         return self.lead(self.best_camera(budget), self.best_control(budget), budget)
+
+    def hindsight_lead(self, budget: float) -> Lead:
+        """What the best policy with a camera has over the best control in hindsight."""
+        return self.lead(self.best_camera(budget), self.hindsight_control(budget), budget)
 
     def full_lead(self, budget: float) -> Lead:
         """What the full scan has over the best control: all that there is to win."""
@@ -121,20 +134,9 @@ class WorldPlays:
         )
         return f"{self.setting.label}: does not discriminate, because {because}."
 
-    def _best(self, policies: Sequence[str], budget: float) -> str | None:
-        """The policy with the fewest collisions, of equal ones that with the earliest detection,
-        over the training seeds that all have played; of equals the first.
-        """
-        cells = {policy: self._training.get((policy, budget), []) for policy in policies}
-        by_seed = {
-            policy: {row["seed"]: row for row in rows} for policy, rows in cells.items() if rows
-        }
-        if not by_seed:
-            return None
-        shared = set.intersection(*map(set, by_seed.values()))
-        return min(
-            by_seed, key=lambda policy: _rank([by_seed[policy][seed] for seed in sorted(shared)])
-        )
+    @property
+    def _controls(self) -> list[str]:
+        return [name for name, tags in self.tags.items() if is_control(tags)]
 
 
 def played_worlds(rows: Sequence[Row]) -> list[WorldPlays]:
@@ -147,13 +149,30 @@ def played_worlds(rows: Sequence[Row]) -> list[WorldPlays]:
     return [WorldPlays(setting, own) for setting, own in worlds.items()]
 
 
+def _best(cells: _Cells, policies: Sequence[str], budget: float) -> str | None:
+    """The policy with the fewest collisions, of equal ones that with the earliest detection, over
+    the seeds of `cells` that all have played; of equals the first.
+    """
+    by_seed = {
+        policy: {row["seed"]: row for row in cells[policy, budget]}
+        for policy in policies
+        if (policy, budget) in cells
+    }
+    if not by_seed:
+        return None
+    shared = set.intersection(*map(set, by_seed.values()))
+    return min(
+        by_seed, key=lambda policy: _rank([by_seed[policy][seed] for seed in sorted(shared)])
+    )
+
+
 def _rank(rows: Sequence[Row]) -> tuple[int, float]:
     distances = [found.value for found in detections(rows)]
     return sum(row["collision"] for row in rows), -float(np.mean(distances or [0.0]))
 
 
-def _by_cell(rows: Iterable[Row]) -> dict[tuple[str, float], list[Row]]:
-    cells: dict[tuple[str, float], list[Row]] = {}
+def _by_cell(rows: Iterable[Row]) -> _Cells:
+    cells: _Cells = {}
     for row in rows:
         cells.setdefault((row["policy"], row["budget"]), []).append(row)
     return cells

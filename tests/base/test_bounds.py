@@ -477,7 +477,7 @@ def test_a_parameter_of_the_command_line_has_an_end():
 
 @pytest.mark.parametrize("number", [0, -1, 10**9, 9999999999999999999999])
 def test_a_number_of_seeds_fits_into_memory(number):
-    refused("seeds must be one number, a count from 1 to 2,000", seeds_of, [number])
+    refused("seeds must be one number, a count from 1 to 1,000", seeds_of, [number])
 
 
 def test_one_number_is_told_to_be_a_count_and_how_to_give_one_seed():

@@ -10,9 +10,9 @@ from care_sim.base.seed_ranges import SPLITS, check_benchmark_seeds, split_of, t
 
 
 def test_test_seeds_end_where_seeds_begin_that_something_is_chosen_by():
-    check_benchmark_seeds([1999, 0])
-    with pytest.raises(InvalidInput, match=r"must lie below 2,000, got 2001"):
-        check_benchmark_seeds([2000, 2001])
+    check_benchmark_seeds([999, 0])
+    with pytest.raises(InvalidInput, match=r"must lie below 1,000, got 1019"):
+        check_benchmark_seeds([1000, 1019])
     with pytest.raises(InvalidInput, match=r"got 3 of test and 2000 of validation"):
         check_benchmark_seeds([3, 2000])
 
@@ -29,10 +29,10 @@ def test_the_ends_of_a_split_are_of_it(name):
 @pytest.mark.parametrize(
     ("seeds", "complaint"),
     [
-        ([0, 5, 10_000], r"of one split \(test 0 to 1999, .*\), got 0 of test and 10000 of train"),
-        (range(2_001), r"got 0 of test and 2000 of validation"),
+        ([0, 5, 10_000], r"of one split \(test 0 to 999, .*\), got 0 of test and 10000 of train"),
+        (range(1_001), r"got 0 of test and 1000 of calibration"),
         ([], "got no seed"),
-        ([2**31], r"seed 2147483648 is of no split; there are test 0 to 1999, validation"),
+        ([2**31], r"seed 2147483648 is of no split; there are test 0 to 999, calibration"),
         ([-1], "seed must be"),
     ],
 )

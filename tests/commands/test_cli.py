@@ -71,12 +71,12 @@ def test_a_host_that_calls_a_command_keeps_its_handlers_and_may_do_so_in_a_threa
         ),
         (["run", "dense", "--policy-parameters", "k=3"], ["care", "k"]),
         (["sweep", "--seeds", "0"], ["seeds", "from 1 to"]),
-        (["sweep", "--seeds", "2001"], ["seeds", "from 1 to 2,000"]),
+        (["sweep", "--seeds", "1001"], ["seeds", "from 1 to 1,000"]),
         (["sweep", "--budgets"], ["--budgets", "at least one"]),
         (["sweep", "--scenarios"], ["--scenarios", "at least one"]),
         (["validate"], ["WORLD"]),
         (["validate", "moon"], ["scenario 'moon'", "dartout"]),
-        (["validate", "cutin", "--seeds", "2000", "2001"], ["seeds of a test", "2,000", "2001"]),
+        (["validate", "cutin", "--seeds", "1000", "1001"], ["seeds of a test", "1,000", "1001"]),
         (["validate", "cutin", "--training-seeds", "0"], ["training_seeds", ">= 1"]),
         (["validate", "cutin", "--factors", "mirrored"], ["NAME=VALUE", "'mirrored'"]),
         (["validate", "cutin", "--factors", "mirrored=half"], ["mirrored 'half'", "drawn"]),
@@ -110,11 +110,11 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_pat
 )
 def test_seeds_of_several_splits_are_no_study(command, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(capsys, *command, "--seeds", "1999", "2000", "10000")
+    code, _, err = run(capsys, *command, "--seeds", "999", "1000", "10000")
     assert code == 2
     assert err.count("\n") == 1
-    assert "test 0 to 1999" in err
-    assert "got 1999 of test and 2000 of validation and 10000 of train" in err
+    assert "test 0 to 999" in err
+    assert "got 999 of test and 1000 of calibration and 10000 of train" in err
     assert not [*tmp_path.iterdir()]
 
 

@@ -47,6 +47,14 @@ def test_the_choice_hangs_on_training_seeds_alone_and_the_memoriser_is_no_contro
     assert only(world(TELLING, {})).best_control(0.03) is None
 
 
+def test_the_choice_in_hindsight_hangs_on_test_seeds_alone_and_leaves_the_verdict():
+    played = only(world(TELLING, TRAINING))
+    assert played.hindsight_control(0.03) == "fan"
+    assert played.hindsight_lead(0.03).avoided.mean == pytest.approx(0.0)
+    assert played.failings(0.03) == []
+    assert only(world({}, TRAINING)).hindsight_control(0.03) is None
+
+
 def test_a_control_that_lacks_a_bad_seed_does_not_win_by_that():
     rows = [
         *cell("fan", [15.0, 15.0], training=True),

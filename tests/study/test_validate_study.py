@@ -55,5 +55,5 @@ def test_a_level_is_the_base_with_one_factor_changed():
 
 
 def test_a_test_seed_of_the_training_is_refused():
-    with pytest.raises(InvalidInput, match=r"seeds of a test must lie below 2,000, got 10001"):
+    with pytest.raises(InvalidInput, match=r"seeds of a test must lie below 1,000, got 10001"):
         validation_study("cutin", [SHORT], [0.1], [10_001], 2)

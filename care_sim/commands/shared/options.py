@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from care_sim.base.errors import InvalidInput, shown
-from care_sim.base.seed_ranges import VALIDATION, split_of
+from care_sim.base.seed_ranges import CALIBRATION, split_of
 from care_sim.commands.shared.selection import policy_parameters
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.perception.detectors import PROXY
@@ -53,9 +53,10 @@ def seeds_of(numbers: Sequence[int]) -> Sequence[int]:
     if len(numbers) != 1:
         split_of(numbers)
         return numbers
-    if not 1 <= numbers[0] <= VALIDATION:
+    if not 1 <= numbers[0] <= CALIBRATION:
         raise InvalidInput(
-            f"seeds must be one number, a count from 1 to {VALIDATION:,} (that many, from 0), or a "
-            f"list of two or more seeds (7 7 is seed 7 alone), got the count {shown(numbers[0])}"
+            f"seeds must be one number, a count from 1 to {CALIBRATION:,} (that many, from 0), or "
+            "a list of two or more seeds (7 7 is seed 7 alone), got the count "
+            f"{shown(numbers[0])}"
         )
     return range(numbers[0])

@@ -11,6 +11,7 @@ from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
+from care_sim.policies.own.sector import columns_ahead
 
 OPEN_M = 25.0
 """A line of sight is open if nothing was met nearer than this, half the range of scoring."""
@@ -20,9 +21,6 @@ length of a car, behind which another thing has room."""
 EDGE_COLUMNS = 4
 """Columns to either side of an edge that are watched: on the paper's grid 2.8 degrees, 1.5 m at a
 range of 30 m, what a walker covers in a second and a car in a tenth."""
-AHEAD_RAD = math.atan(13 / 50)
-"""Half of the sector ahead: at the range of scoring, 50 m, a street of 26 m from house to house,
-with two lanes, parked cars and pavements. What the car drives towards enters the range there."""
 _NEAREST_M = 1.0
 """Nothing remembered is nearer: the car itself is there."""
 _LAST_BITS = 1e-9
@@ -46,16 +44,13 @@ class SightLines:
     def __init__(self, rig: Rig, row: int):
         self._row = row
         self._keyframe_s = rig.keyframe_s
-        columns = rig.grid.columns
-        middles = np.arange(columns, dtype=np.float64) + 0.5
-        self._azimuths: Floats = np.asarray(middles * rig.grid.column_width - np.pi)
-        nearest_first = np.argsort(np.abs(self._azimuths), kind="stable")
-        self._sector = nearest_first[np.abs(self._azimuths[nearest_first]) <= AHEAD_RAD]
+        self._azimuths = rig.grid.azimuths
+        self._sector = columns_ahead(rig.grid)
         # Of a line without a return a scan says the reach in float32, which can be less than it.
         self._reach = float(np.float32(rig.grid.range_m))
         # On a grid of shorter reach, a line without a return is open all the same.
         self._open_m = min(OPEN_M, self._reach / 2)
-        self.ranges = np.full(columns, self._reach)
+        self.ranges = np.full(rig.grid.columns, self._reach)
         self._watched = _open_or_edge(self.ranges, self._open_m)
 
     def update(self, belief: Belief) -> None:
@@ -68,7 +63,7 @@ class SightLines:
         self._watched = _open_or_edge(self.ranges, self._open_m)
 
     def ahead(self) -> Cells:
-        """What is worth a look within `AHEAD_RAD` of straight ahead, the nearest to it first."""
+        """What is worth a look in the sector ahead, the nearest to straight ahead first."""
         return self._cells(self._sector[self._watched[self._sector]])
 
     def cells(self) -> Cells:

@@ -35,8 +35,10 @@ _KNOWN = {
     "ppo-dartout": ("#661100", "*"),
     "care-sightlines": ("#000000", "d"),
     "care-spread": ("#6699CC", "H"),
+    "care-sector": ("#DDAA33", "1"),
     "rows": ("#CC6677", "x"),
     "place": ("#44AA99", "+"),
+    "place-hulls": ("#BB5566", "2"),
     "fan": ("#BBAA33", "8"),
 }
 """From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind. No

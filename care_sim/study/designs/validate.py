@@ -39,7 +39,7 @@ def validation_study(
     Raises InvalidInput for a test seed that is no seed of the benchmark.
     """
     check_benchmark_seeds(test)
-    # The memoriser may look up every seed of the benchmark, and asks for what it knows first.
+    # The memoriser may look up every seed below the validation's, and asks for what it knows first.
     known = (
         ("learned-place.seeds", trained),
         ("history-learned-place.seeds", trained),

@@ -27,6 +27,7 @@ CONTROLS = [
     "place",
     "history-rows",
     "history-place",
+    "place-hulls",
     "learned-place",
     "history-learned-place",
 ]

@@ -1,4 +1,4 @@
-"""What both policies of our own keep to."""
+"""What all policies of our own keep to."""
 
 import gymnasium
 import numpy as np
@@ -7,8 +7,13 @@ import pytest
 import care_sim
 from care_sim.base.errors import InvalidInput
 
+HULL_LAYERS = {"care-spread": 1, "care-sightlines": 2, "care-sector": 2, "place-hulls": 1}
+"""The policies of our own and the control that lists hulls as they do, and the layer of each in
+which its hulls come first.
+"""
 
-@pytest.mark.parametrize(("name", "layer"), [("care-spread", 1), ("care-sightlines", 2)])
+
+@pytest.mark.parametrize(("name", "layer"), HULL_LAYERS.items())
 @pytest.mark.parametrize("returns", [1, 3, 5])
 def test_rounds_are_multiples_of_what_a_detection_needs(name, layer, returns, belief_of, car):
     """The environment tells the policy what its detector needs."""
@@ -17,10 +22,9 @@ def test_rounds_are_multiples_of_what_a_detection_needs(name, layer, returns, be
     assert [len(cells) for cells in demand.layers[layer]] == [2 * returns] * 2
 
 
-@pytest.mark.parametrize("name", ["care-spread", "care-sightlines"])
-def test_hulls_and_wedges_follow_the_cell_order_of_the_rig(name, belief_of, car):
+@pytest.mark.parametrize(("name", "layer"), HULL_LAYERS.items())
+def test_hulls_and_wedges_follow_the_cell_order_of_the_rig(name, layer, belief_of, car):
     belief = belief_of([car(1, 12, -9)])
-    layer = {"care-spread": 1, "care-sightlines": 2}[name]
     with gymnasium.make("CARE-Dense-v0", cell_order="rows-down") as env:
         policy = care_sim.make_policy(name, env)
         (hull,) = policy.demand(belief).layers[layer]
@@ -29,7 +33,7 @@ def test_hulls_and_wedges_follow_the_cell_order_of_the_rig(name, belief_of, car)
 
 
 def test_no_cell_of_a_set_is_asked_for_twice_in_a_round(environment, encounter):
-    for name in ("care-spread", "care-sightlines"):
+    for name in HULL_LAYERS:
         policy = care_sim.make_policy(name, environment)
         for observation in encounter:
             policy(observation)
@@ -38,7 +42,7 @@ def test_no_cell_of_a_set_is_asked_for_twice_in_a_round(environment, encounter):
                     assert len(np.unique(cells)) == len(cells)
 
 
-@pytest.mark.parametrize("name", ["care-spread", "care-sightlines"])
+@pytest.mark.parametrize("name", HULL_LAYERS)
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [

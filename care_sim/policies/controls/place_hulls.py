@@ -1,0 +1,57 @@
+"""A control: the map of `place`, and a few cells for every track, without a camera."""
+
+from collections.abc import Mapping
+from os import PathLike
+from typing import ClassVar
+
+from care_sim.base.checks import check_whole
+from care_sim.core.belief import Belief
+from care_sim.core.conditions import MIN_RETURNS
+from care_sim.core.rig import Rig
+from care_sim.core.types import Demand
+from care_sim.policies.base import Policy
+from care_sim.policies.controls.place import likeliest_cells
+from care_sim.policies.own.care_spread import CORE_FIRST, HULL_CELLS_PER_RETURN
+
+MAP_SHARE = 0.35
+"""Share of the budget that the map has before any track is served. First tried on the streets 0 to
+19, which are scored."""
+
+
+class PlaceHulls(Policy):
+    """`MAP_SHARE` of the budget for the likeliest cells of the map `place`, then two rounds of a
+    few cells for every hull, the undilated core first as in `care-spread`; what is left goes on
+    down the map. What a camera must beat in a policy that serves its tracks as sparingly.
+
+    `path` is a map as for `place`.
+    """
+
+    name = "place-hulls"
+    tags = ("causal", "learned", "control")
+    source = "own: a map that never changes, and the cores of hulls"
+    told: ClassVar[Mapping[str, str]] = {"min_returns": "min_returns"}
+    keeps_order = True
+
+    def __init__(
+        self,
+        rig: Rig,
+        path: str | PathLike[str] | None = None,
+        min_returns: int = MIN_RETURNS,
+    ):
+        super().__init__(rig)
+        check_whole("min_returns", min_returns, 1)
+        self._map = likeliest_cells(rig, path)
+        self._round = HULL_CELLS_PER_RETURN * min_returns
+
+    def demand(self, belief: Belief) -> Demand:
+        """Layers: the top of the map, a round of hulls, another one, and the map again."""
+        hulls = self.rig.hulls(belief.tracks.boxes)
+        few = self.rig.listed(hulls, CORE_FIRST, 2 * self._round)
+        return Demand(
+            layers=[
+                [self._map[: int(MAP_SHARE * belief.budget)]],
+                few.part(0, self._round),
+                few.part(self._round, 2 * self._round),
+                [self._map[: belief.budget]],
+            ]
+        )
