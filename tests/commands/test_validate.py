@@ -21,8 +21,8 @@ def test_it_plays_every_world_and_its_report_is_made_again_of_the_rows(capsys, t
     code, out = run(capsys, SHORT, ["--out", tmp_path])
     assert code == 0
     rows = read_rows(tmp_path / "episodes.parquet")
-    # Thirteen policies are chosen from; four more, and the full scan at its budget, are tested.
-    assert len(rows) == 2 * (13 + 13 + 4)
+    # Fourteen policies are chosen from; four more, and the full scan at its budget, are tested.
+    assert len(rows) == 2 * (14 + 14 + 4)
     assert {row["scenario.occluder_reported"] for row in rows} == {None, True}
     assert {row["seed"] for row in rows} == {0, 10_000}
     assert "dartout, duration s 0.1, occluder truck, occluder reported True: does not" in out

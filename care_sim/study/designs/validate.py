@@ -17,7 +17,7 @@ from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.parameters import Parameters
 from care_sim.study.run_config import FULL, Row
 
-CAMERA_POLICIES = ("all-camera", "care", "care-sightlines")
+CAMERA_POLICIES = ("all-camera", "care", "care-sightlines", "care-sector")
 """The causal policies with a camera; the best of them has to beat the best control."""
 MEMORISER = "seed-finder"
 """It looks the test seed up: what memory of who comes out can reach. Its figure is published, and
