@@ -2,7 +2,7 @@
 
 Exploitation comes first, then the reserve layers, then the shared random floor. In the environments
 a policy calls `allocate` for lines 1 to 5, without a floor. Line 6, the floor, and the hard cap are
-those of `care_sim.core.actions.fired_cells`, which every action passes, whatever made it.
+those of the hardware (`care_sim.core.firing`), which every action passes, whatever made it.
 """
 
 from collections.abc import Sequence
@@ -27,16 +27,17 @@ HIGHEST_CELL = 2**24
 _SETS = "a list of sets of cells"
 
 
-def budget_cells(budget: float, cells: int) -> int:
-    """B = round(beta * N) (Eq. 1): the cells that a fraction `budget` of all `cells` is.
+def budget_cells(budget: float, cells: int, unit: str = "cell") -> int:
+    """B = round(beta * N) (Eq. 1): the cells that a fraction `budget` of all `cells` is, or as many
+    units of another hardware (`care_sim.core.firing`).
 
-    Raises InvalidInput for a fraction outside (0, 1], and for one that leaves no cell.
+    Raises InvalidInput for a fraction outside (0, 1], and for one that leaves none.
     """
     if not (is_number(budget) and 0 < budget <= 1):
         raise InvalidInput(f"budget must lie in (0, 1], got {shown(budget)}")
     if round(float(budget) * cells) < 1:
         raise InvalidInput(
-            f"budget {budget} leaves no cell of {cells}; the least is {1 / cells:.2g}"
+            f"budget {budget} leaves no {unit} of {cells}; the least is {1 / cells:.2g}"
         )
     return round(float(budget) * cells)
 

@@ -17,7 +17,8 @@ from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.times import LAST_BITS_S
 from care_sim.core.allocation import RESERVE_FRACTION
 from care_sim.core.cell_order import AS_DEMANDED
-from care_sim.core.driver_settings import DriverSettings
+from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
+from care_sim.core.firing.listing import CELLS, settled
 from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
 
 MIN_RETURNS = 3
@@ -145,6 +146,15 @@ class Conditions(Sensing):
     row by row from the top, `rows-down`, `rows-up`, `columns`, `random`, `spread` or
     `core-spread`.
     """
+    firing: str = CELLS
+    """What the LiDAR can fire (`care_sim.core.firing`): `cells`, `tiles:ROWSxCOLUMNS`,
+    `segments:COLUMNS`, `rows`, `columns`, `vertical-window` or `azimuth-window:DEGREES`.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # Conditions that mean the same must be equal: they are part of what identifies an episode.
+        object.__setattr__(self, "firing", settled(self.firing))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +164,9 @@ class ClosedLoopConditions(DriverSettings, Conditions):
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
 OF_BOTH_LOOPS = tuple(field.name for field in fields(Conditions))
+COLUMNS_WHERE_CHANGED = (*DRIVER_SETTINGS, "firing")
+"""Conditions that are a column of results only where they are not the default: so rows, and the
+digests made of them, stay as they were before there was a choice."""
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))
 UNUSED_BY_FULL_SCAN = (
     *CAMERA_FAULTS,
@@ -164,6 +177,7 @@ UNUSED_BY_FULL_SCAN = (
     "azimuth_margin",
     "elevation_margin",
     "cell_order",
+    "firing",
 )
 """Conditions that change nothing for a scan of every cell: it asks neither the camera nor the
 allocator."""

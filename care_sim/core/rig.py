@@ -13,6 +13,8 @@ from care_sim.core.belief import Belief, Observation
 from care_sim.core.cell_order import AS_DEMANDED, CELL_ORDERS, reordered
 from care_sim.core.cell_order_kernels import SetMargins
 from care_sim.core.cell_sets import CellSets
+from care_sim.core.firing.base import Hardware
+from care_sim.core.firing.listing import CELLS, hardware_of, settled
 from care_sim.core.grid import (
     AZIMUTH_MARGIN,
     ELEVATION_MARGIN,
@@ -37,7 +39,8 @@ class Rig:
     between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
     `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road. The sets that a
     policy demands are listed in a `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before
-    cells are chosen. Raises InvalidInput for a value out of its bounds.
+    cells are chosen. `firing` names the hardware that fires them (`care_sim.core.firing`). Raises
+    InvalidInput for a value out of its bounds.
     """
 
     grid: AngularGrid = field(default_factory=AngularGrid)
@@ -49,12 +52,14 @@ class Rig:
     elevation_margin: int = bounded(ELEVATION_MARGIN, 0, MOST_ROWS)
     sensor_height_m: float = bounded(LIDAR_HEIGHT_M, 0, 100)
     cell_order: str = AS_DEMANDED
+    firing: str = CELLS
 
     def __post_init__(self) -> None:
         check_fields(self)
         if not isinstance(self.grid, AngularGrid):
             raise InvalidInput(f"grid must be an AngularGrid, got {shown(self.grid)}")
         check_known("cell_order", self.cell_order, CELL_ORDERS)
+        object.__setattr__(self, "firing", settled(self.firing))
         cameras = self.cameras
         if not (
             isinstance(cameras, tuple | list)
@@ -77,6 +82,11 @@ class Rig:
         if not all(0 <= number < count for number in belief.detections.cameras.tolist()):
             raise InvalidInput(f"detections of an observation must be of cameras 0 to {count - 1}")
         return belief
+
+    @cached_property
+    def hardware(self) -> Hardware:
+        """What the LiDAR can fire. Raises InvalidInput for units that do not divide the grid."""
+        return hardware_of(self.firing, self.grid)
 
     @cached_property
     def camera_models(self) -> CameraModels:

@@ -5,6 +5,7 @@ No action can overspend that budget.
 
 import inspect
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, ClassVar, Generic, TypeVar
 
 import gymnasium
@@ -15,10 +16,9 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_flag, check_seed
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.base.random_streams import check_secret, streams
-from care_sim.core.actions import fired_cells
-from care_sim.core.allocation import budget_cells
 from care_sim.core.belief import OBSERVED
 from care_sim.core.conditions import Conditions
+from care_sim.core.firing.listing import hardware_of
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.random_floor import RandomFloor
@@ -69,13 +69,14 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self.rig = Rig(
             grid=grid,
             cameras=cameras,
-            budget=budget_cells(budget, grid.size),
+            budget=hardware_of(conditions.firing, grid).budget_cells(budget),
             reserve_fraction=conditions.reserve_fraction,
             keyframe_s=keyframe_s,
             azimuth_margin=conditions.azimuth_margin,
             elevation_margin=conditions.elevation_margin,
             sensor_height_m=sensor_height_m,
             cell_order=conditions.cell_order,
+            firing=conditions.firing,
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)
@@ -141,6 +142,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         self._over = False
         self._floors = RandomFloor(floor, self.conditions.floor_seed, self.rig.grid.size)
         self._keyframe = 0
+        self._last_fired = np.empty(0, np.int64)
         return self.observed()
 
     def observed(self) -> Observed:
@@ -157,7 +159,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             raise gymnasium.error.ResetNeeded("the episode is over: call reset()")
         # A copy, since the caller may write into an action once it is taken.
         self.acted = scores = checked_scores(action, self.rig.grid.shape).copy()
-        fired = self._fired(scores)
+        self._last_fired = fired = self._fired(scores)
         self._keyframe += 1
         return fired
 
@@ -170,12 +172,8 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         return self._fired(checked_scores(action, self.rig.grid.shape))
 
     def _fired(self, scores: Action) -> Cells:
-        # An action that spends the budget itself needs no floor, and a floor takes longer to draw
-        # than a scan of its cells.
-        scored = np.count_nonzero(scores > 0)
-        needed = self.conditions.floor and scored < self.rig.budget
-        floor = self._floors.at(self._keyframe) if needed else None
-        return fired_cells(scores, self.rig.budget, floor)
+        floor = partial(self._floors.at, self._keyframe) if self.conditions.floor else None
+        return self.rig.hardware.fire(scores, self.rig.budget, floor, self._last_fired)
 
     def _fired_as_info(self, fired: Cells) -> Cells | list[int]:
         """The fired cells as `info` holds them, a copy.

@@ -5,13 +5,14 @@ cell belongs to the share that took it, though later ones may have asked for it 
 """
 
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 
 from care_sim.core.allocation import stages_of, taken_by_stage
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import Cells
+from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 
 RAY_SHARES = ("exploitation", "layer_1", "layer_2", "later_layers", "floor")
@@ -23,8 +24,8 @@ _LAST_OWN, _LATER, _FLOOR = 2, 3, 4
 
 @dataclass(frozen=True)
 class ServedDemand:
-    """What a policy asked for at a keyframe and what it got: all cells `fired` (n,), and the cells
-    that every stage of the demand `took`, exploitation first. What no stage took is the floor's.
+    """What a policy asked for at a keyframe and what it got: all cells `fired` (n,), and those that
+    fired for every stage of the demand (`took`), exploitation first. The others are the floor's.
     """
 
     demand: Demand
@@ -32,11 +33,20 @@ class ServedDemand:
     took: tuple[Cells, ...]
 
     @classmethod
-    def of(
-        cls, demand: Demand, fired: Cells, budget: int, reserve_fraction: float
-    ) -> "ServedDemand":
-        """Of a demand whose allocation, and floor, are the cells `fired`."""
-        return cls(demand, fired, tuple(taken_by_stage(demand, budget, reserve_fraction)))
+    def of(cls, demand: Demand, fired: Cells, rig: Rig) -> "ServedDemand":
+        """Of a demand whose allocation, and floor, are the cells `fired`. A cell that fires along
+        with others of its unit belongs to the stage of the first of them that was asked for.
+        """
+        stages = taken_by_stage(demand, rig.budget, rig.reserve_fraction)
+        places = rig.hardware.credited(np.concatenate(stages), fired)
+        ends = np.cumsum([0, *map(len, stages)])
+        return cls(
+            demand,
+            fired,
+            tuple(
+                fired[(start <= places) & (places < end)] for start, end in pairwise(ends.tolist())
+            ),
+        )
 
     @property
     def sets(self) -> list[Cells]:

@@ -58,7 +58,7 @@ def account_play(config: PlayConfig, film: Film, sightings: Sightings) -> Accoun
                     "accounted for"
                 )
             fired = env.keyframes[-1].fired
-            served = ServedDemand.of(policy.demanded, fired, rig.budget, rig.reserve_fraction)
+            served = ServedDemand.of(policy.demanded, fired, rig)
             for new in entries:
                 seen = new.appearance
                 reasons.append(miss_reason(seen, served, config.min_returns))

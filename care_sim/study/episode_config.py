@@ -11,8 +11,7 @@ from typing import Any, Self
 import gymnasium
 
 from care_sim.base.checks import check_known, check_seed
-from care_sim.core.conditions import DEFAULTS, ClosedLoopConditions
-from care_sim.core.driver_settings import DRIVER_SETTINGS
+from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoopConditions
 from care_sim.envs import CLOSED_LOOP
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
@@ -87,13 +86,13 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     def row(self) -> Row:
         """All parameters, flat; those of detector, scenario and policy as `detector.NAME`,
-        `scenario.NAME`, `policy.NAME`. `detector` and the settings of the driver are columns only
+        `scenario.NAME`, `policy.NAME`. `detector` and `COLUMNS_WHERE_CHANGED` are columns only
         where they are not the default.
         """
-        plain = {name: getattr(self, name) for name in PLAIN_FIELDS if name not in DRIVER_SETTINGS}
+        plain = {n: getattr(self, n) for n in PLAIN_FIELDS if n not in COLUMNS_WHERE_CHANGED}
         # Without the columns the rows, and the digests made of them, stay as they were before there
         # was a choice.
-        chosen = {"detector": PROXY} | {name: DEFAULTS[name] for name in DRIVER_SETTINGS}
+        chosen = {"detector": PROXY} | {name: DEFAULTS[name] for name in COLUMNS_WHERE_CHANGED}
         other = {n: getattr(self, n) for n, usual in chosen.items() if getattr(self, n) != usual}
         return (
             plain

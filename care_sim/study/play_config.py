@@ -9,7 +9,7 @@ from typing import Any, Self
 import gymnasium
 
 from care_sim.base.errors import InvalidInput
-from care_sim.core.conditions import DEFAULTS, OF_BOTH_LOOPS, Conditions
+from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, OF_BOTH_LOOPS, Conditions
 from care_sim.envs.open_loop import UNFILMED, FilmEnv
 from care_sim.evaluation.sightings import ANNOTATED
 from care_sim.loops.film import Film
@@ -31,6 +31,7 @@ from care_sim.study.run_config import (
 )
 
 _FILMED = [name for name in OF_BOTH_LOOPS if name not in UNFILMED]
+_PLAIN = [name for name in _FILMED if name not in COLUMNS_WHERE_CHANGED]
 
 
 @dataclass(frozen=True)
@@ -77,13 +78,14 @@ class PlayConfig(Conditions, RunConfig):
 
     def row(self) -> Row:
         """Every parameter flat; those of detector and policy as `detector.NAME` and `policy.NAME`.
-        `presence` is a column only where it is not the default.
+        `presence` and `COLUMNS_WHERE_CHANGED` are columns only where they are not the default.
         """
-        plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_FILMED)}
+        plain = {name: getattr(self, name) for name in ("policy", "budget", "detector", *_PLAIN)}
         own = flat("detector", self.detector_parameters) | flat("policy", self.policy_parameters)
         # Without the column the rows, and the digests made of them, stay as they were before there
         # was a choice.
-        other = {} if self.presence == ANNOTATED else {"presence": self.presence}
+        chosen = {"presence": ANNOTATED} | {n: DEFAULTS[n] for n in _FILMED if n not in _PLAIN}
+        other = {n: getattr(self, n) for n, usual in chosen.items() if getattr(self, n) != usual}
         return self.source.row(self.scene) | {"scene": self.scene.name} | plain | other | own
 
     def installed(self) -> list[str | None]:
@@ -136,7 +138,7 @@ class PlayConfig(Conditions, RunConfig):
         return own | {"detector_parameters": dict(self.detector_parameters)} | conditions
 
 
-PLAY_FIELDS = ["source", "scene", "policy", "budget", "detector", *_FILMED]
+PLAY_FIELDS = ["source", "scene", "policy", "budget", "detector", *_PLAIN]
 """Columns that every row of a play has."""
 
 

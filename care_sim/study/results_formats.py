@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.core.driver_settings import DRIVER_SETTINGS
+from care_sim.core.conditions import COLUMNS_WHERE_CHANGED
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
 from care_sim.study.mechanism_play import (
@@ -77,7 +77,7 @@ they do not know was at its default.
 _OF_EPISODES = (
     _BY_WRITER
     | {"detector": as_optional(TEXT)}
-    | {name: CONDITION_COLUMNS[name] for name in DRIVER_SETTINGS}
+    | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED}
 )
 """Those of every study of the closed loop."""
 # What a file must have as a column is optional in a row where it tells of what did not happen: a
@@ -114,6 +114,7 @@ _OF_SOME_PLAYS = {
     "recording": as_optional(TEXT),
     "camera_detections": as_optional(TEXT),
     "presence": as_optional(TEXT),
+    "firing": CONDITION_COLUMNS["firing"],
 }
 _PLAYS = Schema(
     _ANY_PLAY

@@ -9,11 +9,11 @@ from care_sim.core.actions import (
     FLOOR,
     NOT_FIRED,
     RESERVE,
-    fired_cells,
     scores_of,
     shares_of,
 )
 from care_sim.core.allocation import allocate
+from care_sim.core.firing.free_cells import fired_cells
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand

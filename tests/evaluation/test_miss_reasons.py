@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.allocation import allocate
+from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.evaluation.miss_reasons import (
     ELSEWHERE,
@@ -35,7 +36,7 @@ def seen(*explained, wedge=WEDGE, returns=OBJECT, tracked=False):
 
 def reason(appearance, demand, budget, floor=NOTHING):
     fired = allocate(demand, budget, 0.3, floor)
-    return miss_reason(appearance, ServedDemand.of(demand, fired, budget, 0.3), 3)
+    return miss_reason(appearance, ServedDemand.of(demand, fired, Rig(budget=budget)), 3)
 
 
 CASES = {

@@ -4,6 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.allocation import allocate
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.evaluation.ray_shares import RAY_SHARES, ServedDemand, rays_by_share, shares_of_credit
 
@@ -19,7 +21,8 @@ def cells(*numbers):
 
 def served(demand, budget, rho=0.3, floor=None):
     floor = np.arange(30) if floor is None else floor
-    return ServedDemand.of(demand, allocate(demand, budget, rho, floor), budget, rho)
+    rig = Rig(AngularGrid(columns=10, rows=3), budget=budget, reserve_fraction=rho)
+    return ServedDemand.of(demand, allocate(demand, budget, rho, floor), rig)
 
 
 def test_every_share_of_a_hull_a_wedge_and_a_floor_by_hand():

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from care_sim.base.errors import InvalidInput, MissingExtra
+from care_sim.core.firing import free_cells
 from care_sim.core.types import Scan
 from care_sim.driving.braking import BrakingController
-from care_sim.envs import sensing
 from care_sim.loops.needless import NeedlessBraking
 from care_sim.measure.certify import design, playing, published, run
 from care_sim.measure.certify.design import (
@@ -205,7 +205,7 @@ def a_track_that_has_moved(monkeypatch):
 
 
 def another_cell(monkeypatch):
-    choose, calls = sensing.fired_cells, []
+    choose, calls = free_cells.fired_cells, []
 
     def other(scores, budget, floor):
         cells = choose(scores, budget, floor)
@@ -213,7 +213,7 @@ def another_cell(monkeypatch):
         free = np.setdiff1d(np.arange(scores.size), cells)[:1]
         return np.sort(np.concatenate([cells[:-1], free])) if len(calls) == 3 else cells
 
-    monkeypatch.setattr(sensing, "fired_cells", other)
+    monkeypatch.setattr(free_cells, "fired_cells", other)
 
 
 def one_range_a_centimetre_longer(monkeypatch):

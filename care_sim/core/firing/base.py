@@ -1,0 +1,79 @@
+"""What hardware is: cells that fire together, and a choice of them for what is demanded."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.allocation import budget_cells
+from care_sim.core.arrays import Integers
+from care_sim.core.grid import AngularGrid, Cells
+
+Floor: TypeAlias = Callable[[], Cells] | None
+"""Draws the random floor of a keyframe, a permutation of all cells; None of an environment without
+one."""
+
+
+class Hardware(ABC):
+    """The cells of a `grid` in units that fire as a whole, `unit_cells` cells each.
+
+    The budget is paid in units. Subclasses name what they stand for: `name` as `firing` has it, the
+    `numbers` behind the colon of it, if any, with their `usual` values, the `unit` in one word, the
+    `product`, and its public `source`.
+    """
+
+    name: ClassVar[str]
+    numbers: ClassVar[tuple[str, ...]] = ()
+    usual: ClassVar[tuple[float, ...]] = ()
+    unit: ClassVar[str]
+    product: ClassVar[str]
+    source: ClassVar[str]
+
+    def __init__(self, grid: AngularGrid, unit_cells: int):
+        self.grid = grid
+        self.unit_cells = unit_cells
+
+    @property
+    def units(self) -> int:
+        """How many units the grid has."""
+        return self.grid.size // self.unit_cells
+
+    @cached_property
+    @abstractmethod
+    def unit_of(self) -> Integers:
+        """(N,) the number of the unit of every cell."""
+
+    def budget_cells(self, budget: float) -> int:
+        """B in cells, of whole units: round(beta * units) of them (Eq. 1 in the hardware's unit).
+
+        Raises InvalidInput for a fraction outside (0, 1], and for one that leaves no unit.
+        """
+        return self.unit_cells * budget_cells(budget, self.units, self.unit)
+
+    @abstractmethod
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+        """The cells that fire, ascending, never more than `budget`.
+
+        Cells with strictly positive `scores` (E, A) are demanded, the highest score first, ties by
+        ascending index. Then the `floor` spends what is left. `last` are the cells that fired at
+        the keyframe before, none at the first one.
+        """
+
+    def credited(self, demanded: Cells, fired: Cells) -> Integers:
+        """(n,) for every fired cell (n,) the place in `demanded` (k,) of the first cell that its
+        unit was demanded for; k where nothing of the unit was demanded.
+        """
+        first = np.full(self.units, len(demanded))
+        np.minimum.at(first, self.unit_of[demanded], np.arange(len(demanded)))
+        return first[self.unit_of[fired]]
+
+
+def ranked(scores: NDArray[Any]) -> Cells:
+    """(k,) cells with strictly positive `scores`, the highest first, ties by ascending index."""
+    flat = scores.ravel()
+    chosen = np.flatnonzero(flat > 0)
+    # Negated, a stable ascending sort puts the highest first and leaves ties in their order.
+    return chosen[np.argsort(-flat[chosen].astype(np.float32), kind="stable")]

@@ -1,0 +1,64 @@
+"""Blocks of the grid: rectangles of cells, each of which fires as a whole."""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.base.compiled import compiled
+from care_sim.base.errors import InvalidInput
+from care_sim.core.arrays import Integers, Mask
+from care_sim.core.firing.base import Floor, Hardware, ranked
+from care_sim.core.grid import AngularGrid, Cells
+
+
+class Blocks(Hardware):
+    """The grid in equal blocks of `rows` x `columns` cells; the first begins at row 0 and column 0.
+
+    A demand is projected in its own order: cell by cell, the block of the cell is taken, until the
+    budget is spent. A cell whose block is taken already costs nothing. The floor, cell by cell,
+    takes what is left. Raises InvalidInput for blocks that do not divide the grid.
+    """
+
+    def __init__(self, grid: AngularGrid, rows: int, columns: int):
+        for size, whole, what in ((rows, grid.rows, "rows"), (columns, grid.columns, "columns")):
+            if size < 1 or whole % size:
+                raise InvalidInput(
+                    f"{what} of firing {self.name} must divide the {whole} of the grid, got {size}"
+                )
+        super().__init__(grid, rows * columns)
+        self.rows = rows
+        self.columns = columns
+
+    @cached_property
+    def unit_of(self) -> Integers:
+        """(N,) the number of the block of every cell, row by row of blocks from the top."""
+        rows, columns = np.divmod(np.arange(self.grid.size), self.grid.columns)
+        across = self.grid.columns // self.columns
+        unit_of: Integers = rows // self.rows * across + columns // self.columns
+        unit_of.flags.writeable = False
+        return unit_of
+
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+        """The blocks of the demanded cells in their order, then those of the floor."""
+        taken = np.zeros(self.units, np.bool_)
+        most = budget // self.unit_cells
+        count = _take(ranked(scores), self.unit_of, taken, 0, most)
+        if floor is not None and count < most:
+            _take(floor(), self.unit_of, taken, count, most)
+        return np.flatnonzero(taken[self.unit_of])
+
+
+@compiled()
+def _take(order: Cells, unit_of: Integers, taken: Mask, count: int, most: int) -> int:
+    """Mark the units of the cells `order` as taken, in its order, until `most` of them are;
+    `count` are before. Returns how many are afterwards.
+    """
+    for cell in order:
+        if count == most:
+            break
+        unit = unit_of[cell]
+        count += not taken[unit]
+        taken[unit] = True
+    return count

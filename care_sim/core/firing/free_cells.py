@@ -1,0 +1,52 @@
+"""Free cells: every cell fires by itself. The paper's hardware, and the default."""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_sim.core.arrays import Integers, Mask
+from care_sim.core.firing.base import Floor, Hardware, ranked
+from care_sim.core.grid import AngularGrid, Cells
+
+
+class FreeCells(Hardware):
+    """A sensor that aims every shot, in any order. The paper assumes it (Sec. 3)."""
+
+    name = "cells"
+    unit = "cell"
+    product = "agile scanner that aims single shots"
+    source = "AEye, white paper Rethinking the Three Rs of LiDAR: Rate, Resolution and Range"
+
+    def __init__(self, grid: AngularGrid):
+        super().__init__(grid, unit_cells=1)
+
+    @cached_property
+    def unit_of(self) -> Integers:
+        """(N,) the cells themselves."""
+        return np.arange(self.grid.size)
+
+    def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
+        """The demanded cells up to the budget, then the floor."""
+        # An action that spends the budget itself needs no floor, and a floor takes longer to draw
+        # than a scan of its cells.
+        needed = floor is not None and np.count_nonzero(scores > 0) < budget
+        return fired_cells(scores, budget, floor() if floor is not None and needed else None)
+
+
+def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Cells | None) -> Cells:
+    """The cells that an action fires, ascending.
+
+    They are the `budget` highest strictly positive `scores` (E, A), ties by ascending index. Where
+    there are fewer, `floor` tops them up; None leaves the rest unspent.
+    """
+    flat = scores.ravel().astype(np.float32, copy=False)
+    (chosen,) = (flat > 0).nonzero()
+    if len(chosen) > budget:
+        chosen = ranked(scores)[:budget]
+    elif floor is not None and len(chosen) < budget:
+        # So much of the floor is enough: at most len(chosen) of these cells are taken.
+        free = floor[:budget]
+        chosen = np.concatenate([chosen, free[flat[free] <= 0][: budget - len(chosen)]])
+    return np.sort(chosen)

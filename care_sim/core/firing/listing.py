@@ -1,0 +1,74 @@
+"""The kinds of hardware by name, and the text that names one: `tiles` or `tiles:4x8`."""
+
+import re
+from collections.abc import Callable
+
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.firing.azimuth_window import AzimuthWindow
+from care_sim.core.firing.base import Hardware
+from care_sim.core.firing.free_cells import FreeCells
+from care_sim.core.firing.ring_segments import RingSegments
+from care_sim.core.firing.tiles import Tiles
+from care_sim.core.firing.vertical_window import VerticalWindow
+from care_sim.core.firing.whole_columns import WholeColumns
+from care_sim.core.firing.whole_rows import WholeRows
+from care_sim.core.grid import AngularGrid
+
+CELLS = FreeCells.name
+HARDWARE: dict[str, type[Hardware]] = {
+    kind.name: kind
+    for kind in (
+        FreeCells,
+        Tiles,
+        RingSegments,
+        WholeRows,
+        WholeColumns,
+        VerticalWindow,
+        AzimuthWindow,
+    )
+}
+_NUMBER = re.compile(r"[0-9]{1,6}(\.[0-9]{1,6})?")
+
+
+def form_of(kind: type[Hardware]) -> str:
+    """How a kind is named: `tiles:ROWSxCOLUMNS`."""
+    return ":".join([kind.name, *(["x".join(kind.numbers)] if kind.numbers else [])])
+
+
+def settled(firing: str) -> str:
+    """The text in full: `tiles:4x8` for `tiles`. Texts that mean the same become equal.
+
+    Raises InvalidInput for what names no hardware.
+    """
+    kind, numbers = _parsed(firing)
+    return ":".join([kind.name, *(["x".join(f"{n:.12g}" for n in numbers)] if numbers else [])])
+
+
+def hardware_of(firing: str, grid: AngularGrid) -> Hardware:
+    """The hardware that a text names, over a grid. Raises InvalidInput for what names none, and
+    for units that do not divide the grid.
+    """
+    kind, numbers = _parsed(firing)
+    make: Callable[..., Hardware] = kind
+    return make(grid, *numbers)
+
+
+def _parsed(firing: str) -> tuple[type[Hardware], tuple[float, ...]]:
+    """The kind of hardware and its numbers. Raises InvalidInput for another text."""
+    name, colon, behind = firing.partition(":") if isinstance(firing, str) else ("", "", "")
+    kind = HARDWARE.get(name)
+    if kind is not None and not colon:
+        return kind, kind.usual
+    given = behind.split("x")
+    if kind is None or len(given) != len(kind.numbers) or not all(map(_NUMBER.fullmatch, given)):
+        raise _unknown(firing)
+    try:
+        # Of the type of the usual ones: what is counted is a whole number.
+        return kind, tuple(type(n)(text) for n, text in zip(kind.usual, given, strict=True))
+    except ValueError as error:
+        raise _unknown(firing) from error
+
+
+def _unknown(firing: object) -> InvalidInput:
+    forms = ", ".join(map(form_of, HARDWARE.values()))
+    return InvalidInput(f"unknown firing {shown(firing)}; known: {forms}")

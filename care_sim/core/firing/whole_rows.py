@@ -1,0 +1,16 @@
+"""Whole rows: scan lines all the way across, as an oscillating mirror draws them."""
+
+from care_sim.core.firing.blocks import Blocks
+from care_sim.core.grid import AngularGrid
+
+
+class WholeRows(Blocks):
+    """A sensor with two mirrors: the fast one draws a whole line, the slow one chooses which."""
+
+    name = "rows"
+    unit = "row"
+    product = "scanner with micro-mirrors that draws whole scan lines"
+    source = "Blickfeld, Qb2 documentation, scan pattern: scan lines, foveation"
+
+    def __init__(self, grid: AngularGrid):
+        super().__init__(grid, 1, grid.columns)

@@ -1,0 +1,236 @@
+"""What all hardware keeps to, and what each fires of demands made by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from care_sim.base.errors import InvalidInput
+from care_sim.core.actions import scores_of
+from care_sim.core.conditions import Conditions
+from care_sim.core.firing.listing import HARDWARE, hardware_of, settled
+from care_sim.core.grid import AngularGrid
+from care_sim.core.rig import Rig
+
+GRID = AngularGrid(columns=12, rows=6)
+NOTHING = np.empty(0, np.int64)
+ALL = (
+    "cells",
+    "tiles:2x3",
+    "tiles:1x1",
+    "segments:4",
+    "rows",
+    "columns",
+    "vertical-window",
+    "azimuth-window:60",
+    "azimuth-window:0",
+    "azimuth-window:180",
+)
+WINDOWS = tuple(name for name in ALL if "window" in name)
+demands = st.lists(st.integers(0, GRID.size - 1), unique=True).map(lambda c: np.array(c, np.int64))
+floors = st.permutations(range(GRID.size)).map(np.array)
+shares = st.integers(0, 12).map(lambda twelfths: twelfths / 12)
+
+
+def at(*places, grid=GRID):
+    """The cells at (row, column)."""
+    return np.array([row * grid.columns + column for row, column in places], np.int64)
+
+
+def fired(name, demand, units, floor=None, last=NOTHING, grid=GRID):
+    """What the hardware fires of cells in their order, with a budget of so many units."""
+    hardware = hardware_of(name, grid)
+    draw = None if floor is None else lambda: floor
+    return hardware.fire(
+        scores_of(demand, grid.shape), units * hardware.unit_cells, draw, last
+    ).tolist()
+
+
+def columns_of(cells, grid=GRID):
+    return sorted({cell % grid.columns for cell in cells})
+
+
+def rows_of(cells, grid=GRID):
+    return sorted({cell // grid.columns for cell in cells})
+
+
+def test_every_kind_is_tested_here():
+    assert {name.partition(":")[0] for name in ALL} == {*HARDWARE}
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(demand=demands, floor=floors, share=shares, last=demands)
+def test_it_fires_whole_units_ascending_and_never_above_its_budget(
+    name, demand, floor, share, last
+):
+    hardware = hardware_of(name, GRID)
+    units = round(share * hardware.units)
+    before = fired(name, last, units)
+    for draw in (None, floor):
+        cells = fired(name, demand, units, draw, np.array(before, np.int64))
+        assert cells == sorted({*cells})
+        sizes = np.bincount(hardware.unit_of[cells], minlength=hardware.units)
+        assert {*sizes.tolist()} <= {0, hardware.unit_cells}
+        assert np.count_nonzero(sizes) <= units
+    # With a floor nothing stays unspent.
+    assert np.count_nonzero(sizes) == units
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(demand=demands, floor=floors)
+def test_the_whole_budget_fires_everything(name, demand, floor):
+    hardware = hardware_of(name, GRID)
+    assert hardware.budget_cells(1.0) == GRID.size
+    assert fired(name, demand, hardware.units, floor) == [*range(GRID.size)]
+
+
+@given(demand=demands, floor=st.none() | floors, budget=st.integers(0, GRID.size))
+def test_a_unit_of_one_cell_is_a_free_cell(demand, floor, budget):
+    free = fired("cells", demand, budget, floor)
+    assert fired("tiles:1x1", demand, budget, floor) == free
+    assert fired("segments:1", demand, budget, floor) == free
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name not in WINDOWS])
+@given(demand=demands, floor=floors, share=shares)
+def test_units_are_taken_in_the_order_of_the_demand_and_then_of_the_floor(
+    name, demand, floor, share
+):
+    hardware = hardware_of(name, GRID)
+    units = round(share * hardware.units)
+    order = [*dict.fromkeys(hardware.unit_of[np.concatenate([demand, floor])].tolist())]
+    found = hardware.unit_of[fired(name, demand, units, floor)]
+    assert {*found.tolist()} == {*order[:units]}
+
+
+@pytest.mark.parametrize("name", ["vertical-window", "azimuth-window:180"])
+@given(demand=demands, share=shares)
+def test_a_window_that_may_go_anywhere_serves_the_first_cell(name, demand, share):
+    units = round(share * hardware_of(name, GRID).units)
+    assume(units > 0 and len(demand))
+    assert demand[0] in fired(name, demand, units)
+
+
+def test_blocks_by_hand():
+    """Of tiles of 2 x 3 the first two cells share one, and the fourth comes too late."""
+    demand = at((0, 1), (1, 2), (5, 11), (3, 3))
+    tile = [*range(3), *range(12, 15)]
+    last_tile = [cell for row in (4, 5) for cell in range(row * 12 + 9, row * 12 + 12)]
+    assert fired("tiles:2x3", demand, 2) == sorted(tile + last_tile)
+    assert fired("segments:4", demand, 2) == [0, 1, 2, 3, *range(12, 16)]
+    assert rows_of(fired("rows", demand, 2)) == [0, 1]
+    assert columns_of(fired("columns", demand, 3)) == [1, 2, 11]
+
+
+def test_equal_scores_are_taken_by_ascending_cell():
+    mask = np.zeros(GRID.shape, bool)
+    mask[[5, 2], [0, 7]] = True
+    tiles = hardware_of("rows", GRID)
+    assert rows_of(tiles.fire(mask, 12, None, NOTHING)) == [2]
+
+
+def test_a_vertical_window_by_hand():
+    """Three of six rows: 1 and 3 fit, 4 would lose row 1, 2 is there anyway."""
+    assert rows_of(fired("vertical-window", at((1, 0), (4, 5), (3, 2), (2, 2)), 3)) == [1, 2, 3]
+    # It moves no further than it must, and stays without a demand.
+    low = np.array(fired("vertical-window", at((5, 0)), 3), np.int64)
+    assert rows_of(low) == [3, 4, 5]
+    assert rows_of(fired("vertical-window", at((1, 0)), 3, last=low)) == [1, 2, 3]
+    assert fired("vertical-window", NOTHING, 3, last=low) == low.tolist()
+
+
+def test_a_vertical_window_begins_on_the_horizon():
+    grid = AngularGrid()
+    middle = np.rad2deg(
+        grid.elevations[rows_of(fired("vertical-window", NOTHING, 1, grid=grid), grid)]
+    )
+    assert abs(middle[0]) <= np.rad2deg(grid.row_height) / 2
+
+
+def test_an_azimuth_window_begins_straight_ahead():
+    assert columns_of(fired("azimuth-window:0", at((0, 0)), 4)) == [4, 5, 6, 7]
+
+
+def test_an_azimuth_window_turns_over_the_seam_and_by_no_more_than_it_may():
+    """60 degrees are two of twelve columns. From 9, 10, 11 it comes as far as 11, 0, 1."""
+    last = at(*((row, column) for row in range(6) for column in (9, 10, 11)))
+    assert columns_of(fired("azimuth-window:60", at((2, 1)), 3, last=last)) == [0, 1, 11]
+    assert columns_of(fired("azimuth-window:60", at((2, 2), (2, 0)), 3, last=last)) == [0, 10, 11]
+    assert columns_of(fired("azimuth-window:59", at((2, 1)), 3, last=last)) == [9, 10, 11]
+    assert columns_of(fired("azimuth-window:180", at((2, 5)), 3, last=last)) == [5, 6, 7]
+
+
+@given(demand=demands, last=demands, width=st.integers(1, 11), turn=st.integers(0, 11))
+def test_the_seam_makes_no_difference(demand, last, width, turn):
+    """Demand and window turned by some columns fire the same, turned as much."""
+
+    def turned(cells):
+        cells = np.array(cells, np.int64)
+        return cells // 12 * 12 + (cells % 12 + turn) % 12
+
+    stood = np.array(fired("azimuth-window:180", last, width), np.int64)
+    expected = turned(fired("azimuth-window:60", demand, width, last=stood))
+    found = fired("azimuth-window:60", turned(demand), width, last=turned(stood))
+    assert found == sorted(expected.tolist())
+
+
+@given(demand=demands, last=demands, width=st.integers(1, 11))
+def test_a_window_turns_by_no_more_than_it_may(demand, last, width):
+    stood = fired("azimuth-window:180", last, width)
+    now = fired("azimuth-window:60", demand, width, last=np.array(stood, np.int64))
+    lost = {*columns_of(stood)} - {*columns_of(now)}
+    assert len(lost) <= 2
+
+
+def test_every_fired_cell_is_credited_to_the_first_that_its_unit_was_demanded_for():
+    hardware = hardware_of("segments:4", GRID)
+    found = hardware.credited(at((0, 2), (1, 0), (0, 1)), at((0, 0), (0, 3), (1, 1), (2, 0)))
+    assert found.tolist() == [0, 0, 1, 3]
+
+
+def test_the_budget_is_rounded_in_units():
+    assert hardware_of("rows", AngularGrid()).budget_cells(0.03) == 512
+    assert hardware_of("tiles", AngularGrid()).budget_cells(0.03) == 15 * 32
+    assert hardware_of("cells", AngularGrid()).budget_cells(0.03) == 492
+    with pytest.raises(InvalidInput, match=r"budget 0.01 leaves no row of 32; the least is 0.031"):
+        hardware_of("rows", AngularGrid()).budget_cells(0.01)
+
+
+def test_texts_that_mean_the_same_are_equal():
+    assert settled("tiles") == "tiles:4x8"
+    assert settled("azimuth-window:10.0") == settled("azimuth-window") == "azimuth-window:10"
+    assert settled("cells") == "cells"
+    assert Conditions(firing="segments") == Conditions(firing="segments:16")
+    assert replace(Rig(), firing="tiles") == Rig(firing="tiles:4x8")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "magic", "cells:", "tiles:4", "tiles:4.5x8", "tiles:-4x8", "rows:2", "segments:x",
+             "azimuth-window:nan", "tiles:4x8x2", "azimuth-window:" + "9" * 40, None, 3]
+)  # fmt: skip
+def test_another_text_is_refused_in_one_line(text):
+    with pytest.raises(InvalidInput, match=r"known: cells, tiles:ROWSxCOLUMNS, ") as refused:
+        settled(text)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("tiles:5x8", "rows of firing tiles must divide the 32 of the grid, got 5"),
+        ("tiles:4x0", "columns of firing tiles must divide the 512 of the grid, got 0"),
+        ("segments:1000", "columns of firing segments must divide the 512 of the grid, got 1000"),
+        ("azimuth-window:181", r"degrees of firing azimuth-window must lie in \[0, 180\]"),
+    ],
+)
+def test_units_must_fit_the_grid(text, named):
+    with pytest.raises(InvalidInput, match=named):
+        hardware_of(text, AngularGrid())
+
+
+@pytest.mark.parametrize("kind", HARDWARE.values())
+def test_every_kind_names_a_product_and_its_source(kind):
+    assert all((kind.product, kind.source, kind.unit))
+    assert len(kind.numbers) == len(kind.usual)
