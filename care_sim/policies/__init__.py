@@ -28,6 +28,7 @@ from care_sim.policies.makers import (
 from care_sim.policies.own.care_sector import CareSector
 from care_sim.policies.own.care_sightlines import CareSightlines
 from care_sim.policies.own.care_spread import CareSpread
+from care_sim.policies.own.care_units import CareUnits
 from care_sim.policies.paper.all_camera import AllCamera
 from care_sim.policies.paper.beam_reduce import BeamReduce
 from care_sim.policies.paper.care import Care
@@ -76,6 +77,7 @@ BUILT_IN: dict[str, PolicyMaker | EntryPoint] = {
         CareSpread,
         CareSightlines,
         CareSector,
+        CareUnits,
         Rows,
         Fan,
         Stride,

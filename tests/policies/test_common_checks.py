@@ -33,7 +33,7 @@ own.
 KEYFRAMES = 6
 OWN = {"care-spread": 1, "care-sightlines": 2, "care-sector": 2}
 """The policies of our own, and the layer of each in which its hulls come first."""
-CORE_FIRST = (*OWN, "place-hulls")
+CORE_FIRST = (*OWN, "place-hulls", "care-units")
 """The policies that list their sets with the core first."""
 PATTERNS = ("rows", "fan", "stride", "sweep", "place")
 
@@ -145,6 +145,7 @@ def test_every_policy_takes_over_a_drive(name, drive_under_way, request):
         ("care", {}),
         ("care-sbf", {"k_safe": 0.0, "decay_per_keyframe": 0.25}),
         ("care-sightlines", {}),
+        ("care-units", {}),
         ("sweep", {}),
         ("seed-finder", {}),
     ],

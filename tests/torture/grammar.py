@@ -267,6 +267,7 @@ class Grammar:
     def _names(self, name):
         """What fits an option of this name; thrice, so that it is drawn more often."""
         from care_sim.core.cell_order import CELL_ORDERS
+        from care_sim.core.firing.listing import HARDWARE
         from care_sim.driving.drivers import DRIVERS
         from care_sim.policies import policy_names
         from care_sim.scenarios import SCENARIOS
@@ -281,6 +282,7 @@ class Grammar:
             "also": policy_names(),
             "engine": ["fast", "bullet"],
             "cell_order": [*CELL_ORDERS],
+            "firing": [*HARDWARE, "tiles:2x16"],
             "driver": [*DRIVERS],
         }
         return names.get(name, []) * 6

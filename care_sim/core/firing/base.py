@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.allocation import budget_cells
-from care_sim.core.arrays import Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid import AngularGrid, Cells
 
 Floor: TypeAlias = Callable[[], Cells] | None
@@ -62,6 +62,13 @@ class Hardware(ABC):
         the keyframe before, none at the first one.
         """
 
+    @abstractmethod
+    def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
+        """The units that can fire together within `budget` cells and are worth the most in all, the
+        best first, of equals the lower one; none that is worth nothing. `worth` (units,) is that of
+        each, 0 or more; `last` as in `fire`.
+        """
+
     def credited(self, demanded: Cells, fired: Cells) -> Integers:
         """(n,) for every fired cell (n,) the place in `demanded` (k,) of the first cell that its
         unit was demanded for; k where nothing of the unit was demanded.
@@ -71,9 +78,9 @@ class Hardware(ABC):
         return first[self.unit_of[fired]]
 
 
-def ranked(scores: NDArray[Any]) -> Cells:
-    """(k,) cells with strictly positive `scores`, the highest first, ties by ascending index."""
-    flat = scores.ravel()
+def ranked(values: NDArray[Any]) -> Integers:
+    """(k,) the places of strictly positive values, the highest first, ties by ascending place."""
+    flat = values.ravel()
     chosen = np.flatnonzero(flat > 0)
     # Negated, a stable ascending sort puts the highest first and leaves ties in their order.
-    return chosen[np.argsort(-flat[chosen].astype(np.float32), kind="stable")]
+    return chosen[np.argsort(-flat[chosen].astype(np.float64), kind="stable")]

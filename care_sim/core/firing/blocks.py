@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
-from care_sim.core.arrays import Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.firing.base import Floor, Hardware, ranked
 from care_sim.core.grid import AngularGrid, Cells
 
@@ -48,6 +48,10 @@ class Blocks(Hardware):
         if floor is not None and count < most:
             _take(floor(), self.unit_of, taken, count, most)
         return np.flatnonzero(taken[self.unit_of])
+
+    def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
+        """Any blocks can fire together."""
+        return ranked(worth)[: budget // self.unit_cells]
 
 
 @compiled()

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_sim.core.arrays import Integers, Mask
+from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.firing.base import Floor, Hardware, ranked
 from care_sim.core.grid import AngularGrid, Cells
 
@@ -33,6 +33,10 @@ class FreeCells(Hardware):
         # than a scan of its cells.
         needed = floor is not None and np.count_nonzero(scores > 0) < budget
         return fired_cells(scores, budget, floor() if floor is not None and needed else None)
+
+    def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
+        """Any cells can fire together."""
+        return ranked(worth)[:budget]
 
 
 def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Cells | None) -> Cells:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
-from care_sim.core.arrays import Integers, Mask
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.firing.base import Floor, Hardware, ranked
 from care_sim.core.grid import Cells
 
@@ -24,33 +24,43 @@ class Window(Hardware):
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
         """The window that serves the demand."""
         width = budget // self.unit_cells
+        places = self._reached(width, last)
+        first = _best_place(ranked(scores), self.unit_of, places, width, self.units)
+        fired = np.zeros(self.units, np.bool_)
+        fired[self._window(first, width)] = True
+        return np.flatnonzero(fired[self.unit_of])
+
+    def best(self, worth: Floats, budget: int, last: Cells) -> Integers:
+        """The units of the window that is worth the most of those that it can come to."""
+        width = budget // self.unit_cells
+        places = self._reached(width, last)
+        # Twice around, so that a window over the seam is the difference of two sums, too.
+        sums = np.concatenate([[0], np.cumsum([*worth, *worth])])
+        units = self._window(int(places[np.argmax(sums[places + width] - sums[places])]), width)
+        return units[ranked(worth[units])]
+
+    def _window(self, first: int, width: int) -> Integers:
+        """The units of the window that begins at the unit `first`, on a circle."""
+        return (first + np.arange(width)) % self.units
+
+    def _reached(self, width: int, last: Cells) -> Integers:
+        """The first units of all places that a window can take after it fired the cells `last`, the
+        nearest to where it stood first, of equals the lower one.
+        """
         fired = np.zeros(self.units, np.bool_)
         fired[self.unit_of[last]] = True
-        # No window and one over everything stand still.
-        if 0 < width < self.units:
-            places = self._places(self._stood(fired, width), width)
-            first = _best_place(ranked(scores), self.unit_of, places, width, self.units)
-            fired[:] = False
-            fired[np.arange(first, first + width) % self.units] = True
-        else:
-            fired[:] = width > 0
-        return np.flatnonzero(fired[self.unit_of])
+        # It began where the neighbour before did not fire, over the seam, too. Over everything it
+        # begins nowhere.
+        begins = np.flatnonzero(fired & ~np.roll(fired, 1))
+        return self._places(int(begins[0]) if len(begins) else self._start(width), width)
 
     @abstractmethod
     def _places(self, stood: int, width: int) -> Integers:
-        """The first units of all places that the window can take, the nearest to the one where it
-        `stood` first, of equals the lower one.
-        """
+        """See `_reached`; the window `stood` at this first unit."""
 
     @abstractmethod
     def _start(self, width: int) -> int:
         """The first unit of the window before the first keyframe."""
-
-    def _stood(self, fired: Mask, width: int) -> int:
-        """The first unit of the window that fired last."""
-        # The one whose neighbour before it did not fire, over the seam, too.
-        begins = np.flatnonzero(fired & ~np.roll(fired, 1))
-        return int(begins[0]) if len(begins) else self._start(width)
 
 
 @compiled()

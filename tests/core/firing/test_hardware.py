@@ -28,7 +28,7 @@ ALL = (
     "azimuth-window:0",
     "azimuth-window:180",
 )
-WINDOWS = tuple(name for name in ALL if "window" in name)
+BLOCKS = tuple(name for name in ALL if "window" not in name)
 demands = st.lists(st.integers(0, GRID.size - 1), unique=True).map(lambda c: np.array(c, np.int64))
 floors = st.permutations(range(GRID.size)).map(np.array)
 shares = st.integers(0, 12).map(lambda twelfths: twelfths / 12)
@@ -60,8 +60,7 @@ def test_every_kind_is_tested_here():
     assert {name.partition(":")[0] for name in ALL} == {*HARDWARE}
 
 
-@pytest.mark.parametrize("name", ALL)
-@given(demand=demands, floor=floors, share=shares, last=demands)
+@given(name=st.sampled_from(ALL), demand=demands, floor=floors, share=shares, last=demands)
 def test_it_fires_whole_units_ascending_and_never_above_its_budget(
     name, demand, floor, share, last
 ):
@@ -78,8 +77,7 @@ def test_it_fires_whole_units_ascending_and_never_above_its_budget(
     assert np.count_nonzero(sizes) == units
 
 
-@pytest.mark.parametrize("name", ALL)
-@given(demand=demands, floor=floors)
+@given(name=st.sampled_from(ALL), demand=demands, floor=floors)
 def test_the_whole_budget_fires_everything(name, demand, floor):
     hardware = hardware_of(name, GRID)
     assert hardware.budget_cells(1.0) == GRID.size
@@ -93,8 +91,7 @@ def test_a_unit_of_one_cell_is_a_free_cell(demand, floor, budget):
     assert fired("segments:1", demand, budget, floor) == free
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if name not in WINDOWS])
-@given(demand=demands, floor=floors, share=shares)
+@given(name=st.sampled_from(BLOCKS), demand=demands, floor=floors, share=shares)
 def test_units_are_taken_in_the_order_of_the_demand_and_then_of_the_floor(
     name, demand, floor, share
 ):
@@ -105,8 +102,9 @@ def test_units_are_taken_in_the_order_of_the_demand_and_then_of_the_floor(
     assert {*found.tolist()} == {*order[:units]}
 
 
-@pytest.mark.parametrize("name", ["vertical-window", "azimuth-window:180"])
-@given(demand=demands, share=shares)
+@given(
+    name=st.sampled_from(["vertical-window", "azimuth-window:180"]), demand=demands, share=shares
+)
 def test_a_window_that_may_go_anywhere_serves_the_first_cell(name, demand, share):
     units = round(share * hardware_of(name, GRID).units)
     assume(units > 0 and len(demand))
@@ -182,6 +180,34 @@ def test_a_window_turns_by_no_more_than_it_may(demand, last, width):
     now = fired("azimuth-window:60", demand, width, last=np.array(stood, np.int64))
     lost = {*columns_of(stood)} - {*columns_of(now)}
     assert len(lost) <= 2
+
+
+@given(
+    name=st.sampled_from(ALL),
+    worth=st.lists(st.integers(0, 5), min_size=72, max_size=72),
+    share=shares,
+    last=demands,
+)
+def test_the_best_units_can_fire_together_and_no_others_are_worth_more(name, worth, share, last):
+    """Every choice that the hardware can fire, one by one, is worth no more."""
+    hardware = hardware_of(name, GRID)
+    worth = np.array(worth[: hardware.units])
+    units = round(share * hardware.units)
+    stood = np.array(fired(name, last, units), np.int64)
+    best = hardware.best(worth, units * hardware.unit_cells, stood).tolist()
+    assert worth[best].tolist() == sorted(worth[best].tolist(), reverse=True)
+    cells = np.flatnonzero(np.isin(hardware.unit_of, best))
+    assert {*cells.tolist()} <= {*fired(name, cells, units, last=stood)}
+    assert worth[best].all()
+    if name in BLOCKS:
+        assert worth[best].sum() == np.sort(worth)[::-1][:units].sum()
+    else:
+        everywhere = [
+            fired(name, np.flatnonzero(hardware.unit_of == unit), units, last=stood)
+            for unit in range(hardware.units)
+        ]
+        rivals = (np.unique(hardware.unit_of[each]) for each in everywhere)
+        assert worth[best].sum() >= max(worth[rival].sum() for rival in rivals)
 
 
 def test_every_fired_cell_is_credited_to_the_first_that_its_unit_was_demanded_for():
