@@ -73,3 +73,18 @@ def test_shares_are_the_order_of_the_allocator(demand, budget, reserve_fraction)
     assert {int(cell) for cell in order if found[cell] == EXPLOITATION} <= wanted
     assert np.count_nonzero(found) == budget
     assert np.count_nonzero(found == FLOOR) == budget - len(order)
+
+
+def test_what_fires_along_has_the_share_of_the_first_of_its_unit():
+    """Segments of two: cells 0 and 2 are for exploitation, 7 is for the reserve, and the floor
+    begins with 11. Cell 3 fires for 2, and 6 for 7.
+    """
+    rig = Rig(GRID, budget=8, reserve_fraction=0.5, firing="segments:2")
+    demand = Demand([np.array([0, 2])], [[np.array([7, 3])]])
+    action = scores_of(allocate(demand, rig.budget, rig.reserve_fraction), GRID.shape)
+    fired = rig.hardware.fire(action, rig.budget, lambda: FLOOR_ORDER, np.empty(0, np.int64))
+    expected = np.full(12, NOT_FIRED)
+    expected[:4], expected[6:8], expected[10:] = EXPLOITATION, RESERVE, FLOOR
+    np.testing.assert_array_equal(shares_of(fired, action, demand, rig).ravel(), expected)
+    expected[:8] = np.where(expected[:8], CHOSEN, NOT_FIRED)
+    np.testing.assert_array_equal(shares_of(fired, action, None, rig).ravel(), expected)

@@ -55,3 +55,12 @@ def test_every_sighting_counts_one_and_one_without_a_ray_nothing():
         np.array([[0.25, 0.75, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 1]])
     )
     assert shares_of_credit(np.empty((0, len(RAY_SHARES)))).shape == (0, 5)
+
+
+def test_rays_that_fire_along_are_credited_to_the_stage_that_their_unit_fired_for():
+    """Rows of ten cells: the hull in row 0 takes it, the wedge row 2, where its second cell is."""
+    rig = Rig(AngularGrid(columns=10, rows=3), budget=20, reserve_fraction=0.5, firing="rows")
+    demand = Demand([cells(3)], [[cells(4, 25)]])
+    fired = np.concatenate([np.arange(10), np.arange(20, 30)])
+    got = ServedDemand.of(demand, fired, rig)
+    assert rays_by_share(cells(0, 3, 20, 29, 15), got).tolist() == [2, 2, 0, 0, 0]

@@ -16,9 +16,9 @@ class Window(Hardware):
     """A window over neighbouring units, as wide as the budget.
 
     A demand is projected in its own order: cell by cell, the window is held to places that hold the
-    cell as well as those before it. A cell that no such place holds is passed over. Of the places
-    that are left the window takes the one nearest to where it stood, and so it stays where nothing
-    is demanded. It always fires as a whole: there is nothing left for the floor.
+    cell as well as those before it. A cell that no such place holds is passed over, as is one out
+    of reach. Of the places that are left the window takes the one nearest to where it stood, so it
+    stays where nothing is demanded. It always fires as a whole: nothing is left for the floor.
     """
 
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
