@@ -33,6 +33,7 @@ _STUDIES = (
     "sweep",
     "ablate",
     "order",
+    "firing",
     "faults",
     "crowding",
     "ncap",

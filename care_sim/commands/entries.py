@@ -66,6 +66,12 @@ COMMANDS = {
         "configurations per seed and those of --also, or with --source the first-sighting "
         "protocol, and list what the paper says order by order.",
     ),
+    "firing": CommandEntry(
+        "firing",
+        "Firing",
+        "Play the dense street under every hardware, or with --source the first-sighting protocol, "
+        "and tell what a policy that knows its hardware has over one whose demand is projected.",
+    ),
     "faults": CommandEntry(
         "faults",
         "Faults",

@@ -31,6 +31,7 @@ from care_sim.reports.figures.r157 import R157_FIGURE, r157_figures
 from care_sim.reports.figures.validate import VALIDATION_FIGURE, validation_figures
 from care_sim.reports.mechanism.tables import mechanism_closing, mechanism_tables
 from care_sim.reports.protocol import ablations as open_ablations
+from care_sim.reports.protocol import firing as open_firing
 from care_sim.reports.protocol import order as open_order
 from care_sim.reports.protocol.closing import protocol_closing
 from care_sim.reports.protocol.tables import protocol_tables
@@ -38,6 +39,7 @@ from care_sim.reports.table import Table
 from care_sim.reports.tables.ablations import ablation_tables
 from care_sim.reports.tables.crowding import crowding_tables
 from care_sim.reports.tables.faults import fault_tables
+from care_sim.reports.tables.firing import firing_tables
 from care_sim.reports.tables.ncap import ncap_tables
 from care_sim.reports.tables.order import order_closing, order_tables
 from care_sim.reports.tables.paper_statements import statements
@@ -197,6 +199,14 @@ _ALL = (
         columns=_ORDER_COLUMNS,
     ),
     Study(
+        "firing",
+        "Hardware in the closed loop",
+        firing_tables,
+        _no_figures,
+        _sweep_closing,
+        (),
+    ),
+    Study(
         "validate",
         "Validation of a world",
         validation_tables,
@@ -215,6 +225,16 @@ _ALL = (
         PROTOCOL_CAPTION,
         PLAYS,
         _ORDER_COLUMNS,
+    ),
+    Study(
+        "firing-open-loop",
+        "Hardware in the open loop",
+        open_firing.firing_tables,
+        _no_figures,
+        protocol_closing,
+        (),
+        PROTOCOL_CAPTION,
+        PLAYS,
     ),
     Study(
         "ablate-open-loop",

@@ -105,6 +105,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, names, capsys, tmp_pat
         ["faults"],
         ["crowding"],
         ["order"],
+        ["firing"],
     ],
     ids=lambda command: command[0],
 )

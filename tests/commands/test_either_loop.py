@@ -10,6 +10,7 @@ from care_sim.commands.ablate import Ablate
 from care_sim.commands.order import Order
 from care_sim.reports.report import read_results
 from care_sim.study.designs.ablations import OPEN_ABLATIONS
+from care_sim.study.designs.firing import FIRINGS
 from care_sim.study.designs.order import ORDERS
 
 
@@ -39,6 +40,8 @@ def written(folder):
         ("order --source streets --also random", "--also has no meaning with --source"),
         ("order --source streets --policies", "--policies needs at least one value"),
         ("order --source moon", "unknown source 'moon'"),
+        ("firing --budgets 0.1", "--budgets has no meaning without --source"),
+        ("firing --source streets --also random", "--also has no meaning with --source"),
         ("ablate --split val", "--split has no meaning without --source"),
         ("ablate --source streets --seeds 3", "--seeds has no meaning with --source"),
         ("ablate --source streets --budgets", "--budgets needs at least one value"),
@@ -76,6 +79,22 @@ def test_the_orders_of_a_log_are_played_and_reported_again(logs, tmp_path, capsy
     assert f"{len(rows)} of {len(rows)} plays found" in capsys.readouterr().err
     for name in before:
         (out / name).unlink()
+    assert run("report", out) == 0
+    assert written(out) == before
+
+
+def test_the_hardware_of_a_log_is_played_and_reported_again(logs, tmp_path, capsys):
+    out = tmp_path / "out"
+    asked = ("firing", "--source", logs, "--policies", "care", "care-units", "full")
+    asked = (*asked, "--budgets", 0.1, "--workers", 1, "--out", out)
+    assert run(*asked) == 0
+    rows, study, _ = read_results(out)
+    assert study.name == "firing-open-loop"
+    assert len(rows) == len(FIRINGS) * 2 + 1
+    # Free cells are the default, and the default has nothing in the column.
+    assert {row["firing"] for row in rows if row["policy"] == "care"} == {None, *FIRINGS[1:]}
+    before = written(out)
+    (out / "tables.md").unlink()
     assert run("report", out) == 0
     assert written(out) == before
 

@@ -10,7 +10,16 @@ from care_sim.base.errors import InvalidInput
 from care_sim.commands.shared.run_study import run_study
 from care_sim.reports.report import StudyReport, print_report, write_report
 from care_sim.reports.studies import STUDIES, study_of
-from care_sim.study.designs import ablations, crowding, faults, ncap, order, paper, validate
+from care_sim.study.designs import (
+    ablations,
+    crowding,
+    faults,
+    firing,
+    ncap,
+    order,
+    paper,
+    validate,
+)
 from care_sim.study.episode_config import grid
 from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import with_added_columns
@@ -36,8 +45,8 @@ def test_an_unknown_study_is_one_clear_line(tmp_path):
     with pytest.raises(
         InvalidInput,
         match=r"unknown study in .* 'gardening'; "
-        "known: ablate, ablate-open-loop, crowding, faults, mechanism, ncap, order, "
-        "order-open-loop, paper, protocol, r157, sweep, validate",
+        "known: ablate, ablate-open-loop, crowding, faults, firing, firing-open-loop, mechanism, "
+        "ncap, order, order-open-loop, paper, protocol, r157, sweep, validate",
     ):
         study_of(tmp_path / "episodes.parquet")
 
@@ -54,6 +63,7 @@ EPISODES = {
         row(config, 9.0) for config in ncap.ncap_study([0, 1], ["care", "full"], ["CPNCO-50"])
     ],
     "order": [row(config, 9.0) for config in order.order_study([0]) if config.scenario == "dense"],
+    "firing": [row(config, 9.0) for config in firing.firing_study([0])],
 }
 
 
@@ -106,6 +116,7 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
         "ablate": ablations.ablation_study(range(2)),
         "faults": faults.fault_study(range(2)),
         "order": order.order_study(range(2)),
+        "firing": firing.firing_study(range(2)),
         "crowding": crowding.crowding_study(range(2)),
         "ncap": ncap.ncap_study(range(2), ["care", "fan", "full"], ["CPNA-25", "CCRs"]),
         "paper": paper.paper_study(range(2)),
@@ -124,7 +135,13 @@ def test_a_file_changes_nothing_in_the_tables(tmp_path):
 
 def test_no_study_is_left_out_above():
     """Studies of the open loop have plays for episodes, and their own tests."""
-    plays = {"protocol", "mechanism", "order-open-loop", "ablate-open-loop"}
+    plays = {
+        "protocol",
+        "mechanism",
+        "order-open-loop",
+        "ablate-open-loop",
+        "firing-open-loop",
+    }
     assert {*EPISODES, *plays} == set(STUDIES)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from care_sim.base import package_files
 from care_sim.base.errors import InvalidInput
-from care_sim.core.driver_settings import DRIVER_SETTINGS
+from care_sim.core.conditions import COLUMNS_WHERE_CHANGED
 from care_sim.study import provenance
 from care_sim.study.episode_config import (
     ENVIRONMENT_IDS,
@@ -57,11 +57,12 @@ def test_bad_input_names_the_thing_and_what_is_allowed(change, names):
     assert "\n" not in str(error.value)
 
 
-def test_settings_of_the_driver_are_columns_only_where_they_are_not_the_default():
+def test_driver_and_hardware_are_columns_only_where_they_are_not_the_default():
     """So that rows and digests of before there was a choice stay as they were."""
-    assert not {*DRIVER_SETTINGS} & {*GOOD.row()}
-    other = replace(GOOD, driver="careful-human", comfort_mps2=2.0)
-    added = {"driver": "careful-human", "comfort_mps2": 2.0}
+    assert not {*COLUMNS_WHERE_CHANGED} & {*GOOD.row()}
+    assert replace(GOOD, firing="cells") == GOOD
+    other = replace(GOOD, driver="careful-human", comfort_mps2=2.0, firing="tiles")
+    added = {"driver": "careful-human", "comfort_mps2": 2.0, "firing": "tiles:4x8"}
     assert other.row() == GOOD.row() | added
     assert other.digest() != GOOD.digest()
 
@@ -158,7 +159,7 @@ def test_the_digest_of_a_policy_without_source_holds_for_one_run_and_its_workers
 
 def test_the_row_is_flat_and_the_label_names_what_is_unusual():
     config = replace(GOOD, camera_latency=2, scenario_parameters=(("vehicles", 7),))
-    assert set(config.row()) == {*PLAIN_FIELDS, "scenario.vehicles"} - {*DRIVER_SETTINGS}
+    assert set(config.row()) == {*PLAIN_FIELDS, "scenario.vehicles"} - {*COLUMNS_WHERE_CHANGED}
     assert config.label == "dense care 0.1 seed 0 camera_latency=2 scenario.vehicles=7"
 
 

@@ -149,6 +149,7 @@ LONG = (
     "reproduce",
     "ablate",
     "order",
+    "firing",
     "faults",
     "crowding",
     "r157",
