@@ -119,6 +119,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `floor_seed` | allocator | which of the random floors that the seed holds |
     | `azimuth_margin`, `elevation_margin` | allocator | cells by which hulls are dilated |
     | `cell_order` | allocator | in which order the cells of a set are taken |
+    | `firing` | LiDAR | what fires as a whole, "cells", "tiles:4x8", ... (3) |
     | `engine` | sensors | what casts the rays, "fast" or "bullet" |
     | `min_returns` | LiDAR detector | fired rays that must hit an object |
     | `camera_confidence` | camera detector | least confidence of a detection |
@@ -135,7 +136,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_dropout` | LiDAR | share of the returns that are lost |
     | `lidar_dead_rows` | LiDAR | elevation rows that return nothing; row 0 is the highest |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
-    | `driver` | driver | who brakes, "fixed" or "careful-human" (3) |
+    | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |
     | `brake_mps2` | fixed driver | its deceleration, m/s^2 |
     | `brake_reaction_s` | fixed driver | from decision to full braking, s |
     | `brake_standstill_m` | fixed driver | gap at which it means to stand, m |
@@ -145,8 +146,9 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `brake_for_oncoming` | fixed driver | whether it foresees how near a track comes by itself |
     | `comfort_mps2` | driver | acceleration back to cruising speed, m/s^2 |
 
-    (3) `care_sim.driving.braking` and `care_sim.driving.careful_human`. Only `fixed` has the
-    settings that begin with `brake_`.
+    (3) `care_sim.core.firing`; B is then the cells of the units that the budget buys. (4)
+    `care_sim.driving.braking` and `care_sim.driving.careful_human`. Only `fixed` has the settings
+    that begin with `brake_`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 (Gymnasium's)
