@@ -39,7 +39,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     `Box(0, 1, (E, A), float32)`: a score for every cell of the angular grid. The `B` highest
     strictly positive scores fire, ties by ascending cell index. If there are fewer, the random
     floor that all policies share fills up (`floor=False` leaves the rest unspent). No action can
-    overspend.
+    overspend. Other hardware than free cells (`firing`) fires whole units for them, in that order.
 
     ### Observation
     A `Dict` of float32 arrays, padded to fixed shapes, that `care_sim.Belief.from_observation`
