@@ -28,7 +28,7 @@ class CareUnits(CareSightlines):
         hardware = self.rig.hardware
         cells = allocate(super().demand(belief), belief.budget, self.rig.reserve_fraction)
         counts = np.arange(len(cells), 0, -1)
-        worth = np.bincount(hardware.unit_of[cells], counts, hardware.units)
+        worth = np.bincount(hardware.unit_of[cells], counts, hardware.units).astype(np.float64)
 
         # Of a cell that was not fired an observation says 0.
         last = np.flatnonzero(belief.ranges.ravel() > 0)
