@@ -169,8 +169,9 @@ def _arc(cells: Integers, grid: GridSpacing) -> _Arc:
         upper, lower = min(upper, row), max(lower, row)
     begin, widest = first, columns - (last + 1 - first)
 
-    # A set that touches the seam from both sides begins where its widest gap ends.
-    if first == 0 and last == columns - 1:
+    # A set that touches the seam from both sides begins where its widest gap ends. A grid that does
+    # not go all round has no seam.
+    if first == 0 and last == columns - 1 and grid.turn == columns:
         occupied = np.zeros(columns, np.bool_)
         for cell in cells:
             occupied[_row_and_column(cell, columns)[1]] = True
@@ -190,13 +191,17 @@ def _core(arc: _Arc, grid: GridSpacing, margins: SetMargins) -> tuple[int, int, 
     # All round there is no margin. Else the middle column stays, or the two middle ones.
     side = 0 if arc.width >= grid.columns else min(margins.columns, (arc.width - 1) // 2)
 
-    # Rows that the margin would have beyond the grid were cut, and what is left of it is unknown:
-    # the outermost row counts as core. The middle stays here, too.
+    # What the margin would have beyond the grid was cut, and what is left of it is unknown: the
+    # outermost row counts as core, and so does the outermost column where the grid does not go all
+    # round. The middle stays here, too.
+    has_ends = grid.turn > grid.columns
+    right = 0 if has_ends and arc.first == 0 else side
+    left = 0 if has_ends and arc.first + arc.width == grid.columns else side
     height = arc.lower - arc.upper + 1
     inner = min(margins.rows, (height - 1) // 2)
     upper = arc.upper + (0 if arc.upper == 0 else inner)
     lower = arc.lower + 1 - (0 if arc.lower == grid.rows - 1 else inner)
-    return arc.width - side, side, upper, lower
+    return arc.width - left, right, upper, lower
 
 
 @compiled()

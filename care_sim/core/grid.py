@@ -2,9 +2,11 @@
 
 Frame: sensor frame, x forward, y left, z up; metres and radians. A cell's index is
 `row * columns + column`; row 0 is the highest elevation and column c covers the azimuths
-[-pi + c * width, -pi + (c + 1) * width).
+[right + c * width, right + (c + 1) * width). All round the car, which is the default, `right` is
+-pi.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from care_sim.base.bounds import bounded, check_fields
-from care_sim.base.errors import InvalidInput
+from care_sim.base.checks import check_number
+from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.cell_sets import CellSets
-from care_sim.core.grid_kernels import GridSpacing, rectangle_cells, silhouettes
+from care_sim.core.grid_kernels import GridSpacing, nearest_rows, rectangle_cells, silhouettes
 
 Cells = NDArray[np.int64]
 
@@ -23,16 +26,25 @@ AZIMUTH_MARGIN = 2
 """Dilation of hulls and wedges, in columns (paper, Remark 2)."""
 ELEVATION_MARGIN = 1
 """Dilation of hulls and wedges, in rows (paper, Remark 2)."""
+LEAST_VIEW = 0.01
+"""Radians, half a degree: the least horizontal field of view."""
+_LAST_BITS = 1e-6
+"""What rounding may add to the columns of a turn."""
 MOST_COLUMNS, MOST_ROWS = 2**14, 2**10
 """Bounds of a grid: a thousand times the cells of the paper's."""
 
 
 @dataclass(frozen=True)
 class AngularGrid:
-    """`columns` x `rows` firing cells of a rotating LiDAR.
+    """`columns` x `rows` firing cells of a LiDAR.
 
     The defaults are the grid of the paper (Remark 1): 512 columns, and the 32 rings of the
     nuScenes sensor from +10.67 to -30.67 degrees in equal steps. `range_m` is the reach of a ray.
+
+    The columns share a `field_of_view` (radians, horizontal) about the azimuth `heading`; their
+    width must divide a whole turn. Rows that are not equally spaced are `listed`: their elevations,
+    from the top, of which the first and the last are `top` and `bottom` (`of_elevations` makes such
+    a grid). Raises InvalidInput for a value out of its bounds.
     """
 
     columns: int = bounded(512, 1, MOST_COLUMNS)
@@ -40,6 +52,9 @@ class AngularGrid:
     top: float = bounded(float(np.deg2rad(10.67)), -np.pi / 2, np.pi / 2)
     bottom: float = bounded(float(np.deg2rad(-30.67)), -np.pi / 2, np.pi / 2)
     range_m: float = bounded(50.0, 1, 1_000_000)
+    field_of_view: float = bounded(2 * np.pi, LEAST_VIEW, 2 * np.pi)
+    heading: float = bounded(0.0, -np.pi, np.pi)
+    listed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self, " of the grid")
@@ -47,6 +62,48 @@ class AngularGrid:
             raise InvalidInput(
                 f"bottom of the grid must lie below its top, {self.top:g}, got {self.bottom:g}"
             )
+        turn = 2 * np.pi / self.column_width
+        if abs(turn - round(turn)) > _LAST_BITS:
+            raise InvalidInput(
+                f"columns of the grid must have a width that divides a whole turn, got "
+                f"{self.columns} in {np.rad2deg(self.field_of_view):g} degrees"
+            )
+        if self.listed != ():
+            self._check_listed()
+
+    @classmethod
+    def of_elevations(
+        cls,
+        elevations: Sequence[float],
+        columns: int = 512,
+        range_m: float = 50.0,
+        field_of_view: float = 2 * np.pi,
+        heading: float = 0.0,
+    ) -> "AngularGrid":
+        """A grid whose rows have these elevations (rows,), radians, from the top. Raises
+        InvalidInput unless they are two or more and descend.
+        """
+        listed = tuple(elevations)
+        if len(listed) < 2:
+            raise InvalidInput(f"elevations of the grid must be two or more, got {len(listed)}")
+        ends = listed[0], listed[-1]
+        return cls(columns, len(listed), *ends, range_m, field_of_view, heading, listed)
+
+    def _check_listed(self) -> None:
+        listed = self.listed
+        if not isinstance(listed, tuple | list) or len(listed) != self.rows:
+            raise InvalidInput(
+                f"listed of the grid must be the elevations of its {self.rows} rows, got "
+                f"{shown(listed)}"
+            )
+        for elevation in listed:
+            check_number("elevations of the grid", elevation, -np.pi / 2, np.pi / 2)
+        if not (np.diff(listed) < 0).all() or (listed[0], listed[-1]) != (self.top, self.bottom):
+            raise InvalidInput(
+                f"elevations of the grid must descend from its top, {self.top:g}, to its bottom, "
+                f"{self.bottom:g}"
+            )
+        object.__setattr__(self, "listed", tuple(map(float, listed)))
 
     @property
     def size(self) -> int:
@@ -61,11 +118,21 @@ class AngularGrid:
     @property
     def column_width(self) -> float:
         """Azimuth covered by a column, radians."""
-        return 2 * np.pi / self.columns
+        return self.field_of_view / self.columns
+
+    @property
+    def right(self) -> float:
+        """The azimuth at which column 0 begins, radians; the others follow to the left."""
+        return self.heading - self.field_of_view / 2
+
+    @property
+    def turn(self) -> int:
+        """How many columns of this width a whole turn has: all are the grid's if it has no gap."""
+        return round(2 * np.pi / self.column_width)
 
     @property
     def row_height(self) -> float:
-        """Elevation between two rows, radians."""
+        """Elevation between two rows, radians; the mean of it where rows are listed."""
         return (self.top - self.bottom) / (self.rows - 1)
 
     @cached_property
@@ -73,30 +140,42 @@ class AngularGrid:
         """The spacing of the grid, in the form that compiled code takes."""
         top = float(self.top)
         height = float(self.row_height)
-        return GridSpacing(self.columns, self.rows, self.column_width, top, height)
+        size = self.columns, self.rows
+        listed = np.array(self.listed, float)
+        return GridSpacing(*size, self.column_width, top, height, self.right, self.turn, listed)
 
     @cached_property
     def elevations(self) -> Floats:
         """(rows,) elevation of the rays of every row, radians, from the top."""
-        elevations = np.linspace(self.top, self.bottom, self.rows)
+        equal = np.linspace(self.top, self.bottom, self.rows)
+        elevations = np.array(self.listed) if self.listed else equal
         elevations.flags.writeable = False
         return elevations
 
     @cached_property
     def azimuths(self) -> Floats:
-        """(columns,) azimuth of the rays of every column, the middle of its sector, radians."""
-        middles = np.arange(self.columns, dtype=np.float64) + 0.5
-        azimuths = np.asarray(middles * self.column_width - np.pi)
+        """(columns,) azimuth of the rays of every column, radians, in [-pi, pi)."""
+        # A column is a sector, and its ray runs through the middle. A row is a ring: its elevation
+        # is that of the ray itself.
+        middles = self.right + (np.arange(self.columns) + 0.5) * self.column_width
+        azimuths = np.where(middles < np.pi, middles, middles - 2 * np.pi)
+        azimuths = np.where(azimuths < -np.pi, azimuths + 2 * np.pi, azimuths)
         azimuths.flags.writeable = False
         return azimuths
+
+    @cached_property
+    def from_ahead(self) -> Floats:
+        """(columns,) how many columns lie between the ray of each and straight ahead."""
+        middles = np.abs(np.arange(self.columns) + 0.5 + self.right / self.column_width)
+        away: Floats = np.minimum(middles, np.abs(self.turn - middles))
+        away.flags.writeable = False
+        return away
 
     @cached_property
     def fan(self) -> tuple[Floats, Floats]:
         """Cosine and sine of the azimuth of every column (columns, 2), and of the elevation of
         every row (rows, 2).
         """
-        # A column is a sector, and its ray runs through the middle. A row is a ring: its elevation
-        # is that of the ray itself.
         across, down = (
             np.stack([np.cos(angles), np.sin(angles)], axis=1)
             for angles in (self.azimuths, self.elevations)
@@ -117,7 +196,7 @@ class AngularGrid:
         return directions
 
     def cells_of(self, directions: ArrayLike) -> Cells:
-        """The cell each direction (n, 3) falls in; -1 above the top or below the bottom row.
+        """The cell each direction (n, 3) falls in; -1 beyond the rows or the field of view.
 
         Raises InvalidInput for a direction that holds NaN.
         """
@@ -127,10 +206,10 @@ class AngularGrid:
         if np.isnan(azimuth).any() or np.isnan(elevation).any():
             raise InvalidInput("directions must be numbers, none of them NaN")
         # The azimuth pi is -pi: it would fall in the column after the last, which is column 0.
-        column = np.floor((azimuth + np.pi) / self.column_width).astype(np.int64)
-        row = self._row(elevation)
-        inside = (row >= 0) & (row < self.rows)
-        return np.where(inside, row * self.columns + column % self.columns, -1)
+        column = np.floor((azimuth - self.right) / self.column_width).astype(np.int64) % self.turn
+        row = nearest_rows(elevation, self.spacing)
+        inside = (row >= 0) & (row < self.rows) & (column < self.columns)
+        return np.where(inside, row * self.columns + column, -1)
 
     def hulls(
         self,
@@ -151,7 +230,7 @@ class AngularGrid:
         planar, upright, around = silhouettes(boxes)
         azimuths = np.arctan2(planar[..., 1], planar[..., 0])
         elevations = np.arctan2(upright[..., 0], upright[..., 1])
-        margins = np.where(around, self.columns, azimuth_margin)
+        margins = np.where(around, self.turn, azimuth_margin)
         return self._rectangles(azimuths, elevations, margins, elevation_margin)
 
     def wedges(
@@ -172,10 +251,6 @@ class AngularGrid:
         elevations = np.arctan2(z, np.hypot(x, y))
         margins = np.full(len(bundles), azimuth_margin)
         return self._rectangles(azimuths, elevations, margins, elevation_margin)
-
-    def _row(self, elevation: Floats) -> Integers:
-        """The row whose ray is nearest to every elevation; on the grid or beyond it."""
-        return np.floor((self.top - elevation) / self.row_height + 0.5).astype(np.int64)
 
     def _rectangles(
         self, azimuths: Floats, elevations: Floats, margins: Integers, elevation_margin: int

@@ -13,7 +13,9 @@ from care_sim.core.arrays import Floats, Integers, Mask
 
 class GridSpacing(NamedTuple):
     """What of a grid tells the cell of a direction: its numbers of `columns` and `rows`, the
-    `column_width` and `row_height` in radians, and the elevation `top` of row 0.
+    `column_width` and `row_height` in radians, the elevation `top` of row 0, the azimuth `right` at
+    which column 0 begins, how many columns a whole `turn` would have, and the `elevations` (rows,)
+    of rows that are not equally spaced, else (0,).
     """
 
     columns: int
@@ -21,6 +23,39 @@ class GridSpacing(NamedTuple):
     column_width: float
     top: float
     row_height: float
+    right: float
+    turn: int
+    elevations: Floats
+
+
+@compiled()
+def row_at(elevation: float, grid: GridSpacing) -> float:
+    """Where an elevation lies among the rows: k at row k, in proportion between two rows, and on in
+    the steps of the outermost two beyond them.
+    """
+    listed = grid.elevations
+    if len(listed) == 0:
+        return (grid.top - elevation) / grid.row_height
+    # Bisection for the first row from 1 on that is not above it; the last row bounds the search.
+    low, high = 1, grid.rows - 1
+    while low < high:
+        middle = (low + high) // 2
+        if listed[middle] > elevation:
+            low = middle + 1
+        else:
+            high = middle
+    above, below = listed[low - 1], listed[low]
+    place: float = low - 1 + (above - elevation) / (above - below)
+    return place
+
+
+@compiled()
+def nearest_rows(elevations: Floats, grid: GridSpacing) -> Integers:
+    """(n,) the row whose ray is nearest to every elevation (n,); on the grid or beyond it."""
+    rows = np.empty(len(elevations), np.int64)
+    for n, elevation in enumerate(elevations):
+        rows[n] = math.floor(row_at(elevation, grid) + 0.5)
+    return rows
 
 
 @compiled()
@@ -85,19 +120,19 @@ def rectangle_cells(
     for n in range(len(azimuths)):
         first, stop = edges[n, 0], edges[n, 1] = _columns(azimuths[n], azimuth_margins[n], grid)
         upper, lower = edges[n, 2], edges[n, 3] = _rows(elevations[n], elevation_margin, grid)
-        sizes[n] = (stop - first) * (lower - upper)
+        sizes[n] = _width(first, stop, grid) * (lower - upper)
 
     # Each rectangle is written where the one before it ended.
     cells = np.empty(sizes.sum(), np.int64)
     place = 0
     for edge in edges:
-        place = _lay(cells, place, edge, grid.columns)
+        place = _lay(cells, place, edge, grid)
     return cells, sizes
 
 
 @compiled()
 def _columns(azimuths: Floats, margin: int, grid: GridSpacing) -> tuple[int, int]:
-    """First column, on the grid, and the one after the last, up to a turn beyond it."""
+    """First column, within a turn, and the one after the last, up to a turn beyond it."""
     # Offsets from the middle are within half a turn, so that the seam at -pi does not matter.
     middle = azimuths[0]
     right, left = math.inf, -math.inf
@@ -105,35 +140,43 @@ def _columns(azimuths: Floats, margin: int, grid: GridSpacing) -> tuple[int, int
         offset = (azimuth - middle + math.pi) % (2 * math.pi) - math.pi
         right, left = min(right, offset), max(left, offset)
 
-    # Column c covers [-pi + c * width, -pi + (c + 1) * width), so both ends round down. With its
-    # margin a rectangle may be wider than a turn; no column counts twice.
-    first = math.floor((middle + right + math.pi) / grid.column_width) - margin
-    last = math.floor((middle + left + math.pi) / grid.column_width) + margin
-    start = first % grid.columns
-    return start, start + max(0, min(last - first + 1, grid.columns))
+    # Column c begins at grid.right + c * width and reaches to the next, so both ends round down.
+    # With its margin a rectangle may be wider than a turn; no column counts twice.
+    first = math.floor((middle + right - grid.right) / grid.column_width) - margin
+    last = math.floor((middle + left - grid.right) / grid.column_width) + margin
+    start = first % grid.turn
+    return start, start + max(0, min(last - first + 1, grid.turn))
+
+
+@compiled()
+def _width(first: int, stop: int, grid: GridSpacing) -> int:
+    """How many of these columns of a turn the grid has."""
+    before, beyond = min(stop, grid.columns) - first, min(stop - grid.turn, grid.columns)
+    return max(0, before) + max(0, beyond)
 
 
 @compiled()
 def _rows(elevations: Floats, margin: int, grid: GridSpacing) -> tuple[int, int]:
     """First row and the one after the last; equal where the rectangle misses the grid."""
     # A row reaches half a step above and below its ray, hence the 0.5.
-    upper = math.floor((grid.top - elevations.max()) / grid.row_height + 0.5) - margin
-    lower = math.floor((grid.top - elevations.min()) / grid.row_height + 0.5) + margin
+    upper = math.floor(row_at(elevations.max(), grid) + 0.5) - margin
+    lower = math.floor(row_at(elevations.min(), grid) + 0.5) + margin
     first = min(max(upper, 0), grid.rows)
     return first, max(first, min(lower + 1, grid.rows))
 
 
 @compiled()
-def _lay(cells: Integers, place: int, edges: Integers, columns: int) -> int:
+def _lay(cells: Integers, place: int, edges: Integers, grid: GridSpacing) -> int:
     """Write the cells of a rectangle from `place` on; the place after them.
 
     In every row those beyond the seam come first: their columns, and so their indices, are lower.
     """
     first, stop, upper, lower = edges
+    columns = grid.columns
     for row in range(upper, lower):
-        # What reaches beyond the last column goes on at column 0.
-        for column in range(columns, stop):
-            cells[place] = row * columns + column - columns
+        # What reaches beyond a turn goes on at column 0.
+        for column in range(min(stop - grid.turn, columns)):
+            cells[place] = row * columns + column
             place += 1
         for column in range(first, min(stop, columns)):
             cells[place] = row * columns + column

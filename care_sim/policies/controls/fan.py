@@ -29,7 +29,7 @@ class Fan(Policy):
         grid = rig.grid
         elevations = grid.elevations
         is_low = (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
-        ahead = np.argsort(np.abs(np.arange(grid.columns) + 0.5 - grid.columns / 2), kind="stable")
+        ahead = np.argsort(grid.from_ahead, kind="stable")
         parts = [np.flatnonzero(rows) * grid.columns + ahead[:, None] for rows in (is_low, ~is_low)]
         self._pattern = np.concatenate([part.ravel() for part in parts])
 

@@ -183,11 +183,15 @@ def _check_contents(entries: list[ZipInfo]) -> None:
 
 
 def _grid(plain: dict[str, Any]) -> AngularGrid:
-    if set(plain) != {column.name for column in fields(AngularGrid)} or not all(
-        map(is_number, plain.values())
+    # Cards of earlier versions are of grids that go all round in equal steps, and say no more.
+    numbers = {"field_of_view": 2 * np.pi, "heading": 0.0} | plain
+    listed = numbers.pop("listed", [])
+    names = {column.name for column in fields(AngularGrid)} - {"listed"}
+    if set(numbers) != names or not (
+        isinstance(listed, list) and all(map(is_number, [*numbers.values(), *listed]))
     ):
         raise ValueError(f"its card says grid {plain!r}")
-    return AngularGrid(**plain)
+    return AngularGrid(**numbers, listed=tuple(listed))
 
 
 def _wrapping(stored: dict[str, Any] | str | None) -> Wrapping | None:
@@ -210,5 +214,7 @@ def _told(name: str, value: Any, rig: Rig) -> str:
     if name == "budget":
         return f"{value} cells ({value / rig.grid.size:.4g})"
     if isinstance(value, AngularGrid):
-        return " ".join(f"{key} {number:.6g}" for key, number in asdict(value).items())
+        told = asdict(value)
+        rows = ", rows listed" if told.pop("listed") else ""
+        return " ".join(f"{key} {number:.6g}" for key, number in told.items()) + rows
     return repr(value)

@@ -10,6 +10,7 @@ from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Mask
 from care_sim.core.belief import Belief
 from care_sim.core.grid import Cells
+from care_sim.core.grid_kernels import GridSpacing
 from care_sim.core.rig import Rig
 from care_sim.policies.own.sector import columns_ahead
 
@@ -44,6 +45,7 @@ class SightLines:
     def __init__(self, rig: Rig, row: int):
         self._row = row
         self._keyframe_s = rig.keyframe_s
+        self._spacing = rig.grid.spacing
         self._azimuths = rig.grid.azimuths
         self._sector = columns_ahead(rig.grid)
         # Of a line without a return a scan says the reach in float32, which can be less than it.
@@ -51,7 +53,7 @@ class SightLines:
         # On a grid of shorter reach, a line without a return is open all the same.
         self._open_m = min(OPEN_M, self._reach / 2)
         self.ranges = np.full(rig.grid.columns, self._reach)
-        self._watched = _open_or_edge(self.ranges, self._open_m)
+        self._watched = _open_or_edge(self.ranges, self._open_m, self._spacing)
 
     def update(self, belief: Belief) -> None:
         """Take in the last scan, and move what is remembered by what the car has driven since."""
@@ -59,8 +61,9 @@ class SightLines:
         np.copyto(self.ranges, seen, where=seen > 0)
         driven = belief.ego.speed * self._keyframe_s
         turned = belief.ego.yaw_rate * self._keyframe_s
-        self.ranges = _moved(self.ranges, self._azimuths, driven, turned, self._reach)
-        self._watched = _open_or_edge(self.ranges, self._open_m)
+        way = driven, turned
+        self.ranges = _moved(self.ranges, self._azimuths, way, self._reach, self._spacing)
+        self._watched = _open_or_edge(self.ranges, self._open_m, self._spacing)
 
     def ahead(self) -> Cells:
         """What is worth a look in the sector ahead, the nearest to straight ahead first."""
@@ -76,12 +79,14 @@ class SightLines:
 
 
 @compiled()
-def _moved(ranges: Floats, azimuths: Floats, driven: float, turned: float, reach: float) -> Floats:
-    """The `ranges` (A,) of things that stand still, after the car has `driven` metres ahead and
-    `turned` radians to the left; `reach` where nothing is left of them.
+def _moved(
+    ranges: Floats, azimuths: Floats, way: tuple[float, float], reach: float, grid: GridSpacing
+) -> Floats:
+    """The `ranges` (A,) of things that stand still, after the car has gone a `way`: driven metres
+    ahead, turned radians to the left; `reach` where nothing is left of them.
     """
+    driven, turned = way
     columns = len(ranges)
-    column_width = 2 * np.pi / columns
     moved = np.full(columns, reach)
     for column in range(columns):
         before = ranges[column]
@@ -89,7 +94,7 @@ def _moved(ranges: Floats, azimuths: Floats, driven: float, turned: float, reach
             x = before * math.cos(azimuths[column]) - driven
             y = before * math.sin(azimuths[column])
             now = max(math.hypot(x, y), _NEAREST_M)
-            middle = math.floor((math.atan2(y, x) - turned + np.pi) / column_width)
+            middle = math.floor((math.atan2(y, x) - turned - grid.right) / grid.column_width)
 
             # From nearer, a surface covers more than the one column in which it was met. It is
             # rounded up, so that no gap opens in a wall: what comes nearer grows by a column on
@@ -97,19 +102,22 @@ def _moved(ranges: Floats, azimuths: Floats, driven: float, turned: float, reach
             # Of two that come to lie behind each other the nearer one is seen.
             half = math.ceil((before / now - 1) / 2 - _LAST_BITS)
             for covered in range(middle - half, middle + half + 1):
-                place = covered % columns
-                moved[place] = min(moved[place], now)
+                place = covered % grid.turn
+                if place < columns:
+                    moved[place] = min(moved[place], now)
     return moved
 
 
 @compiled()
-def _open_or_edge(ranges: Floats, open_m: float) -> Mask:
+def _open_or_edge(ranges: Floats, open_m: float, grid: GridSpacing) -> Mask:
     """(A,) which columns are open, or within `EDGE_COLUMNS` of an edge."""
     columns = len(ranges)
     watched = ranges >= open_m
     for column in range(columns):
         # The edge lies between this column and the next.
-        if abs(ranges[column] - ranges[(column + 1) % columns]) > EDGE_M:
+        after = (column + 1) % grid.turn
+        if after < columns and abs(ranges[column] - ranges[after]) > EDGE_M:
             for near in range(column - EDGE_COLUMNS + 1, column + EDGE_COLUMNS + 1):
-                watched[near % columns] = True
+                if near % grid.turn < columns:
+                    watched[near % grid.turn] = True
     return watched

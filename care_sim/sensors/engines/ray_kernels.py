@@ -60,7 +60,7 @@ def cast_rays(
     cells: Cells,
     reach: float,
     fan: tuple[Floats, Floats],
-    spacing: tuple[int, int, float, float, float],
+    spacing: tuple[int, int, float, float, float, float, int, Floats],
     sensor: Floats,
     parts: tuple[Integers, Floats, Floats, Integers],
     poses: Floats,
@@ -79,7 +79,8 @@ def cast_rays(
     solids = Parts(*parts)
     x, y, z, yaw, roll, pitch = sensor
     pose = SensorPose(x, y, z, yaw, roll, pitch)
-    placed = place_parts(pose, solids, poses, GridSpacing(*spacing))
+    grid = GridSpacing(*spacing)
+    placed = place_parts(pose, solids, poses, grid)
 
     # The road first, then part after part: what is nearer takes the ray. So no list of hits is
     # sorted, and the order of parts matters only where two are equally far.
@@ -90,13 +91,13 @@ def cast_rays(
     for part, (first, last, upper, lower) in enumerate(placed.windows):
         solid = _solid(part, solids, placed.centres, placed.axes)
         for row in range(upper, lower + 1):
-            # The fired cells of this row that lie in the window. A window that runs over the seam
-            # has two stretches of columns: from the row's begin, and from its first column on.
+            # The fired cells of this row that lie in the window. A window that runs over a turn has
+            # two stretches of columns: from the row's begin, and from its first column on.
             begin = row * columns
             low = starts[row]
             high = starts[row + 1]
             ahead = _first_from(cells, begin + first, low, high)
-            for place, end in ((low, begin + last - columns), (ahead, begin + last)):
+            for place, end in ((low, begin + last - grid.turn), (ahead, begin + last)):
                 while place < high and cells[place] <= end:
                     distance = _entry(solid, _ray(rays, row, cells[place] - begin))
                     if distance < ranges[place] and distance <= reach:

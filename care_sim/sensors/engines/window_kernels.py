@@ -11,7 +11,7 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.grid_kernels import GridSpacing
+from care_sim.core.grid_kernels import GridSpacing, row_at
 from care_sim.sensors.engines.geometry_kernels import Axes, body_axes, dot
 
 WINDOW_MARGIN = 1
@@ -46,8 +46,8 @@ class PlacedParts(NamedTuple):
     part's axis i; `windows` (k, 4), the first and last column and the first and last row of the
     angular rectangle of the box that holds each part.
 
-    The first column lies on the grid, the last up to a turn beyond it. The first row lies below the
-    last where a part covers none. `up` (3,) is the world's up.
+    The first column lies within a turn, the last up to a turn beyond it. The first row lies below
+    the last where a part covers none. `up` (3,) is the world's up.
     """
 
     centres: Floats
@@ -161,11 +161,11 @@ def _angle_order(along: float, across: float) -> float:
 
 @compiled()
 def _columns(right: float, left: float, grid: GridSpacing) -> tuple[int, int]:
-    """First column, on the grid, and last, up to a turn beyond it, between two azimuths."""
+    """First column, within a turn, and last, up to a turn beyond it, between two azimuths."""
     # The columns that the two azimuths lie in. Some of their rays may pass by, none is left out.
-    first = math.floor((right + math.pi) / grid.column_width) - WINDOW_MARGIN
-    last = math.floor((left + math.pi) / grid.column_width) + WINDOW_MARGIN
-    return first % grid.columns, first % grid.columns + min(last - first, grid.columns - 1)
+    first = math.floor((right - grid.right) / grid.column_width) - WINDOW_MARGIN
+    last = math.floor((left - grid.right) / grid.column_width) + WINDOW_MARGIN
+    return first % grid.turn, first % grid.turn + min(last - first, grid.turn - 1)
 
 
 @compiled()
@@ -183,8 +183,8 @@ def _rows(corners: Floats, surrounds: bool, grid: GridSpacing) -> tuple[int, int
     # A top above the sensor appears highest where it is nearest, one below it where it is farthest;
     # a bottom the other way round. Row i holds one elevation, that of its rays, so only the rows
     # between the two count.
-    upper = (grid.top - math.atan2(highest, near if highest > 0.0 else far)) / grid.row_height
-    lower = (grid.top - math.atan2(lowest, near if lowest < 0.0 else far)) / grid.row_height
+    upper = row_at(math.atan2(highest, near if highest > 0.0 else far), grid)
+    lower = row_at(math.atan2(lowest, near if lowest < 0.0 else far), grid)
     first = max(0, math.ceil(upper) - WINDOW_MARGIN)
     return first, min(grid.rows - 1, math.floor(lower) + WINDOW_MARGIN)
 

@@ -301,3 +301,19 @@ def test_arrays_are_taken_by_name_and_shape(saved):
         weights.array("weight", None, 4)
     with pytest.raises(InvalidInput, match="no array 'gain'; it has weight, bias"):
         weights.array("gain")
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        AngularGrid(columns=120, field_of_view=np.deg2rad(120.0), heading=0.5),
+        AngularGrid.of_elevations([0.1, 0.05, -0.3]),
+    ],
+)
+def test_a_card_tells_of_any_grid(tmp_path, grid):
+    save_weights(tmp_path / "w.npz", {}, Card("ppo", grid))
+    weights = load_weights(tmp_path / "w.npz")
+    assert weights.card.grid == grid
+    weights.check("ppo", Rig(grid))
+    with pytest.raises(InvalidInput, match=r"grid is .*, needed is "):
+        weights.check("ppo", Rig())

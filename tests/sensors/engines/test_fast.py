@@ -186,3 +186,28 @@ def test_cells_that_the_grid_does_not_have_are_refused(bullet, cells):
         Fast(bullet, AngularGrid(columns=180, rows=24)).cast(
             Frame(0.0, 0.0, 1.84, 0.0), np.array(cells)
         )
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        AngularGrid(60, 24, field_of_view=np.deg2rad(120.0)),
+        AngularGrid(150, 24, field_of_view=np.deg2rad(300.0), heading=2.5),
+        AngularGrid.of_elevations(np.deg2rad([12.0, 3.0, 1.0, 0.5, -1.0, -2.5, -8.0, -25.0]), 180),
+    ],
+    ids=["forward", "wide and turned", "listed rows"],
+)
+@pytest.mark.parametrize("sensor", [SENSOR, Frame(1.0, -0.5, 2.2, 2.8, 0.05, -0.1)])
+def test_any_grid_is_answered_as_bullet_does(grid, sensor):
+    """Bodies all round, some across the edges of the field of view, one around the sensor."""
+    frames = [Frame(8 * np.cos(a), 8 * np.sin(a), 0.0, 2 * a) for a in np.arange(0.0, 6.2, 0.4)]
+    with closing(BulletWorld()) as world:
+        for n, frame in enumerate(frames):
+            world.add(KINDS[("car", "pedestrian", "pole", "van")[n % 4]], frame)
+        world.add(KINDS["terrace"], Frame(-20.0, -30.0, 0.0, 0.5))
+        ranges, ids = cast(world, sensor, grid)
+        expected, theirs = ENGINES["bullet"](world, grid).cast(sensor, rays(grid))
+    same = ids == theirs
+    assert same.mean() > 0.995
+    assert ranges[same] == pytest.approx(expected[same], abs=0.01)
+    assert len(set(ids.tolist())) > 5
