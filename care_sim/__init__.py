@@ -16,6 +16,7 @@ from care_sim.core.allocation import allocate
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES, Demand, Detections, ImageDetections, Tracks
 from care_sim.envs import register_all
 from care_sim.policies import make_policy, policy_names
@@ -34,6 +35,7 @@ __all__ = [
     "Policy",
     "PrivilegedPolicy",
     "Rig",
+    "SensorSetup",
     "Tracks",
     "allocate",
     "make_policy",

@@ -127,6 +127,11 @@ COMMANDS = {
         "Detectors",
         "List the detectors.",
     ),
+    "sensors": CommandEntry(
+        "listings",
+        "Sensors",
+        "List the sensor set-ups.",
+    ),
     "scenarios": CommandEntry(
         "listings",
         "Scenarios",

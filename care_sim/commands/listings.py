@@ -1,4 +1,4 @@
-"""`care-sim policies`, `care-sim detectors` and `care-sim scenarios`: what can be named."""
+"""`care-sim policies`, `detectors`, `sensors` and `scenarios`: what can be named."""
 
 import inspect
 from dataclasses import Field, dataclass, fields
@@ -12,6 +12,7 @@ from care_sim.scenarios.crossing import OCCLUDERS
 from care_sim.scenarios.mirroring import MIRRORED
 from care_sim.scenarios.ncap.table import TESTS
 from care_sim.scenarios.r157.grid import KINDS, SIDES
+from care_sim.sensors.setups import setup_lines
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,16 @@ class Detectors:
     def __call__(self) -> int:
         """Run it."""
         print(*detector_lines(), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """List the sensor set-ups."""
+
+    def __call__(self) -> int:
+        """Run it."""
+        print(*setup_lines(), sep="\n")
         return 0
 
 

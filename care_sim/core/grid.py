@@ -68,8 +68,7 @@ class AngularGrid:
                 f"columns of the grid must have a width that divides a whole turn, got "
                 f"{self.columns} in {np.rad2deg(self.field_of_view):g} degrees"
             )
-        if self.listed != ():
-            self._check_listed()
+        self._settle_listed()
 
     @classmethod
     def of_elevations(
@@ -89,16 +88,18 @@ class AngularGrid:
         ends = listed[0], listed[-1]
         return cls(columns, len(listed), *ends, range_m, field_of_view, heading, listed)
 
-    def _check_listed(self) -> None:
+    def _settle_listed(self) -> None:
+        """Check the listed elevations, and make them a tuple of plain numbers."""
         listed = self.listed
-        if not isinstance(listed, tuple | list) or len(listed) != self.rows:
+        if not isinstance(listed, tuple | list) or len(listed) not in (0, self.rows):
             raise InvalidInput(
                 f"listed of the grid must be the elevations of its {self.rows} rows, got "
                 f"{shown(listed)}"
             )
         for elevation in listed:
             check_number("elevations of the grid", elevation, -np.pi / 2, np.pi / 2)
-        if not (np.diff(listed) < 0).all() or (listed[0], listed[-1]) != (self.top, self.bottom):
+        ends = self.top, self.bottom
+        if listed and not ((np.diff(listed) < 0).all() and (listed[0], listed[-1]) == ends):
             raise InvalidInput(
                 f"elevations of the grid must descend from its top, {self.top:g}, to its bottom, "
                 f"{self.bottom:g}"

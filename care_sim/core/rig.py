@@ -27,8 +27,13 @@ from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.types import Demand
 
+LIDAR_X_M = -0.445
+"""Of the LiDAR before the car's middle: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a
+Renault Zoe."""
 LIDAR_HEIGHT_M = 1.84
 """Of the LiDAR above the road: LIDAR_TOP of nuScenes."""
+MOST_SHIFT_M = 20.0
+"""A LiDAR lies within this of the middle of its car."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +42,10 @@ class Rig:
 
     `budget` is B in cells and `reserve_fraction` rho of Algorithm 1; `keyframe_s` is the time
     between two decisions. Hulls and wedges are dilated by `azimuth_margin` columns and
-    `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road. The sets that a
-    policy demands are listed in a `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before
-    cells are chosen. `firing` names the hardware that fires them (`care_sim.core.firing`). Raises
+    `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road, `sensor_x_m` before
+    and `sensor_y_m` left of the car's middle. The sets that a policy demands are listed in a
+    `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before cells are chosen. `firing` names
+    the hardware that fires them (`care_sim.core.firing`). Raises
     InvalidInput for a value out of its bounds.
     """
 
@@ -53,6 +59,8 @@ class Rig:
     sensor_height_m: float = bounded(LIDAR_HEIGHT_M, 0, 100)
     cell_order: str = AS_DEMANDED
     firing: str = CELLS
+    sensor_x_m: float = bounded(LIDAR_X_M, -MOST_SHIFT_M, MOST_SHIFT_M)
+    sensor_y_m: float = bounded(0.0, -MOST_SHIFT_M, MOST_SHIFT_M)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -68,6 +76,13 @@ class Rig:
             raise InvalidInput(f"cameras must be a tuple of PinholeCamera, got {shown(cameras)}")
         # A list could change later, unlike what has been computed from it and kept.
         object.__setattr__(self, "cameras", tuple(cameras))
+
+    @property
+    def sensor_position(self) -> tuple[float, float, float]:
+        """The LiDAR's x, y and z in the frame of the car, whose origin lies on the road below its
+        middle; metres.
+        """
+        return self.sensor_x_m, self.sensor_y_m, self.sensor_height_m
 
     def read(self, observation: Observation) -> Belief:
         """The belief of an observation. Raises InvalidInput for one of another grid or other

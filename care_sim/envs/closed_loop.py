@@ -24,7 +24,7 @@ from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.engines import check_engine
-from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.viewer.pictures.keyframe import draw_keyframe
 from care_sim.world.world import WORLD_STEP_S, whole_steps
 
@@ -96,6 +96,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | argument | default | meaning |
     |---|---|---|
     | `budget` | 0.10 | beta, the share of the cells that may fire, in (0, 1] |
+    | `sensor` | "hdl-32e" | LiDAR and cameras, see below |
     | `detector` | "returns" | by name (`care_sim.perception.detectors.detector_names`) |
     | `detector_parameters` | None | a mapping of the detector's own parameters |
     | `keyframe_s` | 0.1 | seconds between two decisions, at most 1 |
@@ -103,6 +104,10 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `render_mode` | None | None or "rgb_array" |
     | `secret` | False | a text that enters everything that a seed draws, see below |
     | `scoring_info` | True | whether `info` holds what is for scoring alone |
+
+    A `sensor` is the name of a set-up (`care_sim.sensors.setups.setup_names`), the path of a TOML
+    file of one, or a `care_sim.SensorSetup`. It says the grid, where the LiDAR stands, and the
+    cameras, if it has its own.
 
     A `secret` is a text that enters everything that a seed draws
     (`care_sim.base.random_streams`). An agent that holds this package can then not look its
@@ -160,6 +165,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         self,
         *,
         budget: float = 0.10,
+        sensor: Sensor = DEFAULT_SETUP,
         detector: str = PROXY,
         detector_parameters: Mapping[str, object] | None = None,
         keyframe_s: float = 0.1,
@@ -180,16 +186,18 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         check_engine(conditions.engine)
         check_driver(conditions)
         self.scenario = make_scenario(self.scenario_name, **physics)
+        setup = sensor_setup(sensor)
         super().__init__(
             conditions,
-            cameras=self.scenario.cameras,
-            sensor_height_m=LIDAR_POSITION[2],
+            grid=setup.grid,
+            cameras=setup.equipped(self.scenario.cameras),
+            position=setup.position,
             budget=budget,
             keyframe_s=keyframe_s,
             secret=secret,
             scoring_info=scoring_info,
         )
-        made = detector_of(detector, detector_parameters, conditions, LIDAR_POSITION[2])
+        made = detector_of(detector, detector_parameters, conditions, self.rig)
         # The proxy asks whose return each is, which the loop knows without a cloud.
         self._detector = None if detector == PROXY else made
         self.metadata = {**self.metadata, "render_fps": round(1 / keyframe_s)}

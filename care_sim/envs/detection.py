@@ -4,15 +4,16 @@ from collections.abc import Mapping
 
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.conditions import MIN_RETURNS, Conditions
+from care_sim.core.rig import Rig
 from care_sim.perception.base import Detector
-from care_sim.perception.detectors import PROXY, check_detector, make_detector
+from care_sim.perception.detectors import CLUSTER, PROXY, check_detector, make_detector
 
 
 def detector_of(
     name: str,
     parameters: Mapping[str, object] | None,
     conditions: Conditions,
-    sensor_height_m: float,
+    rig: Rig,
 ) -> Detector:
     """The detector `name` with its own `parameters`.
 
@@ -26,5 +27,9 @@ def detector_of(
         raise InvalidInput(f"detector_parameters must map names to values, got {shown(parameters)}")
     if name == PROXY and "min_returns" in (parameters or {}):
         raise InvalidInput("min_returns is a condition, give it without detector_parameters")
-    own = {"min_returns": conditions.min_returns} if name == PROXY else {}
-    return make_detector(name, sensor_height_m, **own | dict(parameters or {}))
+    own: dict[str, object] = {}
+    if name == PROXY:
+        own = {"min_returns": conditions.min_returns}
+    elif name == CLUSTER:
+        own = {"grid": rig.grid}
+    return make_detector(name, rig.sensor_height_m, **own | dict(parameters or {}))

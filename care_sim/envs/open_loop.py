@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
+from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import Position
 from care_sim.core.types import Action
 from care_sim.envs.detection import detector_of
 from care_sim.envs.sensing import Observed, SensingEnv, arguments_of, split_conditions
@@ -76,8 +78,9 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
 
     def __init__(
         self,
+        grid: AngularGrid,
         cameras: tuple[PinholeCamera, ...],
-        sensor_height_m: float,
+        position: Position,
         keyframe_s: float,
         *,
         budget: float = 0.10,
@@ -93,16 +96,17 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         check_film_arguments(type(self), parameters)
         check_presence(presence)
         conditions, _ = split_conditions(self.conditions_kind, parameters)
-        self._detector = detector_of(detector, detector_parameters, conditions, sensor_height_m)
         super().__init__(
             conditions,
+            grid=grid,
             cameras=cameras,
-            sensor_height_m=sensor_height_m,
+            position=position,
             budget=budget,
             keyframe_s=keyframe_s,
             secret=secret,
             scoring_info=scoring_info,
         )
+        self._detector = detector_of(detector, detector_parameters, conditions, self.rig)
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}
         self.render_mode = render_mode
         self.presence = presence
@@ -176,7 +180,7 @@ class FilmEnv(OpenLoopEnv):
         if not isinstance(film, Film):
             raise InvalidInput(f"film must be a care_sim.loops.film.Film, got {shown(film)}")
         self.film = film
-        super().__init__(film.cameras, film.sensor_height_m, film.keyframe_s, **parameters)
+        super().__init__(film.grid, film.cameras, film.position, film.keyframe_s, **parameters)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -6,7 +6,7 @@ from typing import Any
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.envs.open_loop import FilmEnv, OpenLoopEnv, check_film_arguments
 from care_sim.envs.sensing import Observed
-from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.sources.recordings import film_of, recordings
 from care_sim.sources.street_films import street_film
@@ -19,13 +19,16 @@ class StreetEnv(OpenLoopEnv):
     The seed of `reset` draws the street (`care_sim.streets`) and everything else that is
     random. Seeds 0 to 149 are the evaluation's: train on others. `learned-scorer` and `place`
     learned from the calibration's, 1000 to 1019. With a `secret` all streets are others, and none
-    of them is in the published tables.
+    of them is in the published tables. `sensor` says LiDAR and cameras, as in the closed loop.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
 
-    def __init__(self, **parameters: Any):
-        super().__init__(SURROUND_CAMERAS, LIDAR_POSITION[2], STREET_KEYFRAME_S, **parameters)
+    def __init__(self, *, sensor: Sensor = DEFAULT_SETUP, **parameters: Any):
+        self._setup = setup = sensor_setup(sensor)
+        cameras = setup.equipped(SURROUND_CAMERAS)
+        mounted = setup.grid, cameras, setup.position
+        super().__init__(*mounted, STREET_KEYFRAME_S, **parameters)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -36,7 +39,7 @@ class StreetEnv(OpenLoopEnv):
         """
         self._reseed(seed, options)
         entropy = self._draw_entropy(seed)
-        return self._start(street_film(entropy, self._secret), entropy)
+        return self._start(street_film(entropy, self._secret, self._setup), entropy)
 
 
 class ReplayEnv(FilmEnv):

@@ -23,6 +23,7 @@ from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.random_floor import RandomFloor
 from care_sim.core.rig import Rig
+from care_sim.core.sensor_setup import Position
 from care_sim.core.types import Action
 from care_sim.envs.spaces import checked_scores, observation_space
 from care_sim.loops.truth import EpisodeTruth, Loop, Truth
@@ -48,8 +49,9 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
     def __init__(
         self,
         conditions: Conditions,
+        grid: AngularGrid,
         cameras: tuple[PinholeCamera, ...],
-        sensor_height_m: float,
+        position: Position,
         budget: float,
         keyframe_s: float,
         secret: str | bool,
@@ -61,11 +63,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             raise InvalidInput(
                 "cameras must be at least one, got none: observations tell of each what it sees"
             )
-        grid = AngularGrid()
         check_dead_rows(grid, conditions.lidar_dead_rows)
         self.conditions = conditions
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""
+        x, y, z = position
         self.rig = Rig(
             grid=grid,
             cameras=cameras,
@@ -74,9 +76,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             keyframe_s=keyframe_s,
             azimuth_margin=conditions.azimuth_margin,
             elevation_margin=conditions.elevation_margin,
-            sensor_height_m=sensor_height_m,
+            sensor_height_m=z,
             cell_order=conditions.cell_order,
             firing=conditions.firing,
+            sensor_x_m=x,
+            sensor_y_m=y,
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)

@@ -30,7 +30,7 @@ from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
+from care_sim.sensors.lidar import Lidar
 from care_sim.world.world import World
 
 
@@ -84,10 +84,10 @@ class ClosedLoop:
         self._limits = Limits(rig)
         self._memory = TrackMemory(rig.keyframe_s)
         self._track_objects = TrackObjects()
-        # The driver goes by the sensor, which sits behind the middle of the car: the front bumper
-        # is farther from it than half a length.
+        # The driver reckons from where the sensor stands along the car: the front bumper is farther
+        # from a sensor behind the middle than half a length.
         length, width, _ = world.ego_kind.size
-        front_m = length / 2 - LIDAR_POSITION[0]
+        front_m = length / 2 - rig.sensor_x_m
         cruise_mps = world.ego_motion.speed
         # Where somebody may come towards the ego into its way, the scenario asks for foresight.
         rules = replace(
@@ -121,9 +121,10 @@ class ClosedLoop:
         detections, behind, found = self._detection.detect(scan, bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)
-        command = self._command(sensor)
+        middle = self._middle()
+        command = self._command(middle)
         needless = self._needless is not None and self._needless.judge(
-            world, sensor, command.braking
+            world, middle, command.braking
         )
         sights = self._sights(found)
 
@@ -186,24 +187,31 @@ class ClosedLoop:
         """Whether a camera shows enough of a body for a box. Truth: for scoring and people."""
         return any(picture.shows(body) for picture in self.pictures)
 
-    def _command(self, sensor: Frame) -> Command:
+    def _middle(self) -> Frame:
+        """Where the driver reckons from: the LiDAR's frame, moved to the middle line of the car."""
+        if not self.rig.sensor_y_m:
+            return self.sensor
+        x, _, z = self.rig.sensor_position
+        return Frame.mounted(self.world.ego.pose, (x, 0.0, z))
+
+    def _command(self, middle: Frame) -> Command:
         """What the car's software asks for, from the tracks of this keyframe."""
-        ahead = self._tracks_ahead(sensor)
+        ahead = self._tracks_ahead(middle)
         ego = self.belief.ego
         command = self._driver.command(ahead, ego)
         if self._cruising is None:
             return command
         return self._cruising.eased(command, ahead, ego.speed, self.world.along_m)
 
-    def _tracks_ahead(self, sensor: Frame) -> Tracks:
+    def _tracks_ahead(self, middle: Frame) -> Tracks:
         """The tracks as the controller takes them: along the way that the car is to go."""
-        tracks = self._memory.tracks(sensor)
+        tracks = self._memory.tracks(middle)
         route = self.world.route
-        return tracks if route is None else along_route(tracks, route, sensor)
+        return tracks if route is None else along_route(tracks, route, middle)
 
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the cameras' pictures and form the belief on which the next cells are chosen."""
-        self.sensor = sensor = Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
+        self.sensor = sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
         boxes = self._local_boxes(self._reported)
         self.pictures = tuple(
             self._photograph(camera, sensor, boxes) for camera in self.rig.cameras

@@ -5,10 +5,12 @@ recorded clouds. Nothing in it depends on a policy. It holds truth; policies see
 `care_sim.core.belief.Belief` carries.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import LIDAR_POSITION, Position
 from care_sim.core.types import Ego
 from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, IdentifiedDetections
 
@@ -31,7 +33,8 @@ class Shot:
 @dataclass(frozen=True, eq=False)
 class Film:
     """A scene: its name, the cameras of its car, the LiDAR's height above the road, seconds between
-    keyframes.
+    keyframes, the grid whose cells its clouds hold, and the LiDAR's `place` (x, y) on the car, the
+    default one where a recording does not tell it.
 
     `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
     of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
@@ -44,3 +47,10 @@ class Film:
     keyframe_s: float
     shots: tuple[Shot, ...]
     hidden: Annotations = NO_ANNOTATIONS
+    grid: AngularGrid = field(default_factory=AngularGrid)
+    place: tuple[float, float] = LIDAR_POSITION[:2]
+
+    @property
+    def position(self) -> Position:
+        """The LiDAR's x, y and z in the frame of the car, metres."""
+        return *self.place, self.sensor_height_m

@@ -19,7 +19,6 @@ from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.sensors.annotated import NO_OBJECT
 from care_sim.sensors.camera import faultless_detections
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import Actor, World
 
 WAY_M = 40.0
@@ -107,10 +106,10 @@ class WatchedKeyframe:
         return cells, grid.directions[cells] * ranges[cells, None]
 
 
-def _way(world: World) -> Floats:
+def _way(world: World, sensor_x: float) -> Floats:
     pieces = 1 if world.route is None else _PIECES
     middles = (np.arange(pieces) + 0.5) * WAY_M / pieces
-    return np.array([way_ahead(world, LIDAR_POSITION[0], ahead) for ahead in middles.tolist()])
+    return np.array([way_ahead(world, sensor_x, ahead) for ahead in middles.tolist()])
 
 
 class EpisodeWatcher:
@@ -134,7 +133,7 @@ class EpisodeWatcher:
             time_s=world.time,
             sensor=loop.sensor,
             ego=world.boxes_of(np.array([world.ego_body]))[0],
-            way=_way(world),
+            way=_way(world, loop.rig.sensor_x_m),
             names=tuple(actor.name for actor in world.actors),
             labels=tuple(actor.label for actor in world.actors),
             bodies=world.boxes(world.actors).copy(),

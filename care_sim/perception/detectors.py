@@ -23,6 +23,8 @@ PROXY = "returns"
 """The paper's proxy."""
 GRADED = "graded"
 """The proxy that is surer with more returns."""
+CLUSTER = "cluster"
+"""The classical one. It is told the grid, and so how far apart neighbouring points are."""
 _PRIVILEGED = (PROXY, GRADED)
 """Those that read whose return each one is; all others are `PointDetector`s."""
 
@@ -38,7 +40,7 @@ DETECTORS: Plugins[Any] = Plugins(
     built_in={
         PROXY: ReturnsProxy,
         GRADED: GradedProxy,
-        "cluster": ClusterDetector,
+        CLUSTER: ClusterDetector,
         "torchscript": TorchScriptDetector,
     },
     faults=_faults,

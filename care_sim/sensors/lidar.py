@@ -6,16 +6,10 @@ from care_sim.core.arrays import Integers
 from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
-from care_sim.core.rig import LIDAR_HEIGHT_M
 from care_sim.core.types import Scan
 from care_sim.sensors.engines import RayEngine
 from care_sim.sensors.lidar_faults import CellFaults
 from care_sim.world.bullet import NO_BODY
-
-LIDAR_POSITION = (-0.445, 0.0, LIDAR_HEIGHT_M)
-"""Metres from the ego's centre: LIDAR_TOP of nuScenes, 0.94 m before the rear axle of a Renault
-Zoe.
-"""
 
 
 class Lidar:

@@ -7,6 +7,7 @@ from care_sim.base.checks import check_known
 from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput, shortened
 from care_sim.loops.film import Film
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
 from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
 from care_sim.sources.street_films import record
 from care_sim.streets.street import (
@@ -36,6 +37,11 @@ class Source(Protocol):
         """What the source is called."""
         ...
 
+    @property
+    def sensor(self) -> str:
+        """The name or file of the set-up whose grid its films hold."""
+        ...
+
     def film(self, scene: Scene) -> Film:
         """The film of a scene. Raises InvalidInput where it cannot be made."""
         ...
@@ -49,10 +55,16 @@ class Source(Protocol):
 
 @dataclass(frozen=True)
 class Streets:
-    """Generated streets: the 150 of the evaluation, or the 20 of the calibration."""
+    """Generated streets: the 150 of the evaluation, or the 20 of the calibration. They are filmed
+    by the `sensor`, the name or file of a set-up.
+    """
 
     kind = "streets"
     split: str = "evaluation"
+    sensor: str = DEFAULT_SETUP
+
+    def __post_init__(self) -> None:
+        sensor_setup(self.sensor)
 
     def scenes(self) -> list[Scene]:
         """One per seed."""
@@ -60,17 +72,18 @@ class Streets:
 
     def film(self, scene: Scene) -> Film:
         """The street of the seed."""
-        return record(make_street(scene.seed))
+        return record(make_street(scene.seed), sensor_setup(self.sensor))
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """The name of a street says all."""
-        return {"source": self.kind}
+        """The name of a street says all but the sensor."""
+        return {"source": self.kind} | sensor_columns(self.sensor)
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """Scenes of recordings."""
+    """Scenes of recordings, whose cameras and mounts are their own."""
 
+    sensor = DEFAULT_SETUP
     recordings: Recordings
 
     @property
@@ -120,11 +133,12 @@ def source_of(text: str, **options: object) -> Source:
             raise InvalidInput(f"unknown source {text!r}; known: {known}")
         return Recorded(recordings(text, options))
     given = {name: value for name, value in options.items() if value is not None}
+    sensor = str(given.pop("sensor", DEFAULT_SETUP))
     split = str(given.pop("split", "evaluation"))
     if given:
         raise InvalidInput(f"{', '.join(given)} has no meaning for streets")
     check_known("split of the streets", split, SPLITS)
-    return Streets(split)
+    return Streets(split, sensor)
 
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:

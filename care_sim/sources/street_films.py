@@ -11,12 +11,12 @@ import numpy as np
 from care_sim.base.random_streams import secret_entropy
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
-from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import CLASSES
 from care_sim.loops.film import Film, Shot
 from care_sim.sensors.annotated import Annotations, Cloud, IdentifiedDetections
-from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sensors.surround import SURROUND_CAMERAS, full_sweep, numbers_of, surround_detections
 from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
@@ -24,52 +24,47 @@ from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
 
 SIGHT_M = 60.0
-"""Bodies whose hull is further than this from the sensor are left out: the LiDAR reaches 50 m, and
-an adult shows the camera its least number of pixels at about 50 m."""
+"""Bodies whose hull is further than this from the sensor are left out, unless its LiDAR reaches
+further: the default one reaches 50 m, and an adult shows its camera the least number of pixels at
+about 50 m."""
 
+_DEFAULT = sensor_setup(DEFAULT_SETUP)
 _NO_CLASS = -1
 """The class of a body that the five classes do not hold."""
 
 
-def record(
-    street: Street,
-    grid: AngularGrid | None = None,
-    cameras: tuple[PinholeCamera, ...] = SURROUND_CAMERAS,
-) -> Film:
-    """The film of a street. `Cloud.objects` and `Annotations.objects` are the columns of
-    `street.poses`.
+def record(street: Street, setup: SensorSetup = _DEFAULT) -> Film:
+    """The film of a street, taken by a sensor set-up. `Cloud.objects` and `Annotations.objects` are
+    the columns of `street.poses`.
 
     An object is annotated at a keyframe if a return of the full sweep lies on it or a camera shows
     it. nuScenes is alike: it scores what has at least one LiDAR or radar point. Nobody could have
     seen what is wholly hidden. The street knows those too: who is wholly hidden at its first
     keyframe is in `Film.hidden`.
     """
-    grid = grid or AngularGrid()
+    cameras = setup.equipped(SURROUND_CAMERAS)
     with closing(BulletWorld()) as world:
-        bodies = _StreetBodies(street, world)
-        shots, hidden = zip(
-            *(bodies.shot(k, grid, cameras) for k in range(len(street.ego))), strict=True
-        )
-    return Film(street.name, cameras, LIDAR_POSITION[2], STREET_KEYFRAME_S, shots, hidden[0])
+        bodies = _StreetBodies(street, world, setup)
+        shots, hidden = zip(*(bodies.shot(k, cameras) for k in range(len(street.ego))), strict=True)
+    x, y, z = setup.position
+    told = street.name, cameras, z, STREET_KEYFRAME_S
+    return Film(*told, shots, hidden[0], setup.grid, (x, y))
 
 
-def street_film(seed: int, secret: str = "") -> Film:
+def street_film(seed: int, secret: str = "", setup: SensorSetup = _DEFAULT) -> Film:
     """The film of the street of a seed. The last one is kept, for policies that meet the same
     street in turn. With a secret it is another street, whose seed cannot be guessed. Its name
     tells the given seed, and not the layout.
     """
-    return _street_film(seed, secret)
+    return _street_film(seed, secret, setup)
 
 
 @lru_cache(maxsize=1)
-def _street_film(seed: int, secret: str) -> Film:
+def _street_film(seed: int, secret: str, setup: SensorSetup) -> Film:
     if not secret:
-        return record(make_street(seed))
-    return record(
-        replace(
-            make_street(secret_entropy("street", (seed,), secret)), name=f"street-{seed:04d}-secret"
-        )
-    )
+        return record(make_street(seed), setup)
+    street = make_street(secret_entropy("street", (seed,), secret))
+    return record(replace(street, name=f"street-{seed:04d}-secret"), setup)
 
 
 class _StreetBodies:
@@ -77,9 +72,12 @@ class _StreetBodies:
     way.
     """
 
-    def __init__(self, street: Street, world: BulletWorld):
+    def __init__(self, street: Street, world: BulletWorld, setup: SensorSetup):
         self._street = street
         self._world = world
+        self._setup = setup
+        # What is farther than the LiDAR reaches is met by no ray.
+        self._sight_m = max(SIGHT_M, setup.grid.range_m)
         self._sizes = np.array([CATALOGUE[kind].size for kind in street.kinds]).reshape(-1, 3)
         labels = [CATALOGUE[kind].label for kind in street.kinds]
         self._classes = np.array(
@@ -87,13 +85,11 @@ class _StreetBodies:
         )
         self._bodies: dict[int, int] = {}
 
-    def shot(
-        self, keyframe: int, grid: AngularGrid, cameras: tuple[PinholeCamera, ...]
-    ) -> tuple[Shot, Annotations]:
+    def shot(self, keyframe: int, cameras: tuple[PinholeCamera, ...]) -> tuple[Shot, Annotations]:
         """Everything that can be seen at a keyframe, and who is near and cannot."""
         street = self._street
         x, y, yaw = street.ego[keyframe].tolist()
-        sensor = Frame.mounted((x, y, yaw), LIDAR_POSITION)
+        sensor = Frame.mounted((x, y, yaw), self._setup.position)
         near = self._set_up(keyframe, sensor)
         # Everything near may hide something; what has a class is reported and annotated.
         everything = sensor.boxes_to_local(self._boxes(keyframe, near))
@@ -103,7 +99,7 @@ class _StreetBodies:
         numbers = {self._bodies[number]: number for number in labelled.tolist()}
         labels = {body: int(self._classes[number]) for body, number in numbers.items()}
         seen = surround_detections(self._world, cameras, sensor, labels, boxes)
-        swept = full_sweep(self._world, grid, sensor, everything, LIDAR_POSITION[2])
+        swept = full_sweep(self._world, self._setup.grid, sensor, everything, sensor.z)
         identified = IdentifiedDetections(seen.detections, numbers_of(seen.objects, numbers))
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
         # Seen by the full sweep or by a camera, whatever a policy will fire later.
@@ -126,7 +122,7 @@ class _StreetBodies:
             np.hypot(poses[:, 0] - sensor.x, poses[:, 1] - sensor.y)
             - np.hypot(*self._sizes[:, :2].T) / 2
         )
-        (near,) = np.nonzero(apart < SIGHT_M)
+        (near,) = np.nonzero(apart < self._sight_m)
         # Bodies that were near once stay in the world and are moved on; those that stand need not
         # be.
         placed = np.array([*self._bodies], np.int64)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Pose, turned
-from care_sim.sensors.lidar import LIDAR_POSITION
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.speed_plan import SpeedPlan
 

@@ -15,6 +15,7 @@ from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoop
 from care_sim.envs import CLOSED_LOOP
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns
 from care_sim.study.parameters import Parameters
 from care_sim.study.provenance import detector_digest
 from care_sim.study.run_config import (
@@ -49,6 +50,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     policy: str
     budget: float = 0.1
     seed: int = 0
+    sensor: str = DEFAULT_SETUP
     detector: str = PROXY
     detector_parameters: Parameters = ()
     scenario_parameters: Parameters = ()
@@ -78,6 +80,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
             f"care_sim:{ENVIRONMENT_IDS[self.scenario]}",
             disable_env_checker=True,
             budget=self.budget,
+            sensor=self.sensor,
             detector=self.detector,
             detector_parameters=dict(self.detector_parameters),
             **{name: getattr(self, name) for name in CONDITION_NAMES},
@@ -86,8 +89,8 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
 
     def row(self) -> Row:
         """All parameters, flat; those of detector, scenario and policy as `detector.NAME`,
-        `scenario.NAME`, `policy.NAME`. `detector` and `COLUMNS_WHERE_CHANGED` are columns only
-        where they are not the default.
+        `scenario.NAME`, `policy.NAME`. `sensor`, `detector` and `COLUMNS_WHERE_CHANGED` are columns
+        only where they are not the default.
         """
         plain = {n: getattr(self, n) for n in PLAIN_FIELDS if n not in COLUMNS_WHERE_CHANGED}
         # Without the columns the rows, and the digests made of them, stay as they were before there
@@ -96,6 +99,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         other = {n: getattr(self, n) for n, usual in chosen.items() if getattr(self, n) != usual}
         return (
             plain
+            | sensor_columns(self.sensor)
             | other
             | flat("detector", self.detector_parameters)
             | flat("scenario", self.scenario_parameters)
@@ -116,7 +120,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         """A short name for people: scenario, policy, budget, seed and what departs from the
         defaults.
         """
-        main = ("scenario", "policy", "budget", "seed")
+        main = ("scenario", "policy", "budget", "seed", "sensor_hash")
         changes = departures(self, main)
         return " ".join(
             [f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes]

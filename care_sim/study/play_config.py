@@ -63,6 +63,7 @@ class PlayConfig(Conditions, RunConfig):
             # Any film will do for this check, and a generated street needs no data.
             "care_sim:CARE-Street-v0",
             disable_env_checker=True,
+            sensor=self.source.sensor,
             **self._arguments(),
         ) as env:
             self.make_policy(env)
@@ -102,7 +103,7 @@ class PlayConfig(Conditions, RunConfig):
     def label(self) -> str:
         """A short name for people: scene, policy, budget and what departs from the defaults."""
         main = (
-            *self.source.row(self.scene),
+            *(name for name in self.source.row(self.scene) if name != "sensor"),
             "scene",
             "policy",
             "budget",

@@ -69,6 +69,8 @@ _BY_WRITER = {
     "digest": as_optional(TEXT),
     "episode_hash": as_optional(TEXT),
     "tags": as_optional(TEXT),
+    "sensor": as_optional(TEXT),
+    "sensor_hash": as_optional(TEXT),
     "cell_order": CONDITION_COLUMNS["cell_order"],
 }
 """Columns that every study writes. Older files and those of others may lack them: a condition that
@@ -166,7 +168,17 @@ MECHANISM = ResultsFormat(
 )
 RESULTS_FORMATS = (EPISODES, PLAYS, MECHANISM)
 _PARAMETERS = frozenset(
-    {*PLAIN_FIELDS, *PLAY_FIELDS, "scene", "detector", "camera_detections", "presence", "driver"}
+    {
+        *PLAIN_FIELDS,
+        *PLAY_FIELDS,
+        "scene",
+        "sensor",
+        "sensor_hash",
+        "detector",
+        "camera_detections",
+        "presence",
+        "driver",
+    }
 )
 
 

@@ -426,7 +426,7 @@ def test_step_before_reset_says_so():
         ({"vehicles": 99}, "vehicles of dense must be a whole number >= 0 and <= 12"),
         (
             {"weather": "rain"},
-            "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, vehicles",
+            "unknown argument of DenseEnv 'weather'; known: .*budget, .*, secret, sensor, vehicles",
         ),
         ({"secrt": "x"}, "unknown argument of DenseEnv 'secrt', the nearest is secret; known: "),
         ({"bugdet": 0.1}, "the nearest is budget; known: "),

@@ -223,7 +223,9 @@ def test_a_street_is_drawn_by_the_seed_and_filmed_once(monkeypatch, short_street
         street_films, "make_street", lambda seed: drawn.append(seed) or make_street(seed)
     )
     monkeypatch.setattr(
-        street_films, "record", lambda street: filmed.append(street.name) or record(street)
+        street_films,
+        "record",
+        lambda street, setup: filmed.append(street.name) or record(street, setup),
     )
     street_films._street_film.cache_clear()
     for budget in (0.1, 0.2):

@@ -44,7 +44,8 @@ def _short_street(seed):
     return part_of(make_street(seed % len(LAYOUTS)), slice(KEYFRAMES))
 
 
-def _filmed(street):
-    if street.name not in _films:
-        _films[street.name] = record(street)
-    return _films[street.name]
+def _filmed(street, setup):
+    key = street.name, setup
+    if key not in _films:
+        _films[key] = record(street, setup)
+    return _films[key]

@@ -6,9 +6,9 @@ import pytest
 
 import care_sim
 from care_sim import InvalidInput
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.perception import detectors
 from care_sim.perception.matching import MATCH_M
-from care_sim.sensors.lidar import LIDAR_POSITION
 
 
 def play(name="CARE-Dartout-v0", seed=0, policy="full", keyframes=60, **arguments):

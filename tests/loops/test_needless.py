@@ -5,8 +5,8 @@ import pytest
 
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.loops.needless import NeedlessBraking
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.route import Route
 from care_sim.world.traffic import Traffic
 from care_sim.world.world import World

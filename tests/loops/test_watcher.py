@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import care_sim
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.envs.wrappers.watching import Watching
 from care_sim.loops.watcher import WAY_M, EpisodeWatcher
 from care_sim.sensors.confidence import MIN_PIXELS
-from care_sim.sensors.lidar import LIDAR_POSITION
 
 
 class Notes(Watching):

@@ -13,10 +13,10 @@ from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.residual import wedges
 from care_sim.core.rig import Rig
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import Demand
 from care_sim.scenarios import make_scenario
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector, Picture, faultless_detections
-from care_sim.sensors.lidar import LIDAR_POSITION
 
 pytestmark = pytest.mark.slow
 GRID = AngularGrid()

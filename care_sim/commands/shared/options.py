@@ -9,6 +9,7 @@ from care_sim.base.seed_ranges import CALIBRATION, split_of
 from care_sim.commands.shared.selection import policy_parameters
 from care_sim.core.conditions import ClosedLoopConditions
 from care_sim.perception.detectors import PROXY
+from care_sim.sensors.setups import DEFAULT_SETUP
 from care_sim.study.parameters import parameters
 
 
@@ -16,6 +17,8 @@ from care_sim.study.parameters import parameters
 class Options(ClosedLoopConditions):
     """Conditions that all episodes share."""
 
+    sensor: str = DEFAULT_SETUP
+    """LiDAR and cameras: a name of `care-sim sensors`, or a .toml file of a set-up."""
     detector: str = PROXY
     """returns (the paper's proxy), graded (the surer the more returns), cluster (a real
     one), torchscript, or that of an installed package.

@@ -27,6 +27,8 @@ class SourceOptions:
     """
     version: str | None = None
     """For nuScenes: the version, where the folder holds several."""
+    sensor: str | None = None
+    """For streets: LiDAR and cameras, a name of `care-sim sensors` or a .toml file of a set-up."""
     camera_detections: Path | None = None
     """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
 
@@ -36,6 +38,7 @@ class SourceOptions:
             text,
             split=self.split,
             version=self.version,
+            sensor=self.sensor,
             camera_detections=self.camera_detections,
         )
 

@@ -30,8 +30,9 @@ _UNITS_NOTE = (
     "Metres, seconds, radians. Boxes: centre x, y, z, length, width, height, yaw. World frame: x "
     "along the road, y left, z up. Sensor frame, that of points and tracks: x forward, y left, "
     "z up; sensor_in_world is its origin, then yaw, pitch and roll, turned about z, then y, then "
-    "x. Cells: row * columns + column; row 0 is the highest, column 0 straight behind, then to the "
-    "right, ahead, left. Ego and bodies are truth, in the world frame."
+    "x. Cells: row * columns + column; row 0 is the highest, column 0 begins at the azimuth "
+    "heading - field_of_view / 2, straight behind on a grid that goes all round, and the others "
+    "follow to the left. Ego and bodies are truth, in the world frame."
 )
 POINT_BYTES = 4 * 3 + 4 + 1
 """Bytes per point of a cloud: three coordinates, cell and share."""

@@ -19,7 +19,7 @@ from care_sim.perception.proxy import ReturnsRule
 from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
-from care_sim.sensors.lidar import LIDAR_POSITION, Lidar
+from care_sim.sensors.lidar import Lidar
 from care_sim.study.episode_config import EpisodeConfig
 
 POLICY = "policy + allocation"
@@ -112,7 +112,7 @@ class StageByStage:
         length, width, _ = world.ego_kind.size
         self._controller = BrakingController(
             world.ego_motion.speed,
-            length / 2 - LIDAR_POSITION[0],
+            length / 2 - rig.sensor_x_m,
             width / 2,
             rig.keyframe_s,
             DriverSettings(),
@@ -134,7 +134,7 @@ class StageByStage:
         # The world moves on, and the camera looks at it from the new place.
         watch("world step", self.world.advance, command.acceleration, self._rig.keyframe_s)
         watch("track", self._memory.predict)
-        self._sensor = Frame.mounted(self.world.ego.pose, LIDAR_POSITION)
+        self._sensor = Frame.mounted(self.world.ego.pose, self._rig.sensor_position)
         arrived = self._camera_detections()
         return arrived, watch("track", self._memory.tracks, self._sensor)
 

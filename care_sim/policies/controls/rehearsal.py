@@ -39,5 +39,5 @@ def rehearsal(scenario: Scenario, seed: int, rig: Rig) -> ClosedLoop:
     built, camera, lidar, _, odometry = streams((seed,), 5)
     world = scenario.build(np.random.default_rng(built))
     # A rig that was made alone may have no camera; the scenario's environment has these.
-    equipped = replace(rig, cameras=scenario.cameras)
+    equipped = rig if rig.cameras else replace(rig, cameras=scenario.cameras)
     return ClosedLoop(world, equipped, ClosedLoopConditions(), SensorSeeds(camera, lidar, odometry))

@@ -18,7 +18,6 @@ from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.controls.rehearsal import known_scenario, rehearsal
 from care_sim.scenarios.base import Scenario
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.world import World
 
 
@@ -115,7 +114,7 @@ class SeedFinder(Policy):
         hidden = {one.body for one in self._twin.meetings}
         if self._twin.first_sighting is not None:
             hidden.add(self._twin.first_sighting.body)
-        sensor = Frame.mounted(self._twin.ego.pose, LIDAR_POSITION)
+        sensor = Frame.mounted(self._twin.ego.pose, self.rig.sensor_position)
         boxes = sensor.boxes_to_local(self._twin.boxes_of(np.array(sorted(hidden), np.int64)))
         # Who was passed, or is too far to be detected, would take the cells of who matters.
         near = planar_ranges(boxes) <= self.rig.grid.range_m

@@ -20,11 +20,11 @@ from care_sim.core.frames import Pose
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import sought
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.study.episode_config import EpisodeConfig
 from care_sim.study.episode_play import trace
 from care_sim.study.run_config import Row

@@ -102,6 +102,7 @@ def argoverse2_film(log: Path, grid: AngularGrid | None = None) -> Film:
         ARGOVERSE2_KEYFRAME_S,
         tuple(shots),
         hidden,
+        grid,
     )
 
 

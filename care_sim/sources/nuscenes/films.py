@@ -60,7 +60,8 @@ def nuscenes_film(
         detections.check(database)
     samples = database.samples(scene)
     data = [_recordings(database, sample) for sample in samples]
-    setup = _scene_setup(database, samples, data[0], grid or AngularGrid(), detections)
+    grid = grid or AngularGrid()
+    setup = _scene_setup(database, samples, data[0], grid, detections)
     cars = [
         _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
     ]
@@ -73,7 +74,7 @@ def nuscenes_film(
     )
     cameras = tuple(camera.pinhole for camera in setup.cameras)
     hidden = setup.hidden(samples[0], cars[0])
-    return Film(scene["name"], cameras, setup.lidar.z, NUSCENES_KEYFRAME_S, shots, hidden)
+    return Film(scene["name"], cameras, setup.lidar.z, NUSCENES_KEYFRAME_S, shots, hidden, grid)
 
 
 @dataclass(frozen=True)

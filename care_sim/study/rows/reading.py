@@ -47,6 +47,7 @@ def _setting_of_episode(row: Row) -> Setting:
     ]
     # Sorted, so that the order of columns in a file does not make another setting.
     conditions = sorted((n.removeprefix("scenario."), v) for n, v in changed)
+    conditions += _sensor(row)
     if row.get("detector") is not None:
         conditions.append(("detector", with_parameters(row, "detector")))
     return Setting(row["scenario"], tuple(conditions))
@@ -60,7 +61,16 @@ def _setting_of_play(row: Row) -> Setting:
         for name, usual in _USUAL_PLAY.items()
         if row.get(name) not in (usual, None)
     )
-    return Setting(row["source"], changed, with_parameters(row, "detector"))
+    return Setting(row["source"], (*changed, *_sensor(row)), with_parameters(row, "detector"))
+
+
+def _sensor(row: Row) -> list[tuple[str, Any]]:
+    """Another sensor set-up than the default, as a condition. Files of one name may differ: the
+    begin of the hash tells them apart.
+    """
+    if row.get("sensor") is None:
+        return []
+    return [("sensor", f"{row['sensor']} {row['sensor_hash'][:6]}")]
 
 
 def key_of(row: Row) -> Key:

@@ -11,7 +11,6 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.evaluation.metrics import outcome
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.drawing import BACKGROUND, FAINT_INK, INK
 from care_sim.viewer.pictures.furnished_world import add_car, furnished, photograph
@@ -64,7 +63,7 @@ def _write_header(draw: ImageDraw.ImageDraw, name: str, loop: ClosedLoop, frame:
 
 def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
     with furnished(loop.world) as scene:
-        add_car(scene, loop.world, LIDAR_POSITION[0], loop.guarded_m)
+        add_car(scene, loop.world, loop.rig.sensor_x_m, loop.guarded_m)
         view = photograph(scene, _CAMERA, loop.sensor)
     draw = ImageDraw.Draw(view)
     mark_tracks(draw, _CAMERA, loop.belief.tracks)

@@ -13,7 +13,6 @@ from care_sim.core.types import CLASSES, Tracks
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
 from care_sim.loops.watcher import way_ahead
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.camera_views import (
     EXPLAINED_COLOUR,
@@ -78,7 +77,7 @@ def draw_keyframe(loop: ClosedLoop, frame: Keyframe | None) -> NDArray[np.uint8]
     with furnished(loop.world) as scene:
         # The cameras do not see the car that carries them, nor the marks on the ground.
         pictures = take_pictures(scene, loop, PICTURE_WIDTH)
-        add_car(scene, loop.world, LIDAR_POSITION[0], loop.guarded_m)
+        add_car(scene, loop.world, loop.rig.sensor_x_m, loop.guarded_m)
         chase = photograph(scene, CHASE_CAMERA, loop.sensor)
     _annotate_chase(chase, loop, frame)
     _write_header(ImageDraw.Draw(canvas), loop, frame)
@@ -116,7 +115,7 @@ def _annotate_chase(chase: Image.Image, loop: ClosedLoop, frame: Keyframe | None
     draw = ImageDraw.Draw(chase)
     # Numbers stand beside the bars, 1.6 m to the left, on the ground.
     for metres in METRE_MARKS:
-        bar = Frame.mounted(way_ahead(loop.world, LIDAR_POSITION[0], metres), (0.0, 1.6, 0.0))
+        bar = Frame.mounted(way_ahead(loop.world, loop.rig.sensor_x_m, metres), (0.0, 1.6, 0.0))
         (ground,) = loop.sensor.boxes_to_local(np.array([[bar.x, bar.y, *[0.0] * 5]]))
         if at := drawing.point_above(CHASE_CAMERA, ground):
             draw.text(at, f"{metres:.0f} m", INK, drawing.font(12), anchor="rm")

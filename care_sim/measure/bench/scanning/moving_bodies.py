@@ -6,8 +6,8 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.core.frames import Frame
+from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
-from care_sim.sensors.lidar import LIDAR_POSITION
 from care_sim.world.bodies import CATALOGUE, BodyKind
 
 NEAREST_BODY_M = 8.0

@@ -1,0 +1,105 @@
+"""What is mounted on the car: the grid of its LiDAR, where that stands, and the cameras."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+
+from care_sim.base.checks import check_number
+from care_sim.base.digests import combined_digest
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.grid import AngularGrid
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
+
+Position = tuple[float, float, float]
+LIDAR_POSITION: Position = (LIDAR_X_M, 0.0, LIDAR_HEIGHT_M)
+"""Metres in the frame of the car: LIDAR_TOP of nuScenes, the default."""
+_LOWEST_M, _HIGHEST_M = 0.1, 10.0
+"""A LiDAR on a car stands between these above the road."""
+
+
+@dataclass(frozen=True)
+class SensorSetup:
+    """One LiDAR and its cameras, by name.
+
+    `position` is the LiDAR's x, y and z in the frame of the car: metres before, left of and above
+    the point on the road below the car's middle. Its axes are those of the car; it is turned by the
+    grid's `heading`. `cameras` are placed in the LiDAR's frame; without any, those of the scenario
+    stay where they are on the car. Raises InvalidInput for a value out of its bounds, and for a
+    camera that sees nothing of the grid.
+    """
+
+    name: str
+    grid: AngularGrid = field(default_factory=AngularGrid)
+    position: Position = LIDAR_POSITION
+    cameras: tuple[PinholeCamera, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name):
+            raise InvalidInput(f"name of a sensor set-up must be a text, got {shown(self.name)}")
+        of = f" of the sensor set-up {self.name}"
+        if not isinstance(self.grid, AngularGrid):
+            raise InvalidInput(f"grid{of} must be an AngularGrid, got {shown(self.grid)}")
+        if not (isinstance(self.position, tuple | list) and len(self.position) == 3):
+            raise InvalidInput(
+                f"position{of} must be x, y and z in metres, got {shown(self.position)}"
+            )
+        x, y, z = self.position
+        check_number(f"x of the position{of}", x, -MOST_SHIFT_M, MOST_SHIFT_M)
+        check_number(f"y of the position{of}", y, -MOST_SHIFT_M, MOST_SHIFT_M)
+        check_number(f"z of the position{of}", z, _LOWEST_M, _HIGHEST_M)
+        object.__setattr__(self, "position", (float(x), float(y), float(z)))
+        self._check_cameras(of)
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of all but the name."""
+        plain = asdict(self)
+        del plain["name"]
+        return combined_digest([json.dumps(plain)])
+
+    def equipped(self, cameras: Sequence[PinholeCamera]) -> tuple[PinholeCamera, ...]:
+        """Its cameras; where it has none those given, which are placed for the default LiDAR and
+        stay where they are on the car.
+        """
+        if self.cameras:
+            return self.cameras
+        if self.position == LIDAR_POSITION:
+            return tuple(cameras)
+        return tuple(
+            replace(camera, position=between(self.position, on_car(LIDAR_POSITION, camera)))
+            for camera in cameras
+        )
+
+    def _check_cameras(self, of: str) -> None:
+        cameras = self.cameras
+        if not (
+            isinstance(cameras, tuple | list)
+            and all(isinstance(camera, PinholeCamera) for camera in cameras)
+        ):
+            raise InvalidInput(f"cameras{of} must be PinholeCameras, got {shown(cameras)}")
+        for number, camera in enumerate(cameras):
+            picture = camera.box_rays([[0.0, 0.0, camera.width, camera.height]])
+            (seen,) = self.grid.wedges(picture, 0, 0)
+            if not len(seen):
+                raise InvalidInput(f"camera {number}{of} sees nothing of the grid")
+        # As plain numbers in a tuple: equal set-ups then have equal hashes.
+        object.__setattr__(self, "cameras", tuple(map(_plain, cameras)))
+
+
+def _plain(camera: PinholeCamera) -> PinholeCamera:
+    x, y, z = map(float, camera.position)
+    return replace(camera, position=(x, y, z))
+
+
+def on_car(lidar: Position, camera: PinholeCamera) -> Position:
+    """Where a camera stands in the frame of the car, whose LiDAR is at `lidar`."""
+    x, y, z = (float(a + b) for a, b in zip(lidar, camera.position, strict=True))
+    return x, y, z
+
+
+def between(lidar: Position, camera: Position) -> Position:
+    """The way from the LiDAR to a camera, both places in the frame of the car."""
+    x, y, z = (b - a for a, b in zip(lidar, camera, strict=True))
+    return x, y, z

@@ -1,0 +1,195 @@
+"""Sensor set-ups by name or file: those that come with the package, and TOML files alike.
+
+The tables and keys of a file are those of `docs/sensors.md`: lengths in metres, angles in degrees,
+places in the frame of the car (x forward, y left, z up; its origin is on the road below the car's
+middle).
+"""
+
+import tomllib
+from collections.abc import Mapping
+from functools import lru_cache
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from care_sim.base.checks import check_arguments, check_number, check_path
+from care_sim.base.digests import content_digest
+from care_sim.base.errors import InvalidInput, shown
+from care_sim.core.grid import AngularGrid
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import LIDAR_POSITION, Position, SensorSetup, between
+
+DEFAULT_SETUP = "hdl-32e"
+"""What the paper's data were taken with, and what is mounted where nothing else is said."""
+Sensor = str | PathLike[str] | SensorSetup
+"""A set-up, its name, or a TOML file of one."""
+
+_SHIPPED = Path(__file__).parent / "shipped"
+_TABLES = ("name", "lidar", "cameras")
+_EQUAL_ROWS = ("rows", "top_deg", "bottom_deg")
+_LIDAR = (
+    "columns",
+    *_EQUAL_ROWS,
+    "elevations_deg",
+    "range_m",
+    "field_of_view_deg",
+    "position_m",
+    "yaw_deg",
+)
+_CAMERA = (
+    "width",
+    "height",
+    "horizontal_fov_deg",
+    "position_m",
+    "yaw_deg",
+    "pitch_deg",
+    "roll_deg",
+)
+
+
+def setup_names() -> list[str]:
+    """The set-ups that come with the package, the default first."""
+    names = sorted(path.stem for path in _SHIPPED.glob("*.toml"))
+    return sorted(names, key=lambda name: name != DEFAULT_SETUP)
+
+
+def sensor_setup(sensor: Sensor) -> SensorSetup:
+    """The set-up that is meant by a name or the path of a TOML file.
+
+    Raises InvalidInput for a name that is unknown, a file that is missing or no set-up, and a
+    set-up that does not fit together.
+    """
+    if isinstance(sensor, SensorSetup):
+        return sensor
+    check_path("sensor", sensor)
+    if sensor in setup_names():
+        return _read(_SHIPPED / f"{sensor}.toml")
+    path = Path(sensor)
+    if path.suffix != ".toml":
+        raise InvalidInput(
+            f"unknown sensor {shown(str(sensor))}; known: {', '.join(setup_names())}, or a .toml "
+            "file of a set-up"
+        )
+    if not path.is_file():
+        raise InvalidInput(f"sensor {path}: no such file")
+    return _read(path)
+
+
+def setup_lines() -> list[str]:
+    """One line per set-up that comes with the package: its name, grid, reach and cameras."""
+    return [_line(sensor_setup(name)) for name in setup_names()]
+
+
+def sensor_columns(sensor: Sensor) -> dict[str, str]:
+    """Columns of a row that tell its set-up by name and hash; none of the default, so that rows and
+    their digests stay as they were before there was a choice.
+    """
+    setup = sensor_setup(sensor)
+    if setup == sensor_setup(DEFAULT_SETUP):
+        return {}
+    return {"sensor": setup.name, "sensor_hash": setup.digest}
+
+
+def _line(setup: SensorSetup) -> str:
+    grid = setup.grid
+    rows = f"{np.rad2deg(grid.top):+.4g} to {np.rad2deg(grid.bottom):+.4g} degrees"
+    around = f"{np.rad2deg(grid.field_of_view):.4g} degrees"
+    cameras = f"{len(setup.cameras)} of its own" if setup.cameras else "the scenario's"
+    return (
+        f"{setup.name:14} {grid.columns} columns in {around}, {grid.rows} rows from {rows}, "
+        f"{grid.range_m:g} m; cameras: {cameras}"
+    )
+
+
+def _read(path: Path) -> SensorSetup:
+    return _read_once(path, content_digest(path))
+
+
+# Every row of a study asks for the set-up. A file that is written anew has another digest.
+@lru_cache(maxsize=32)
+def _read_once(path: Path, _digest: str) -> SensorSetup:
+    try:
+        plain = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InvalidInput(f"sensor {path}: no TOML ({' '.join(str(error).split())})") from error
+    try:
+        return _setup_of(plain)
+    except InvalidInput as error:
+        raise InvalidInput(f"sensor {path}: {error}") from error
+
+
+def _setup_of(plain: Mapping[str, Any]) -> SensorSetup:
+    check_arguments("a set-up", plain, _TABLES)
+    lidar = _table("lidar", plain.get("lidar", {}), _LIDAR)
+    cameras = plain.get("cameras", [])
+    if not isinstance(cameras, list):
+        raise InvalidInput("cameras must be tables, each [[cameras]]")
+    position = _position("lidar", lidar)
+    return SensorSetup(
+        plain.get("name", ""),
+        _grid(lidar),
+        position,
+        tuple(_camera(_table("cameras", camera, _CAMERA), position) for camera in cameras),
+    )
+
+
+def _grid(lidar: Mapping[str, Any]) -> AngularGrid:
+    usual = AngularGrid()
+    given = {
+        "columns": lidar.get("columns", usual.columns),
+        "range_m": lidar.get("range_m", usual.range_m),
+        "field_of_view": _radians(lidar, "field_of_view_deg", 360.0),
+        "heading": _radians(lidar, "yaw_deg", 0.0),
+    }
+    if "elevations_deg" in lidar:
+        if twice := [name for name in _EQUAL_ROWS if name in lidar]:
+            raise InvalidInput(f"elevations_deg says all of the rows, so leave out {twice[0]}")
+        elevations = lidar["elevations_deg"]
+        if not isinstance(elevations, list):
+            raise InvalidInput(f"elevations_deg must be a list, got {shown(elevations)}")
+        for elevation in elevations:
+            check_number("elevations_deg", elevation, -90, 90)
+        return AngularGrid.of_elevations([float(np.deg2rad(one)) for one in elevations], **given)
+    if missing := [name for name in _EQUAL_ROWS if name not in lidar]:
+        raise InvalidInput(f"lidar lacks {missing[0]}, or elevations_deg for rows of unequal steps")
+    top, bottom = (_radians(lidar, name, 0.0) for name in ("top_deg", "bottom_deg"))
+    return AngularGrid(rows=lidar["rows"], top=top, bottom=bottom, **given)
+
+
+def _camera(camera: Mapping[str, Any], lidar: Position) -> PinholeCamera:
+    usual = PinholeCamera()
+    angles = {name: _radians(camera, f"{name}_deg", 0.0) for name in ("yaw", "pitch", "roll")}
+    return PinholeCamera(
+        camera.get("width", usual.width),
+        camera.get("height", usual.height),
+        _radians(camera, "horizontal_fov_deg", 90.0),
+        between(lidar, _position("cameras", camera)),
+        **angles,
+    )
+
+
+def _table(name: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:
+    if not isinstance(table, dict):
+        raise InvalidInput(f"{name} must be a table, got {shown(table)}")
+    check_arguments(name, table, known)
+    return table
+
+
+def _position(name: str, table: Mapping[str, Any]) -> Position:
+    if "position_m" not in table and name == "lidar":
+        return LIDAR_POSITION
+    position = table.get("position_m")
+    if not (isinstance(position, list) and len(position) == 3):
+        raise InvalidInput(f"position_m of {name} must be [x, y, z], got {shown(position)}")
+    for metres in position:
+        check_number(f"position_m of {name}", metres, -100, 100)
+    x, y, z = map(float, position)
+    return x, y, z
+
+
+def _radians(table: Mapping[str, Any], name: str, usual: float) -> float:
+    degrees = table.get(name, usual)
+    check_number(name, degrees, -360, 360)
+    return float(np.deg2rad(degrees))

@@ -1,0 +1,252 @@
+"""Sensor set-ups: those that come with the package, files of one's own, and what is refused."""
+
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+import care_sim
+from care_sim.base.errors import InvalidInput
+from care_sim.core.frames import Frame
+from care_sim.core.grid import AngularGrid
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.sensor_setup import LIDAR_POSITION, SensorSetup
+from care_sim.sensors.camera import FRONT_CAMERA
+from care_sim.sensors.setups import (
+    DEFAULT_SETUP,
+    sensor_columns,
+    sensor_setup,
+    setup_lines,
+    setup_names,
+)
+
+LISTED = """
+name = "mine"
+
+[lidar]
+columns = 180
+elevations_deg = [5.0, 1.0, -1.0, -9.0]
+field_of_view_deg = 90.0
+yaw_deg = 30.0
+range_m = 80.0
+position_m = [1.0, 0.5, 0.75]
+
+[[cameras]]
+width = 400
+height = 300
+horizontal_fov_deg = 60.0
+position_m = [1.5, 0.0, 1.25]
+yaw_deg = 20.0
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text):
+        path = tmp_path / "mine.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_the_default_is_what_was_mounted_before_there_was_a_choice():
+    setup = sensor_setup(DEFAULT_SETUP)
+    assert setup_names()[0] == DEFAULT_SETUP
+    assert setup == SensorSetup(DEFAULT_SETUP, AngularGrid(), (-0.445, 0.0, 1.84))
+    assert setup.equipped((FRONT_CAMERA,)) == (FRONT_CAMERA,)
+    assert sensor_columns(DEFAULT_SETUP) == {}
+    with gymnasium.make("CARE-Dense-v0") as env:
+        assert env.unwrapped.rig == care_sim.Rig(cameras=(FRONT_CAMERA,))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "view_deg"),
+    [
+        ("hdl-32e", (32, 512), 360),
+        ("os1-64", (64, 1024), 360),
+        ("os1-128", (128, 1024), 360),
+        ("m1-forward", (126, 600), 120),
+        ("paper-vehicle", (32, 512), 360),
+    ],
+)
+def test_what_comes_with_the_package_is_as_its_data_sheet_says(name, shape, view_deg):
+    setup = sensor_setup(name)
+    assert setup.name == name
+    assert setup.grid.shape == shape
+    assert np.rad2deg(setup.grid.field_of_view) == pytest.approx(view_deg)
+    assert any(line.startswith(name) for line in setup_lines())
+
+
+def test_these_are_all_and_no_two_have_one_hash():
+    assert len(setup_names()) == 5
+    assert len({sensor_setup(name).digest for name in setup_names()}) == 5
+
+
+def test_a_file_is_read_in_metres_and_degrees_of_the_car(written):
+    setup = sensor_setup(written(LISTED))
+    grid = setup.grid
+    assert (setup.name, setup.position) == ("mine", (1.0, 0.5, 0.75))
+    assert (grid.columns, grid.range_m) == (180, 80.0)
+    assert np.rad2deg(grid.elevations) == pytest.approx([5.0, 1.0, -1.0, -9.0])
+    assert np.rad2deg(grid.azimuths[[0, -1]]) == pytest.approx([-14.75, 74.75])
+    (camera,) = setup.cameras
+    assert camera.position == (0.5, -0.5, 0.5)
+    angles = np.rad2deg([camera.horizontal_fov, camera.yaw, camera.pitch])
+    assert angles == pytest.approx([60.0, 20.0, 0.0])
+
+
+def test_the_same_set_up_is_an_object_a_file_and_a_path_in_text(written):
+    path = written(LISTED)
+    setup = sensor_setup(path)
+    assert sensor_setup(str(path)) == sensor_setup(setup) == setup
+    assert sensor_columns(str(path)) == {"sensor": "mine", "sensor_hash": setup.digest}
+    path.write_text(LISTED.replace("80.0", "70.0"))
+    assert sensor_setup(path).grid.range_m == 70.0
+    assert sensor_setup(path).digest != setup.digest
+
+
+def test_the_hash_is_of_what_is_mounted_not_of_the_name():
+    setup = SensorSetup("one", cameras=(FRONT_CAMERA,))
+    assert replace(setup, name="other").digest == setup.digest
+    moved = replace(setup, position=(0.0, 0.0, 1.84))
+    turned = replace(setup, cameras=(replace(FRONT_CAMERA, pitch=0.01),))
+    assert len({one.digest for one in (setup, moved, turned)}) == 3
+
+
+def test_cameras_of_the_scenario_stay_where_they_are_on_the_car():
+    """A LiDAR in the bumper, 1.5 m before and 1.3 m below the usual place."""
+    setup = SensorSetup("bumper", position=(1.055, 0.2, 0.54))
+    (camera,) = setup.equipped((FRONT_CAMERA,))
+    usual = np.add(LIDAR_POSITION, FRONT_CAMERA.position)
+    assert np.add(setup.position, camera.position) == pytest.approx(usual)
+
+
+@pytest.mark.parametrize("environment", ["CARE-Dense-v0", "CARE-Street-v0"])
+def test_a_set_up_is_mounted_in_both_loops(environment, written):
+    with gymnasium.make(environment, sensor=written(LISTED), budget=0.1) as env:
+        observation, _ = env.reset(seed=0)
+        inner = env.unwrapped
+        assert observation["ranges"].shape == inner.action_space.shape == (4, 180)
+        assert inner.rig.budget == 72
+        assert inner.rig.sensor_position == (1.0, 0.5, 0.75)
+        assert len(inner.rig.cameras) == 1
+        env.step(np.ones(env.action_space.shape, np.float32))
+        loop = inner.loop
+        sensor = loop.sensor if environment == "CARE-Dense-v0" else loop.shot.sensor
+        assert sensor.z == 0.75
+
+
+def test_a_return_lies_where_the_mount_and_the_grid_say():
+    """Every point of a full scan of the empty road is on the road, within the field of view."""
+    setup = SensorSetup(
+        "low",
+        AngularGrid(90, 4, 0.0, -0.3, 30.0, field_of_view=np.pi / 2, heading=-1.0),
+        (2.0, -0.9, 0.6),
+    )
+    with gymnasium.make("CARE-CutIn-v0", sensor=setup, budget=1.0) as env:
+        env.reset(seed=0)
+        loop = env.unwrapped.loop
+        x, y, yaw = loop.world.ego.pose
+        expected = Frame(x, y, 0.0, yaw).holding(np.array(setup.position))
+        assert loop.sensor.origin == pytest.approx(expected.origin)
+        scan = loop.full_scan()
+        hit = np.isfinite(scan.ranges)
+        points = setup.grid.directions[scan.cells[hit]] * scan.ranges[hit, None]
+        road = points[points[:, 2] < -0.55]
+        assert len(road) > 90
+        assert road[:, 2] == pytest.approx(-0.6, abs=1e-3)
+        azimuths = np.arctan2(points[:, 1], points[:, 0])
+        assert azimuths.min() > -1.0 - np.pi / 4
+        assert azimuths.max() < -1.0 + np.pi / 4
+
+
+def test_what_is_in_the_way_of_the_car_counts_wherever_the_lidar_stands_across_it():
+    """Seen from a LiDAR 1.9 m to the right the parked cars are straight ahead, and nobody brakes."""
+    braking = []
+    for left in (0.0, -1.9):
+        setup = SensorSetup("shifted", position=(-0.445, left, 1.84))
+        with gymnasium.make("CARE-Dense-v0", sensor=setup, budget=1.0) as env:
+            policy = care_sim.make_policy("full", env)
+            observation, _ = env.reset(seed=1)
+            for _ in range(20):
+                observation, _, _, _, info = env.step(policy(observation))
+                braking.append(info["braking"])
+    assert not any(braking)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("columns", "colums", "unknown argument of lidar 'colums', the nearest is columns"),
+        ('name = "mine"', "", "name of a sensor set-up must be a text"),
+        ("[lidar]", "[radar]", "unknown argument of a set-up 'radar'"),
+        ("elevations_deg", "rows = 4\nelevations_deg", "so leave out rows"),
+        ("[5.0, 1.0, -1.0, -9.0]", "[5.0, 1.0, 2.0, -9.0]", "must descend"),
+        ("[5.0, 1.0, -1.0, -9.0]", "5.0", "elevations_deg must be a list"),
+        ("elevations_deg = [5.0, 1.0, -1.0, -9.0]", "rows = 4", "lidar lacks top_deg"),
+        ("field_of_view_deg = 90.0", "field_of_view_deg = 91.0", "divides a whole turn"),
+        ("[1.0, 0.5, 0.75]", "[1.0, 0.5]", r"position_m of lidar must be \[x, y, z\]"),
+        ("[1.0, 0.5, 0.75]", "[1.0, 0.5, 0.0]", "z of the position of the sensor set-up mine"),
+        ("[1.5, 0.0, 1.25]", "1.5", "position_m of cameras must be"),
+        ("position_m = [1.5, 0.0, 1.25]", "", "position_m of cameras must be"),
+        ("width = 400", "width = 0", "width of the camera must be"),
+        ("yaw_deg = 20.0", "yaw_deg = 200.0", "camera 0 .* sees nothing of the grid"),
+        ("[[cameras]]", "[cameras]", "cameras must be tables"),
+        ("= 80.0", "= nan", "range_m of the grid must"),
+        ("= 80.0", "= eighty", "no TOML"),
+    ],
+)
+def test_a_file_that_does_not_fit_together_is_refused_in_one_line(written, old, new, said):
+    assert old in LISTED
+    path = written(LISTED.replace(old, new))
+    with pytest.raises(InvalidInput, match=said) as refused:
+        sensor_setup(path)
+    assert str(path) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "said"),
+    [
+        ("hdl-32", "unknown sensor 'hdl-32'; known: hdl-32e, "),
+        ("nowhere.toml", "sensor nowhere.toml: no such file"),
+        (b"hdl-32e", "sensor must be a path"),
+        (None, "sensor must be a path"),
+        (3, "sensor must be a path"),
+        ("", "sensor must be a path, none that is empty"),
+    ],
+)
+def test_what_names_no_set_up_is_refused_in_one_line(sensor, said):
+    with pytest.raises(InvalidInput, match=said):
+        gymnasium.make("CARE-Dense-v0", sensor=sensor)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"grid": None}, "must be an AngularGrid"),
+        ({"position": 3.0}, "must be x, y and z"),
+        ({"position": (0.0, 0.0, float("nan"))}, "z of the position"),
+        ({"cameras": FRONT_CAMERA}, "must be PinholeCameras"),
+        ({"cameras": (PinholeCamera(pitch=1.5),)}, "camera 0 .* sees nothing of the grid"),
+    ],
+)
+def test_an_object_that_does_not_fit_together_is_refused(wrong, said):
+    with pytest.raises(InvalidInput, match=said):
+        SensorSetup("mine", **wrong)
+
+
+def test_a_budget_below_a_cell_and_weights_of_another_grid_are_refused():
+    with pytest.raises(InvalidInput, match="leaves no cell of 16384"):
+        gymnasium.make("CARE-Dense-v0", budget=1e-6)
+    with gymnasium.make("CARE-Dense-v0", sensor="os1-64") as env:
+        for policy in ("place", "learned-scorer", "ppo"):
+            with pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is columns 1024"):
+                care_sim.make_policy(policy, env)
+
+
+def test_the_clustering_detector_is_told_the_grid():
+    with gymnasium.make("CARE-Dense-v0", sensor="os1-64", detector="cluster") as env:
+        assert env.unwrapped._detector._detector._grid == sensor_setup("os1-64").grid
