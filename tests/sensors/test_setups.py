@@ -163,7 +163,7 @@ def test_a_return_lies_where_the_mount_and_the_grid_say():
 
 
 def test_what_is_in_the_way_of_the_car_counts_wherever_the_lidar_stands_across_it():
-    """Seen from a LiDAR 1.9 m to the right the parked cars are straight ahead, and nobody brakes."""
+    """Seen from a LiDAR 1.9 m to the right the parked cars are ahead, and nobody brakes."""
     braking = []
     for left in (0.0, -1.9):
         setup = SensorSetup("shifted", position=(-0.445, left, 1.84))
