@@ -20,7 +20,6 @@ from care_sim.core.frames import Pose
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.residual import explained
 from care_sim.core.rig import Rig
-from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.records import Keyframe
@@ -80,6 +79,7 @@ class Recorder:
     sought: Sequence[Actor] = ()
     first_sighting: Actor | None = None
     ego_size: tuple[float, ...] = ()
+    sensor: tuple[float, ...] = ()
     poses: list[list[Pose]] = field(default_factory=list)
     moments: list[dict[str, Any]] = field(default_factory=list)
     rays: list[str] = field(default_factory=list)
@@ -94,6 +94,7 @@ class Recorder:
         self.sought = sought(loop.world)
         self.first_sighting = loop.world.first_sighting
         self.ego_size = loop.world.ego_kind.size
+        self.sensor = loop.rig.sensor_position[:2]
         self._take(loop)
 
     def after(self, loop: ClosedLoop, frame: Keyframe) -> None:
@@ -119,7 +120,7 @@ class Recorder:
         columns = {name: [moment[name] for moment in self.moments] for name in self.moments[0]}
         ego = {
             "size": _whole(np.array(self.ego_size[:2]), _CENTI),
-            "sensor": _whole(LIDAR_POSITION[0], _CENTI),
+            "sensor": _whole(np.array(self.sensor), _CENTI),
         }
         # How it stands with each at every keyframe, and whom the strips and distances are of.
         about = self.first_sighting.kind.name if self.first_sighting else None
@@ -201,12 +202,12 @@ def _way(loop: ClosedLoop) -> list[list[int]] | None:
 
 def fullness(fired: Cells, grid: AngularGrid) -> str:
     """How much of every sector fires, one digit per sector."""
+    sectors = np.floor((grid.azimuths + np.pi) / (2 * np.pi) * SECTORS).astype(np.int64)
     # Cells are numbered row by row, so that the remainder is the column.
-    width = grid.columns // SECTORS
-    counts = np.bincount(np.asarray(fired) % grid.columns // width, minlength=SECTORS)
+    counts = np.bincount(sectors[np.asarray(fired) % grid.columns], minlength=SECTORS)
+    cells = np.maximum(np.bincount(sectors, minlength=SECTORS), 1) * grid.rows
     return "".join(
-        _DIGITS[round(digit)]
-        for digit in (counts / (width * grid.rows) * (len(_DIGITS) - 1)).tolist()
+        _DIGITS[round(digit)] for digit in (counts / cells * (len(_DIGITS) - 1)).tolist()
     )
 
 

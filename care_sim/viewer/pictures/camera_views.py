@@ -19,6 +19,8 @@ EXPLAINED_COLOUR = (90, 220, 255)
 UNEXPLAINED_COLOUR = (255, 170, 40)
 ROW_HEIGHT = 140
 """Of a row of cameras with its words, pixels."""
+ALONE_SIZE = (352, 180)
+"""Of the picture of a single camera, at the most: the grid is drawn beside it."""
 _BEHIND_RAD = np.deg2rad(170.0)
 _AHEAD_RAD = np.deg2rad(10.0)
 
@@ -27,14 +29,16 @@ def take_pictures(scene: BulletWorld, loop: ClosedLoop, width: int) -> list[Imag
     """What every camera sees, with its detections: those that a forecast explains in one colour,
     the others in another.
 
-    That of a single camera is as large as the camera's, and the classes stand beside the boxes.
-    Several share `width` pixels and have no room for words. They come in the sequence of the
-    grid's columns in a picture: behind, left, ahead, right.
+    That of a single camera is as large as the camera's, within `ALONE_SIZE`, and the classes stand
+    beside the boxes. Several share `width` pixels and have no room for words. They come in the
+    sequence of the grid's columns in a picture: behind, left, ahead, right.
     """
     cameras = loop.rig.cameras
     known = explained(loop.belief.detections, loop.belief.tracks, loop.rig)
     if len(cameras) == 1:
-        return [_picture(scene, loop, known, 0, cameras[0].width)]
+        camera = cameras[0]
+        scale = min(1.0, ALONE_SIZE[0] / camera.width, ALONE_SIZE[1] / camera.height)
+        return [_picture(scene, loop, known, 0, round(scale * camera.width))]
     share = width // len(cameras)
     return [_picture(scene, loop, known, number, share) for number in _from_left(cameras)]
 
@@ -75,7 +79,7 @@ def _picture(
     drawing.image_boxes(
         ImageDraw.Draw(picture),
         scale * seen.boxes[own],
-        [CLASSES[label] if scale == 1 else "" for label in seen.classes[own]],
+        [CLASSES[label] if len(loop.rig.cameras) == 1 else "" for label in seen.classes[own]],
         [EXPLAINED_COLOUR if is_known else UNEXPLAINED_COLOUR for is_known in known[own]],
     )
     return picture

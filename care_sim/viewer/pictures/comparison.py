@@ -20,8 +20,8 @@ from care_sim.viewer.pictures.sought import DETECTED, HIT, IN_VIEW, contact_text
 _VIEW_SIZE = (512, 320)
 _CAMERA = PinholeCamera(*_VIEW_SIZE, np.deg2rad(52.0), (-11.0, 0.0, 3.8), 0.0, np.deg2rad(-11.0))
 _TOP = 36
-_COLUMN_PIXELS = 2
-_ROW_PIXELS = 3
+_CELLS_SIZE = (512, 96)
+"""Of the picture of any grid: three pixels a row for the paper's."""
 _GRID_TOP = _TOP + _VIEW_SIZE[1] + 22
 COMPARISON_WIDTH = _VIEW_SIZE[0]
 _COMPARISON_HEIGHT = 508
@@ -72,13 +72,14 @@ def _chase_view(loop: ClosedLoop, frame: Keyframe) -> Image.Image:
 
 
 def _cells_ahead(loop: ClosedLoop) -> Image.Image:
-    # Ahead is the middle of the picture of the grid, so that its two middle quarters are the front.
+    """The columns of the front half, from its left to its right."""
     grid = loop.rig.grid
-    whole = drawing.grid_picture(grid, loop.belief.ranges, 1)
-    ahead = whole.crop((grid.columns // 4, 0, 3 * grid.columns // 4, grid.rows))
-    return ahead.resize(
-        (ahead.width * _COLUMN_PIXELS, ahead.height * _ROW_PIXELS), Image.Resampling.NEAREST
-    )
+    azimuths = grid.azimuths
+    ahead = np.argsort(azimuths, kind="stable")
+    ahead = ahead[np.abs(azimuths[ahead]) < np.pi / 2]
+    if not len(ahead):
+        return Image.new("RGB", _CELLS_SIZE, BACKGROUND)
+    return drawing.fitted(drawing.grid_picture(grid, loop.belief.ranges[:, ahead]), _CELLS_SIZE)
 
 
 def verdict_text(frames: Sequence[Keyframe], keyframe_s: float) -> tuple[str, drawing.Colour]:

@@ -77,15 +77,27 @@ def image_boxes(
             label(draw, ((box[0] + box[2]) / 2, box[1]), name, colour, 11)
 
 
-def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating], row_pixels: int) -> Image.Image:
-    """The scan (E, A) as the car sees it: its left is left, straight ahead is the middle."""
-    picture = np.full((*grid.shape, 3), NOT_FIRED_COLOUR, np.uint8)
+def grid_picture(grid: AngularGrid, ranges: NDArray[np.floating]) -> Image.Image:
+    """The scan (E, n) of the grid, or of some of its columns, as the car sees it: its left is left.
+    A pixel a cell.
+    """
+    picture = np.full((*ranges.shape, 3), NOT_FIRED_COLOUR, np.uint8)
     fired = ranges > 0
     returned = fired & (ranges < grid.range_m)
     picture[fired] = NO_RETURN_COLOUR
     picture[returned] = range_colours(ranges[returned] / grid.range_m)
-    # Columns run counter-clockwise from behind, so that the right comes first.
-    return Image.fromarray(np.repeat(picture[:, ::-1], row_pixels, axis=0))
+    # Columns run counter-clockwise, so that the right comes first.
+    return Image.fromarray(np.ascontiguousarray(picture[:, ::-1]))
+
+
+def fitted(picture: Image.Image, size: tuple[int, int]) -> Image.Image:
+    """A picture of cells in another size: cells stay sharp where they grow, and are averaged where
+    several share a pixel.
+    """
+    width = min(picture.width, size[0])
+    height = min(picture.height, size[1])
+    averaged = picture.resize((width, height), Image.Resampling.BOX)
+    return averaged.resize(size, Image.Resampling.NEAREST)
 
 
 def range_colours(shares: NDArray[np.floating]) -> NDArray[np.uint8]:

@@ -45,15 +45,15 @@ _HEADER = 40
 PANELS_TOP = _HEADER + CHASE_SIZE[1]
 GRID_LEFT = 392
 _GRID_MIDDLE = 224
-_ROW_PIXELS = 4
-_DIRECTIONS = (
-    (0.0, "behind", "la"),
-    (0.25, "left", "ma"),
-    (0.5, "ahead", "ma"),
-    (0.75, "right", "ma"),
-    (1.0, "behind", "ra"),
-)
-"""Directions below the grid: share of its width, name, anchor of the text."""
+_GRID_SIZE = (512, 128)
+"""Of the picture of any grid: four pixels a row for the paper's."""
+_DIRECTIONS = {
+    "behind": np.pi,
+    "left": np.pi / 2,
+    "ahead": 0.0,
+    "right": -np.pi / 2,
+}
+"""Azimuths that are named below the grid."""
 _BOXES_MEAN = "boxes: tracks, faint when the last scan missed them"
 
 _COASTING_COLOUR = (120, 140, 190)
@@ -144,19 +144,31 @@ def draw_grid(
     """
     left, top = at
     draw = ImageDraw.Draw(canvas)
-    picture = drawing.grid_picture(grid, ranges, _ROW_PIXELS)
+    picture = drawing.fitted(drawing.grid_picture(grid, ranges), _GRID_SIZE)
     canvas.paste(picture, (left, top + 44))
     bottom = top + 44 + picture.height
+    view_deg = np.rad2deg(grid.field_of_view)
+    view = "all around the car" if grid.turn == grid.columns else f"{view_deg:.0f} degrees wide"
     draw.text(
-        (left, top + 8),
-        "LiDAR: cells fired in the last scan, all around the car",
-        INK,
-        drawing.font(14),
+        (left, top + 8), f"LiDAR: cells fired in the last scan, {view}", INK, drawing.font(14)
     )
-    for share, name, anchor in _DIRECTIONS:
-        place = (left + share * grid.columns, bottom + 4)
+    for share, name in _directions(grid):
+        place = (left + share * picture.width, bottom + 4)
+        anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
         draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
     _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
+
+
+def _directions(grid: AngularGrid) -> list[tuple[float, str]]:
+    """What is named below the picture of a grid, at which share of its width."""
+    # Left is left in the picture. Straight behind lies at both ends of a grid that goes all round.
+    leftmost = grid.right + grid.field_of_view
+    shares = [
+        ((leftmost - azimuth + turn) / grid.field_of_view, name)
+        for name, azimuth in _DIRECTIONS.items()
+        for turn in (0.0, 2 * np.pi)
+    ]
+    return [(share, name) for share, name in shares if 0.0 <= share <= 1.0]
 
 
 def _draw_legend(

@@ -80,7 +80,7 @@ def test_distances_are_those_of_the_drawn_places(replay):
     (person,) = (body for body in replay.story["moving"] if body["sought"])
     for k, distance in enumerate(replay.story["distance"]):
         x, y, yaw = replay.story["place"][k]
-        ahead = replay.story["ego"]["sensor"]
+        ahead, _ = replay.story["ego"]["sensor"]
         sensor = x + ahead * np.cos(yaw / 1000), y + ahead * np.sin(yaw / 1000)
         assert np.hypot(
             person["poses"][k][0] - sensor[0], person["poses"][k][1] - sensor[1]
@@ -131,7 +131,7 @@ def test_the_camera_sees_the_person_where_the_person_is(replay):
     ((left, right, explained),) = replay.story["camera"][k]
     x, y, _ = replay.story["place"][k]
     azimuth = 1000 * np.arctan2(
-        person["poses"][k][1] - y, person["poses"][k][0] - x - replay.story["ego"]["sensor"]
+        person["poses"][k][1] - y, person["poses"][k][0] - x - replay.story["ego"]["sensor"][0]
     )
     assert right < azimuth + 15
     assert azimuth - 15 < left

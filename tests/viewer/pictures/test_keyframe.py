@@ -12,8 +12,11 @@ from care_sim.core.pinhole import PinholeCamera
 from care_sim.envs import CLOSED_LOOP
 from care_sim.viewer.pictures import drawing
 from care_sim.viewer.pictures.camera_views import EXPLAINED_COLOUR
+from care_sim.viewer.pictures.comparison import draw_panel
 from care_sim.viewer.pictures.keyframe import (
     BRAKING_COLOUR,
+    GRID_LEFT,
+    PANELS_TOP,
     PICTURE_HEIGHT,
     PICTURE_WIDTH,
     SURROUND_HEIGHT,
@@ -106,7 +109,7 @@ def test_the_grid_shows_the_left_on_the_left_and_colours_returns():
     left, right = 6, 1
     ranges[0, left] = grid.range_m
     ranges[1, right] = 10.0
-    picture = np.asarray(drawing.grid_picture(grid, ranges, 3))
+    picture = np.asarray(drawing.fitted(drawing.grid_picture(grid, ranges), (8, 6)))
     assert picture.shape == (6, 8, 3)
     assert tuple(picture[0, 1]) == drawing.NO_RETURN_COLOUR
     assert tuple(picture[5, 6]) == tuple(drawing.range_colours(np.array([0.2]))[0])
@@ -117,3 +120,30 @@ def test_points_behind_the_camera_are_not_marked():
     camera = PinholeCamera(100, 50)
     assert drawing.point_above(camera, np.array([5.0, 0, 0, 1, 1, 1, 0])) is not None
     assert drawing.point_above(camera, np.array([-5.0, 0, 0, 1, 1, 1, 0])) is None
+
+
+def test_a_picture_of_more_cells_than_pixels_averages_them():
+    grid = AngularGrid(columns=4, rows=2)
+    ranges = np.zeros(grid.shape)
+    ranges[:, :2] = grid.range_m
+    picture = np.asarray(drawing.fitted(drawing.grid_picture(grid, ranges), (2, 4)))
+    assert [tuple(pixel) for pixel in picture[0]] == [
+        drawing.NOT_FIRED_COLOUR,
+        drawing.NO_RETURN_COLOUR,
+    ]
+    assert (picture == picture[0]).all()
+
+
+def test_a_setting_with_another_sensor_is_drawn_within_the_picture():
+    """A camera wider than its place, and a grid of other proportions than the paper's."""
+    with gymnasium.make("CARE-Dense-v0", sensor="m1-forward", render_mode="rgb_array") as env:
+        env.reset(seed=0)
+        env.step(np.ones(env.action_space.shape, np.float32))
+        picture = env.render()
+        panel = draw_panel("care", env.unwrapped.loop, env.unwrapped.keyframes)
+    assert picture.shape == (PICTURE_HEIGHT, PICTURE_WIDTH, 3)
+    # Between the camera's picture and the grid, and to the right of it, nothing is drawn.
+    background = np.array(drawing.BACKGROUND)
+    assert (picture[PANELS_TOP + 44 : -30, 376 : GRID_LEFT - 2] == background).all()
+    assert (picture[PANELS_TOP + 44 : -30, GRID_LEFT + 514 :] == background).all()
+    assert panel.size == (512, 508)

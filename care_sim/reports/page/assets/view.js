@@ -143,8 +143,9 @@ class View {
     const { story } = this;
     const on = (name) => story[name][frame] === "1";
     const [x, y, yaw] = story.place[k];
-    const ahead = story.ego.sensor;
-    this.sensor.setAttribute("transform", place([x + ahead * Math.cos(yaw / 1000), y + ahead * Math.sin(yaw / 1000), yaw]));
+    const [ahead, left] = story.ego.sensor;
+    const [cos, sin] = [Math.cos(yaw / 1000), Math.sin(yaw / 1000)];
+    this.sensor.setAttribute("transform", place([x + ahead * cos - left * sin, y + ahead * sin + left * cos, yaw]));
     this.sectors.forEach((sector, n) => sector.setAttribute("fill-opacity", (0.75 * (parseInt(story.rays[frame][n], 36) / 35) ** 0.7).toFixed(3)));
     this.wedges.replaceChildren();
     for (const [left, right, known] of story.camera[k]) add(this.wedges, "path", { d: fan(left, right, REACH), class: known ? "explained" : "unexplained" });
