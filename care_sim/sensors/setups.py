@@ -77,6 +77,14 @@ def sensor_setup(sensor: Sensor) -> SensorSetup:
     return _read(path)
 
 
+def check_shipped(name: str, digest: str) -> None:
+    """Raise InvalidInput unless a set-up of this name and hash comes with the package: the rows of
+    results tell no more of it.
+    """
+    if name not in setup_names() or sensor_setup(name).digest != digest:
+        raise InvalidInput(f"the sensor set-up {name} {digest} does not come with this version")
+
+
 def setup_lines() -> list[str]:
     """One line per set-up that comes with the package: its name, grid, reach and cameras."""
     return [_line(sensor_setup(name)) for name in setup_names()]

@@ -1,0 +1,96 @@
+"""Another sensor set-up in studies: its name and hash in rows, digests and tables."""
+
+import pytest
+
+from care_sim.base.errors import InvalidInput
+from care_sim.reports.page.episodes import config_of
+from care_sim.sensors.setups import sensor_setup
+from care_sim.sources.scenes import Streets, source_of
+from care_sim.study.episode_config import EpisodeConfig
+from care_sim.study.play_config import PlayConfig
+from care_sim.study.rows.reading import setting_of
+
+FILE = """
+name = "mine"
+
+[lidar]
+columns = 90
+rows = 8
+top_deg = 3.0
+bottom_deg = -9.0
+"""
+SCENE = Streets().scenes()[0]
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE)
+    return path
+
+
+def episode(**given):
+    return EpisodeConfig("dense", "care", **given)
+
+
+def play(sensor="hdl-32e"):
+    return PlayConfig(Streets(sensor=sensor), SCENE, "care")
+
+
+@pytest.mark.parametrize("config", [episode, play])
+def test_rows_of_the_default_are_as_before_there_was_a_choice(config):
+    row = config().row()
+    assert not [name for name in row if "sensor" in name]
+    assert config(sensor="hdl-32e").digest() == config().digest()
+
+
+@pytest.mark.parametrize("config", [episode, play])
+def test_rows_carry_the_name_and_the_hash_of_what_a_file_holds(config, file):
+    mine = config(sensor=str(file))
+    row = mine.row()
+    assert (row["sensor"], row["sensor_hash"]) == ("mine", sensor_setup(file).digest)
+    assert "sensor=mine" in mine.label
+    before = mine.digest()
+    assert before != config().digest()
+    file.write_text(FILE.replace("3.0", "2.0"))
+    assert mine.digest() != before
+
+
+@pytest.mark.parametrize("config", [episode, play])
+def test_tables_keep_set_ups_of_one_name_apart(config, file):
+    usual = setting_of(config().row())
+    one = setting_of(config(sensor=str(file)).row())
+    file.write_text(FILE.replace("3.0", "2.0"))
+    other = setting_of(config(sensor=str(file)).row())
+    assert len({usual, one, other}) == 3
+    assert "sensor mine" in one.label
+    assert one.for_full() == one
+
+
+def test_an_episode_of_a_page_is_played_again_with_what_comes_with_the_package(file):
+    config = episode(sensor="m1-forward", budget=0.2)
+    row = config.row()
+    assert config_of(row) == config
+    for changed in (row | {"sensor_hash": "0" * 16}, episode(sensor=str(file)).row()):
+        with pytest.raises(InvalidInput, match="does not come with this version"):
+            config_of(changed)
+
+
+def test_a_film_is_taken_with_the_sensor_of_its_source(file, monkeypatch):
+    filmed = []
+    monkeypatch.setattr(
+        "care_sim.sources.scenes.record", lambda street, setup: filmed.append(setup)
+    )
+    source_of("streets", sensor=str(file)).film(SCENE)
+    assert filmed == [sensor_setup(file)]
+
+
+def test_what_has_no_sensor_to_choose_is_refused_in_one_line(tmp_path):
+    with pytest.raises(InvalidInput, match="sensor has no meaning for argoverse2 recordings"):
+        source_of(f"argoverse2:{tmp_path}", sensor="os1-64")
+    with pytest.raises(InvalidInput, match="unknown sensor 'os2'"):
+        source_of("streets", sensor="os2")
+    with pytest.raises(InvalidInput, match="unknown sensor 'os2'"):
+        episode(sensor="os2")
+    with pytest.raises(InvalidInput, match=r"grid is columns 512 .*needed is"):
+        EpisodeConfig("dense", "ppo", sensor="os1-64")
