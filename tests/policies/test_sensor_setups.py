@@ -24,7 +24,13 @@ SMALL = SensorSetup(
 )
 """Listed rows and a gap behind on the right, from a corner of the bumper."""
 SETUPS = {"m1-forward": "m1-forward", "os1-64": "os1-64", "small": SMALL}
-OF_A_GRID = ("place", "history-place", "learned-scorer", *(n for n in BUILT_IN if "ppo" in n))
+OF_A_GRID = (
+    "place",
+    "place-hulls",
+    "history-place",
+    "learned-scorer",
+    *(name for name in BUILT_IN if name.startswith("ppo")),
+)
 """Their weights fit the default grid alone."""
 SLOW = ("learned-place", "history-learned-place", "seed-finder", "farthest-points")
 """They take seconds on large grids: all but the last play whole episodes first."""
