@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from care_sim.base.checks import check_number
+from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Integers
 from care_sim.core.firing.window import Window
 from care_sim.core.grid import AngularGrid
@@ -19,7 +20,7 @@ class AzimuthWindow(Window):
 
     The sensor of the source restarts for another window: during a drive it has 0 degrees. The
     usual 10 stand for a head that turns by 100 degrees a second; no product is known to.
-    Raises InvalidInput for degrees outside 0 to 180.
+    Raises InvalidInput for degrees outside 0 to 180, and for a grid that does not go all round.
     """
 
     name = "azimuth-window"
@@ -31,6 +32,11 @@ class AzimuthWindow(Window):
 
     def __init__(self, grid: AngularGrid, degrees: float):
         check_number("degrees of firing azimuth-window", degrees, 0, 180)
+        if grid.columns < grid.turn:
+            raise InvalidInput(
+                "firing azimuth-window turns all round, and the grid has no more than "
+                f"{np.rad2deg(grid.field_of_view):g} degrees"
+            )
         super().__init__(grid, grid.rows)
         self.reach = int(np.deg2rad(degrees) / grid.column_width + _LAST_BITS)
         """Columns by which it turns at most."""
@@ -47,4 +53,6 @@ class AzimuthWindow(Window):
         return (stood + turns[np.abs(turns) <= self.reach]) % self.units
 
     def _start(self, width: int) -> int:
-        return self.units // 2 - width // 2
+        # Column 0 begins at the right end of the grid.
+        ahead = round(-self.grid.right / self.grid.column_width)
+        return (ahead - width // 2) % self.units

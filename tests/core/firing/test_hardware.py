@@ -260,3 +260,13 @@ def test_units_must_fit_the_grid(text, named):
 def test_every_kind_names_a_product_and_its_source(kind):
     assert all((kind.product, kind.source, kind.unit))
     assert len(kind.numbers) == len(kind.usual)
+
+
+def test_an_azimuth_window_is_of_a_grid_that_goes_all_round_and_begins_straight_ahead():
+    forward = AngularGrid(columns=60, field_of_view=np.deg2rad(120))
+    with pytest.raises(InvalidInput, match="turns all round, and the grid has no more than 120"):
+        hardware_of("azimuth-window:0", forward)
+
+    turned = AngularGrid(columns=36, heading=np.deg2rad(90))
+    columns = columns_of(fired("azimuth-window:0", np.arange(turned.size), 2, grid=turned), turned)
+    assert sorted(np.rad2deg(turned.azimuths[columns]).round()) == [-5, 5]
