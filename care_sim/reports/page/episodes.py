@@ -91,11 +91,14 @@ def config_of(row: Row) -> EpisodeConfig:
     """
     # A condition that the file's version did not know, or the row does not tell, is the default.
     plain = {name: row[name] for name in PLAIN_FIELDS if row.get(name) is not None}
+    if row.get("detector") is not None:
+        plain["detector"] = row["detector"]
     if row.get("sensor") is not None:
         check_shipped(row["sensor"], row["sensor_hash"])
         plain["sensor"] = row["sensor"]
-    scenario, policy = (_parameters(row, kind) for kind in ("scenario", "policy"))
-    return EpisodeConfig(**plain, scenario_parameters=scenario, policy_parameters=policy)
+    for kind in ("detector", "scenario", "policy"):
+        plain[f"{kind}_parameters"] = _parameters(row, kind)
+    return EpisodeConfig(**plain)
 
 
 def _parameters(row: Row, kind: str) -> Parameters:

@@ -180,7 +180,8 @@ def test_a_story_is_unpacked_as_it_was_packed(replay):
             policy_parameters=(("k_safe", 0.5),),
             lidar_dead_rows=(10, 11),
         ),
-        EpisodeConfig("dense", "care", driver="careful-human", comfort_mps2=2.0),
+        EpisodeConfig("dense", "care", driver="careful-human", comfort_mps2=2.0, firing="tiles"),
+        EpisodeConfig("dense", "care", detector="graded"),
     ],
 )
 def test_a_row_gives_its_configuration_back(config):
