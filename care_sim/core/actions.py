@@ -48,7 +48,8 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
             asked = taken
             kinds = np.where(np.arange(len(taken)) < len(first), EXPLOITATION, RESERVE)
 
-    # What fired and was not asked for can only have come from the floor.
+    # What fired and was not asked for came from the floor, or from the rest of a window, which
+    # always fires as a whole.
     shares = np.full(rig.grid.size, NOT_FIRED, np.uint8)
     shares[fired] = np.append(kinds, FLOOR)[rig.hardware.credited(asked, fired)]
     return shares.reshape(rig.grid.shape)

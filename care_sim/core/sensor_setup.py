@@ -15,6 +15,7 @@ from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
 Position = tuple[float, float, float]
 LIDAR_POSITION: Position = (LIDAR_X_M, 0.0, LIDAR_HEIGHT_M)
 """Metres in the frame of the car: LIDAR_TOP of nuScenes, the default."""
+_LONGEST_NAME = 60
 _LOWEST_M, _HIGHEST_M = 0.1, 10.0
 """A LiDAR on a car stands between these above the road."""
 
@@ -36,8 +37,12 @@ class SensorSetup:
     cameras: tuple[PinholeCamera, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and self.name):
-            raise InvalidInput(f"name of a sensor set-up must be a text, got {shown(self.name)}")
+        named = isinstance(self.name, str) and self.name.isprintable()
+        if not (named and 0 < len(self.name) <= _LONGEST_NAME):
+            raise InvalidInput(
+                f"name of a sensor set-up must be 1 to {_LONGEST_NAME} printable characters, got "
+                f"{shown(self.name)}"
+            )
         of = f" of the sensor set-up {self.name}"
         if not isinstance(self.grid, AngularGrid):
             raise InvalidInput(f"grid{of} must be an AngularGrid, got {shown(self.grid)}")
@@ -49,7 +54,7 @@ class SensorSetup:
         check_number(f"x of the position{of}", x, -MOST_SHIFT_M, MOST_SHIFT_M)
         check_number(f"y of the position{of}", y, -MOST_SHIFT_M, MOST_SHIFT_M)
         check_number(f"z of the position{of}", z, _LOWEST_M, _HIGHEST_M)
-        object.__setattr__(self, "position", (float(x), float(y), float(z)))
+        object.__setattr__(self, "position", _unsigned(self.position))
         self._check_cameras(of)
 
     @cached_property
@@ -89,8 +94,13 @@ class SensorSetup:
 
 
 def _plain(camera: PinholeCamera) -> PinholeCamera:
-    x, y, z = map(float, camera.position)
-    return replace(camera, position=(x, y, z))
+    return replace(camera, position=_unsigned(camera.position))
+
+
+def _unsigned(position: Sequence[float]) -> Position:
+    """Plain numbers; zero has no sign, which equality does not tell but a hash would."""
+    x, y, z = (float(metres) + 0.0 for metres in position)
+    return x, y, z
 
 
 def on_car(lidar: Position, camera: PinholeCamera) -> Position:

@@ -45,7 +45,8 @@ def tables_by_firing(
     tables = [
         Table(f"{title}, {shown.level_unit}", columns, lines(level, keys), notes, whole=_NAMES)
     ]
-    if others := [key for key in keys if key[1] not in (AWARE, FULL)]:
+    played = {key[1] for key in keys}
+    if AWARE in played and (others := [key for key in keys if key[1] not in (AWARE, FULL)]):
         leads = lines(lead, others)
         title = f"{title}, {AWARE} minus each, {shown.difference_unit}"
         tables.append(Table(title, columns, leads, notes, whole=_NAMES))

@@ -120,7 +120,7 @@ def _read(path: Path) -> SensorSetup:
 def _read_once(path: Path, _digest: str) -> SensorSetup:
     try:
         plain = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidInput(f"sensor {path}: no TOML ({' '.join(str(error).split())})") from error
     try:
         return _setup_of(plain)

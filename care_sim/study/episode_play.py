@@ -74,6 +74,8 @@ def trace(
     watch around the environment.
     """
     started = time.perf_counter()
+    # The file of a set-up may be written anew while the episode runs.
+    told = config.row()
     digest = EpisodeHash()
     inner = config.make_env()
     # Made for the environment within the wrappers: the policy takes nothing from them.
@@ -94,7 +96,7 @@ def trace(
         keyframes = played.keyframes
         drawn = played.loop.world.drawn
     row = {
-        **config.row(),
+        **told,
         "version": care_sim.__version__,
         "digest": config.digest(),
         **flat("drawn", tuple(drawn.items())),

@@ -180,7 +180,7 @@ def test_what_is_in_the_way_of_the_car_counts_wherever_the_lidar_stands_across_i
     ("old", "new", "said"),
     [
         ("columns", "colums", "unknown argument of lidar 'colums', the nearest is columns"),
-        ('name = "mine"', "", "name of a sensor set-up must be a text"),
+        ('name = "mine"', "", "name of a sensor set-up must be 1 to 60 printable"),
         ("[lidar]", "[radar]", "unknown argument of a set-up 'radar'"),
         ("elevations_deg", "rows = 4\nelevations_deg", "so leave out rows"),
         ("[5.0, 1.0, -1.0, -9.0]", "[5.0, 1.0, 2.0, -9.0]", "must descend"),
@@ -250,3 +250,18 @@ def test_a_budget_below_a_cell_and_weights_of_another_grid_are_refused():
 def test_the_clustering_detector_is_told_the_grid():
     with gymnasium.make("CARE-Dense-v0", sensor="os1-64", detector="cluster") as env:
         assert env.unwrapped._detector._detector._grid == sensor_setup("os1-64").grid
+
+
+@pytest.mark.parametrize("text", ["rows = " + "9" * 5000, "x = " + "[" * 5000, 'name = "a\\nb"'])
+def test_a_file_that_cannot_be_read_is_refused_in_one_line(tmp_path, text):
+    path = tmp_path / "odd.toml"
+    path.write_text(text)
+    with pytest.raises(InvalidInput, match=r"odd\.toml") as refused:
+        sensor_setup(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_zero_has_no_sign_in_the_hash():
+    plain, signed = (SensorSetup("a", position=(0.0, y, 1.0)) for y in (0.0, -0.0))
+    assert plain == signed
+    assert plain.digest == signed.digest

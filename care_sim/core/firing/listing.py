@@ -41,7 +41,7 @@ def settled(firing: str) -> str:
     Raises InvalidInput for what names no hardware.
     """
     kind, numbers = _parsed(firing)
-    return ":".join([kind.name, *(["x".join(f"{n:.12g}" for n in numbers)] if numbers else [])])
+    return ":".join([kind.name, *(["x".join(map(_text, numbers))] if numbers else [])])
 
 
 def hardware_of(firing: str, grid: AngularGrid) -> Hardware:
@@ -67,6 +67,11 @@ def _parsed(firing: str) -> tuple[type[Hardware], tuple[float, ...]]:
         return kind, tuple(type(n)(text) for n, text in zip(kind.usual, given, strict=True))
     except ValueError as error:
         raise _unknown(firing) from error
+
+
+def _text(number: float) -> str:
+    # As many decimals as may be given, and no exponent, so that the text names the same again.
+    return f"{number:.6f}".rstrip("0").rstrip(".")
 
 
 def _unknown(firing: object) -> InvalidInput:

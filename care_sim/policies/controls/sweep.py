@@ -25,7 +25,7 @@ class Sweep(Policy):
         self.reset()
 
     def reset(self) -> None:
-        """Begin straight behind."""
+        """Begin at column 0, which is straight behind on a grid that goes all round."""
         self._first = self._next = 0
 
     def remember(self, belief: Belief) -> None:

@@ -94,7 +94,7 @@ def config_of(row: Row) -> EpisodeConfig:
     if row.get("detector") is not None:
         plain["detector"] = row["detector"]
     if row.get("sensor") is not None:
-        check_shipped(row["sensor"], row["sensor_hash"])
+        check_shipped(row["sensor"], row.get("sensor_hash") or "")
         plain["sensor"] = row["sensor"]
     for kind in ("detector", "scenario", "policy"):
         plain[f"{kind}_parameters"] = _parameters(row, kind)

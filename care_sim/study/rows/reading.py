@@ -70,7 +70,8 @@ def _sensor(row: Row) -> list[tuple[str, Any]]:
     """
     if row.get("sensor") is None:
         return []
-    return [("sensor", f"{row['sensor']} {row['sensor_hash'][:6]}")]
+    digest = row.get("sensor_hash") or "of no hash"
+    return [("sensor", f"{row['sensor']} {digest[:6]}")]
 
 
 def key_of(row: Row) -> Key:

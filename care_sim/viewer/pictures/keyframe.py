@@ -152,21 +152,21 @@ def draw_grid(
     draw.text(
         (left, top + 8), f"LiDAR: cells fired in the last scan, {view}", INK, drawing.font(14)
     )
-    for share, name in _directions(grid):
+    for share, name in directions(grid):
         place = (left + share * picture.width, bottom + 4)
         anchor = {0.0: "la", 1.0: "ra"}.get(share, "ma")
         draw.text(place, name, FAINT_INK, drawing.font(13), anchor=anchor)
     _draw_legend(canvas, draw, left, bottom + 26, grid.range_m)
 
 
-def _directions(grid: AngularGrid) -> list[tuple[float, str]]:
+def directions(grid: AngularGrid) -> list[tuple[float, str]]:
     """What is named below the picture of a grid, at which share of its width."""
     # Left is left in the picture. Straight behind lies at both ends of a grid that goes all round.
     leftmost = grid.right + grid.field_of_view
     shares = [
         ((leftmost - azimuth + turn) / grid.field_of_view, name)
         for name, azimuth in _DIRECTIONS.items()
-        for turn in (0.0, 2 * np.pi)
+        for turn in (-2 * np.pi, 0.0, 2 * np.pi)
     ]
     return [(share, name) for share, name in shares if 0.0 <= share <= 1.0]
 

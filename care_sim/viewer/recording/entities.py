@@ -54,8 +54,8 @@ ENTITIES = {
         "what the camera without its faults would have given besides; pixels"
     ),
     "grid": (
-        "the angular grid as the car sees it: left is left, ahead in the middle, behind at both "
-        "ends"
+        "the angular grid as the car sees it: left is left; one that goes all round has ahead in "
+        "the middle and behind at both ends"
     ),
     "grid/cells": (
         f"share of every cell; pixel x = A - 1 - column, y = {ROW_PIXELS} * row (row 0 the highest)"

@@ -152,7 +152,7 @@ def photograph(loop: ClosedLoop) -> bytes:
 
 def outlines(sectors: Sequence[Cells], grid: AngularGrid) -> Floats:
     """(n, 4: left, top, right, bottom in pixels) boxes around angular rectangles of cells, over the
-    picture of the grid: two for one that lies across the seam behind the car, none for one without
+    picture of the grid: two for one that lies across the seam of the grid, none for one without
     cells.
     """
     boxes = [box for cells in sectors if len(cells) for box in _cell_boxes(cells, grid)]

@@ -228,6 +228,14 @@ def test_texts_that_mean_the_same_are_equal():
     assert settled("tiles") == "tiles:4x8"
     assert settled("azimuth-window:10.0") == settled("azimuth-window") == "azimuth-window:10"
     assert settled("cells") == "cells"
+
+
+@pytest.mark.parametrize("text", ["azimuth-window:0.00001", "azimuth-window:100", "segments:10"])
+def test_a_text_in_full_names_the_same_again(text):
+    assert settled(settled(text)) == settled(text) == text
+
+
+def test_conditions_with_texts_that_mean_the_same_are_equal():
     assert Conditions(firing="segments") == Conditions(firing="segments:16")
     assert replace(Rig(), firing="tiles") == Rig(firing="tiles:4x8")
 

@@ -20,6 +20,7 @@ from care_sim.viewer.pictures.keyframe import (
     PICTURE_HEIGHT,
     PICTURE_WIDTH,
     SURROUND_HEIGHT,
+    directions,
     draw_keyframe,
 )
 from care_sim.viewer.pictures.sought import DETECTED, IN_VIEW, OUT_OF_VIEW
@@ -147,3 +148,11 @@ def test_a_setting_with_another_sensor_is_drawn_within_the_picture():
     assert (picture[PANELS_TOP + 44 : -30, 376 : GRID_LEFT - 2] == background).all()
     assert (picture[PANELS_TOP + 44 : -30, GRID_LEFT + 514 :] == background).all()
     assert panel.size == (512, 508)
+
+
+@pytest.mark.parametrize("heading", [-np.pi, np.pi])
+def test_a_grid_that_looks_behind_names_every_direction(heading):
+    named = directions(AngularGrid(heading=heading))
+    assert sorted(named) == [
+        (0.0, "ahead"), (0.25, "right"), (0.5, "behind"), (0.75, "left"), (1.0, "ahead"),
+    ]  # fmt: skip
