@@ -35,15 +35,15 @@ _KNOWN = {
     "ppo-dartout": ("#661100", "*"),
     "care-sightlines": ("#000000", "d"),
     "care-spread": ("#6699CC", "H"),
-    "care-sector": ("#DDAA33", "1"),
+    "care-sector": ("#AA3377", "1"),
     "rows": ("#CC6677", "x"),
     "place": ("#44AA99", "+"),
     "place-hulls": ("#BB5566", "2"),
     "fan": ("#BBAA33", "8"),
 }
 """From the palettes of Okabe and Ito (2008) and of Tol (2021), both safe for the colour-blind. No
-two have one marker. `rows` and `place` have thin ones, since Matplotlib has too few to fill; a
-closed loop, whose figures leave markers open, plays `fan`.
+two have one marker. `rows`, `place`, `place-hulls` and `care-sector` have thin ones, since
+Matplotlib has too few to fill; a closed loop, whose figures leave markers open, plays `fan`.
 """
 _SPARE = ("#88CCEE", "#DDCC77", "#EE8866", "#AAAA00", "#77AADD")
 _GREYS = ("0.3", "0.45", "0.6")
