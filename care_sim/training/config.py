@@ -134,6 +134,12 @@ class OnPolicy(AgentConfig):
     noise: float = bounded(0.3, 1e-3, 10)
     """Standard deviation of the exploration at the start."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # Advantages are normalised, and one alone has no deviation.
+        if self.rollout * self.environments < 2:
+            raise InvalidInput("rollout needs two steps or more, or two environments, got one step")
+
 
 @dataclass(frozen=True, kw_only=True)
 class PpoConfig(OnPolicy):

@@ -209,6 +209,11 @@ def test_a_missing_library_is_named(monkeypatch):
         algorithm("recurrent-ppo")
 
 
+def test_a_rollout_of_one_step_is_refused():
+    with pytest.raises(InvalidInput, match="rollout needs two steps or more"):
+        PpoConfig(environments=1, rollout=1)
+
+
 def test_budgets_beyond_the_environments_are_refused():
     with pytest.raises(InvalidInput, match="budget needs one value to 2"):
         SacConfig(environments=2, budget=(0.1, 0.2, 0.3))

@@ -41,6 +41,7 @@ LEFT_OUT = {
     "detector_parameters": "the paper's proxy has none",
     "presence": "decides which objects are counted, nothing that is played",
     "secret": "is hashed into every stream: a street would have to be made for it",
+    "sensor": "the default alone: another set-up needs weights and maps of its own",
     "scoring_info": "decides what is told, not what is played",
     "render_mode": "pictures are no part of a trail",
     "source": "the recording is the list's own",

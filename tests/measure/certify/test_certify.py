@@ -52,7 +52,6 @@ from care_sim.world.world import World
 from tests.helpers.places import ROOT
 
 LIST = [drawn(number) for number in range(CERTIFIED_EPISODES)]
-waits = pytest.mark.xfail(strict=True, reason="the list is not published yet")
 
 
 @pytest.fixture(scope="module")
@@ -352,7 +351,6 @@ def test_a_missing_or_damaged_list_is_one_line(tmp_path):
         published.read(file)
 
 
-@waits
 def test_some_of_the_list_goes_as_published():
     """A short form of the certificate; `care-sim certify` is the whole."""
     short = [
@@ -372,7 +370,6 @@ def test_a_seed_finder_of_the_list_knows_its_episode(name):
         assert policy.found == episode.seed
 
 
-@waits
 @pytest.mark.slow
 def test_an_episode_of_a_street_goes_as_published():
     number = next(e.number for e in LIST if e.environment == STREET and e.keyframes <= 8)
@@ -380,7 +377,6 @@ def test_an_episode_of_a_street_goes_as_published():
     assert verdict.as_published, "\n".join(verdict.lines())
 
 
-@waits
 def test_the_readme_tells_the_hash_of_the_list():
     readme = (ROOT / "README.md").read_text()
     told = published.combined(published.read()[:CERTIFIED_EPISODES])

@@ -29,7 +29,6 @@ def played(folder):
     return {n: in_turns([drawn(n)], source)[0] for n in NUMBERS}
 
 
-@pytest.mark.xfail(strict=True, reason="the list is not published yet")
 @pytest.mark.slow
 def test_a_processor_of_fewer_features_plays_most_episodes_as_published(tmp_path, pytestconfig):
     """That this processor plays them as published is tested for 28 of them in `test_certify.py`;
