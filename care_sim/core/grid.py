@@ -26,7 +26,7 @@ AZIMUTH_MARGIN = 2
 """Dilation of hulls and wedges, in columns (paper, Remark 2)."""
 ELEVATION_MARGIN = 1
 """Dilation of hulls and wedges, in rows (paper, Remark 2)."""
-LEAST_VIEW = 0.01
+LEAST_VIEW = np.pi / 360
 """Radians, half a degree: the least horizontal field of view."""
 _LAST_BITS = 1e-6
 """What rounding may add to the columns of a turn."""

@@ -62,20 +62,25 @@ def test_the_default_is_what_was_mounted_before_there_was_a_choice():
 
 
 @pytest.mark.parametrize(
-    ("name", "shape", "view_deg"),
+    ("name", "shape", "view_deg", "rows_deg", "range_m", "position"),
     [
-        ("hdl-32e", (32, 512), 360),
-        ("os1-64", (64, 1024), 360),
-        ("os1-128", (128, 1024), 360),
-        ("m1-forward", (126, 600), 120),
-        ("paper-vehicle", (32, 512), 360),
+        ("hdl-32e", (32, 512), 360, (10.67, -30.67), 50, LIDAR_POSITION),
+        ("os1-64", (64, 1024), 360, (16.6, -16.6), 120, LIDAR_POSITION),
+        ("os1-128", (128, 1024), 360, (22.5, -22.5), 120, LIDAR_POSITION),
+        ("m1-forward", (126, 600), 120, (12.5, -12.5), 150, (0.6, 0.0, 1.5)),
+        ("paper-vehicle", (32, 512), 360, (10.67, -30.67), 50, LIDAR_POSITION),
     ],
 )
-def test_what_comes_with_the_package_is_as_its_data_sheet_says(name, shape, view_deg):
+def test_what_comes_with_the_package_is_as_its_data_sheet_says(
+    name, shape, view_deg, rows_deg, range_m, position
+):
     setup = sensor_setup(name)
     assert setup.name == name
     assert setup.grid.shape == shape
     assert np.rad2deg(setup.grid.field_of_view) == pytest.approx(view_deg)
+    assert np.rad2deg([setup.grid.top, setup.grid.bottom]) == pytest.approx(rows_deg)
+    assert setup.grid.range_m == range_m
+    assert setup.position == position
     assert any(line.startswith(name) for line in setup_lines())
 
 
