@@ -195,5 +195,5 @@ def _config(scenario: str, policy: str, budget: float, given: dict[str, Any]) ->
 
 
 def listed_episodes(configs: Sequence[EpisodeConfig]) -> dict[str, Any]:
-    """The configurations as plain data, each once, with the list of its seeds."""
-    return {"configurations": collected([asdict(config) for config in configs], "seed", "seeds")}
+    """What `config.json` tells of the configurations, each once, with the list of its seeds."""
+    return collected([asdict(config) for config in configs], "seed", "seeds")

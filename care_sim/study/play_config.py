@@ -189,7 +189,7 @@ def listed_plays(configs: Sequence[PlayConfig]) -> dict[str, Any]:
     plain = [_plain(config) for config in configs if config.scene == scenes[0]]
     return {
         "scenes": [scene.name for scene in scenes],
-        "configurations": collected(plain, "floor_seed", "floor_seeds"),
+        **collected(plain, "floor_seed", "floor_seeds"),
     }
 
 

@@ -209,9 +209,10 @@ def in_batches(tasks: Sequence[RunConfig]) -> list[list[RunConfig]]:
     return list(together.values())
 
 
-def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[dict[str, Any]]:
+def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> dict[str, Any]:
     """Configurations as plain data, each once, with the list of all values of an axis under its
-    plural.
+    plural. What all have alike is told once, under `common`: a study of thousands of
+    configurations else writes megabytes.
     """
     values: dict[str, list[Any]] = {}
     kept: dict[str, dict[str, Any]] = {}
@@ -220,7 +221,22 @@ def collected(plain: Sequence[dict[str, Any]], axis: str, plural: str) -> list[d
         key = json.dumps(rest)
         kept[key] = rest
         values.setdefault(key, []).append(one[axis])
-    return [{**rest, plural: values[key]} for key, rest in kept.items()]
+    common = _common(list(kept.values()))
+    listed = [
+        {**{name: value for name, value in rest.items() if name not in common}, plural: values[key]}
+        for key, rest in kept.items()
+    ]
+    return {"common": common, "configurations": listed}
+
+
+def _common(plain: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """What all of them have alike."""
+    first = plain[0]
+    return {
+        name: value
+        for name, value in first.items()
+        if all(name in one and one[name] == value for one in plain)
+    }
 
 
 def _is_pair(given: object) -> bool:

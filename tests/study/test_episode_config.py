@@ -1,6 +1,6 @@
 import pickle
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib.machinery import ModuleSpec
 
 import numpy as np
@@ -171,6 +171,27 @@ def test_full_runs_once_for_all_budgets():
         ("full", 1.0),
     ]
     assert [plain["seeds"] for plain in listed_episodes(configs)["configurations"]] == [[0, 1]] * 3
+
+
+def test_what_all_configurations_have_alike_is_told_once():
+    configs = [
+        *grid(["dense"], ["care"], (0.03, 0.1), (0, 1)),
+        *grid(["dense"], ["care"], (0.03,), (7,), camera_latency=1),
+    ]
+    told = listed_episodes(configs)
+    assert told["configurations"] == [
+        {"budget": 0.03, "camera_latency": 0, "seeds": [0, 1]},
+        {"budget": 0.1, "camera_latency": 0, "seeds": [0, 1]},
+        {"budget": 0.03, "camera_latency": 1, "seeds": [7]},
+    ]
+    again = [
+        {**told["common"], **each, "seed": seed}
+        for each in told["configurations"]
+        for seed in each["seeds"]
+    ]
+    assert [{k: v for k, v in one.items() if k != "seeds"} for one in again] == [
+        asdict(config) for config in configs
+    ]
 
 
 def test_a_parameter_may_be_one_policys_own():
