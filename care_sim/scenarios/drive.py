@@ -17,10 +17,10 @@ from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.dimensions import LANE_WIDTH_M, SPEED_LIMIT_MPS
-from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
 from care_sim.streets.drive_traffic import DrivenLane
 from care_sim.streets.encounters import COMERS, Course, Wanted
+from care_sim.streets.footprints import footprints_meet
 from care_sim.streets.hiding import AT_KERB
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.crosser import Crosser, Meeting
