@@ -56,7 +56,7 @@ class PinholeCamera:
         for metres in self.position:
             check_number("position of the camera", metres, -FARTHEST_M, FARTHEST_M)
 
-    @property
+    @cached_property
     def focal(self) -> float:
         """Focal length in pixels."""
         return float(self.width / 2 / np.tan(self.horizontal_fov / 2))

@@ -127,11 +127,12 @@ def _walking(way: Floats) -> Motion:
     shares = np.arange(between)[:, None] / between
     moved = way[:-1, None, :2] + shares * np.diff(way[:, :2], axis=0)[:, None]
     headings = np.repeat(way[:-1, 2], between)
-    poses = np.column_stack([moved.reshape(-1, 2), headings])
+    xs, ys = moved.reshape(-1, 2).T.tolist()
+    yaws = headings.tolist()
 
     def pose(time: float) -> Pose:
-        x, y, heading = poses[min(round(time / WORLD_STEP_S), len(poses) - 1)].tolist()
-        return x, y, heading
+        place = min(round(time / WORLD_STEP_S), len(yaws) - 1)
+        return xs[place], ys[place], yaws[place]
 
     return pose
 
