@@ -66,7 +66,7 @@ def _steps(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
     steps = np.empty(len(numbers), np.int64)
     for n in range(len(numbers)):
         number = np.float64(numbers[n])
-        # Floor, not round: a border lies SHIFT beside each multiple of the step. Held within bounds,
+        # Floor, not round: a border lies SHIFT beside each multiple of the step. Held in bounds,
         # so that every step is a 64-bit integer, and those beyond are left for infinity and NaN.
         if math.isfinite(number):
             step = math.floor(min(max(number / STEP + SHIFT, -_LARGEST), _LARGEST))
