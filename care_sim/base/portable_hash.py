@@ -6,8 +6,12 @@ a matrix product. What is hashed as raw bits therefore moves with the machine al
 happened.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from care_sim.base.compiled import compiled
 
 STEP = 1e-4
 """Metres, radians, metres per second: what measured numbers are rounded to. A whole episode
@@ -50,13 +54,25 @@ def _bytes_of(part: object) -> bytes:
 
 def _rounded(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
     """The step that each number lies in."""
-    # Floor, not round: a border lies SHIFT beside each multiple of the step. Clipped, so that every
-    # step is a 64-bit integer, and those beyond are left for infinity and NaN.
-    steps = np.floor(np.clip(numbers.astype(np.float64) / STEP + SHIFT, -_LARGEST, _LARGEST))
-    finite = np.isfinite(numbers)
-    # As the scans of all episodes are: 16,384 cells a keyframe.
-    if finite.all():
-        return steps.astype(np.int64)
-    counted = np.where(finite, steps, 0.0).astype(np.int64)
-    infinite = np.where(np.isinf(numbers), np.where(numbers > 0, _INFINITE, -_INFINITE), counted)
-    return np.where(np.isnan(numbers), _NONE, infinite)
+    # Compiled for the two kinds of floats that arrays come in; any other is taken as the wider one.
+    is_single = numbers.dtype == np.float32
+    table = np.ascontiguousarray(numbers, np.float32 if is_single else np.float64)
+    return np.asarray(_steps(table.reshape(-1)).reshape(numbers.shape))
+
+
+@compiled()
+def _steps(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
+    """(n,) the steps of numbers (n,)."""
+    steps = np.empty(len(numbers), np.int64)
+    for n in range(len(numbers)):
+        number = np.float64(numbers[n])
+        # Floor, not round: a border lies SHIFT beside each multiple of the step. Held in bounds,
+        # so that every step is a 64-bit integer, and those beyond are left for infinity and NaN.
+        if math.isfinite(number):
+            step = math.floor(min(max(number / STEP + SHIFT, -_LARGEST), _LARGEST))
+        elif math.isnan(number):
+            step = _NONE
+        else:
+            step = _INFINITE if number > 0 else -_INFINITE
+        steps[n] = step
+    return steps

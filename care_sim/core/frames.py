@@ -21,12 +21,28 @@ def turned(vectors: Floats, yaw: float | Floats) -> Floats:
     """Vectors (..., k) turned by `yaw` radians about z: one angle, or one each. x and y come first;
     the other numbers stay as they are.
     """
-    # Written out: a matrix product may round differently from one processor to the next.
+    # Written out: a matrix product may round differently from one processor to the next. The sines
+    # and cosines are NumPy's, also where compiled code takes them.
     cos, sin = np.cos(yaw), np.sin(yaw)
+    if not isinstance(yaw, np.ndarray):
+        table = np.ascontiguousarray(vectors, dtype=float)
+        turn = float(cos), float(sin)
+        return _turned_alike(table.reshape(-1, table.shape[-1]), turn).reshape(table.shape)
     result: Floats = np.array(vectors, dtype=float)
     x, y = vectors[..., 0], vectors[..., 1]
     result[..., 0] = cos * x - sin * y
     result[..., 1] = sin * x + cos * y
+    return result
+
+
+@compiled()
+def _turned_alike(vectors: Floats, turn: tuple[float, float]) -> Floats:
+    """Vectors (n, k) turned by the angle with this cosine and sine; see `turned`."""
+    result = vectors.copy()
+    cos, sin = turn
+    for one in result:
+        x, y = one[0], one[1]
+        one[0], one[1] = cos * x - sin * y, sin * x + cos * y
     return result
 
 

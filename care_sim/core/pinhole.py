@@ -56,7 +56,7 @@ class PinholeCamera:
         for metres in self.position:
             check_number("position of the camera", metres, -FARTHEST_M, FARTHEST_M)
 
-    @property
+    @cached_property
     def focal(self) -> float:
         """Focal length in pixels."""
         return float(self.width / 2 / np.tan(self.horizontal_fov / 2))
@@ -78,8 +78,13 @@ class PinholeCamera:
         """World position (3,) of the camera on a sensor at the frame `sensor`, and (3, 3) its axes
         in the world: rows are forward, left and up.
         """
-        position = sensor.origin + sensor.vectors_to_world(np.array(self.position))
-        return position, sensor.vectors_to_world(self.axes)
+        position, *axes = sensor.vectors_to_world(self._mounting)
+        return sensor.origin + position, np.array(axes)
+
+    @cached_property
+    def _mounting(self) -> Floats:
+        """(4, 3) position and axes in the sensor frame."""
+        return np.vstack([self.position, self.axes])
 
     def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Pixels (..., 2) and depths (...) of sensor-frame points (..., 3).
@@ -112,6 +117,16 @@ class PinholeCamera:
         cut there.
         """
         return kernels.box_spans(np.ascontiguousarray(boxes, dtype=float), self._model, NEAR_M)
+
+    def window_on(self, boxes: Floats) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom in whole pixels: the rectangle of the picture that holds 3D
+        boxes (n, 7), with a pixel more on each side; all 0 when none is in view.
+        """
+        boxes = np.ascontiguousarray(boxes, dtype=float)
+        window: tuple[int, int, int, int] = kernels.window_on(
+            boxes, self._model, NEAR_M, self.width, self.height
+        )
+        return window
 
     @cached_property
     def _model(self) -> CameraModel:

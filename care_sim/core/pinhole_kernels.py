@@ -113,6 +113,20 @@ def box_spans(boxes: Floats, camera: CameraModel, nearest: float) -> Floats:
 
 
 @compiled()
+def window_on(
+    boxes: Floats, camera: CameraModel, nearest: float, width: int, height: int
+) -> tuple[int, int, int, int]:
+    """`window_around` what 3D boxes (n, 7) span; see `box_spans`."""
+    kept = np.empty(boxes.shape)
+    count = 0
+    for n in range(len(boxes)):
+        if not _is_beside(boxes[n], camera):
+            kept[count] = boxes[n]
+            count += 1
+    return window_around(box_spans(kept[:count], camera, nearest), width, height)
+
+
+@compiled()
 def window_around(spans: Floats, width: int, height: int) -> tuple[int, int, int, int]:
     """Left, top, right, bottom: the whole pixels of a picture that hold `spans` (n, 4), and one
     more on each side. Spans of NaN are left out, and all 0 is a window that holds nothing.
@@ -183,6 +197,22 @@ def _is_behind(box: Floats, camera: CameraModel, depth: float) -> bool:
     radius = math.sqrt(box[3] ** 2 + box[4] ** 2 + box[5] ** 2) / 2
     # A millimetre is room for rounding.
     return _along(camera.axes[0], x, y, z) + radius + 0.001 < depth
+
+
+@compiled()
+def _is_beside(box: Floats, camera: CameraModel) -> bool:
+    """Whether the ball that holds a box (7,) lies wholly to one side of all that the picture and
+    two columns more on either side show.
+    """
+    place = camera.position
+    x, y, z = box[0] - place[0], box[1] - place[1], box[2] - place[2]
+    ahead, left = _along(camera.axes[0], x, y, z), _along(camera.axes[1], x, y, z)
+    # The plane through the camera and a column `off` from the principal point is
+    # left * focal = off * ahead. A millimetre is room for rounding.
+    off = camera.centre[0] + 2.0
+    radius = math.sqrt(box[3] ** 2 + box[4] ** 2 + box[5] ** 2) / 2 + 0.001
+    beyond = abs(left) * camera.focal - off * ahead
+    return bool(beyond > radius * math.hypot(camera.focal, off))
 
 
 @compiled()

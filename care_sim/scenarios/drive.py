@@ -17,10 +17,10 @@ from care_sim.core.frames import Pose
 from care_sim.scenarios.base import LONGEST_EPISODE_S, Scenario
 from care_sim.sensors.surround import SURROUND_CAMERAS
 from care_sim.streets.dimensions import LANE_WIDTH_M, SPEED_LIMIT_MPS
-from care_sim.streets.draft import footprints_meet
 from care_sim.streets.drive import SAMPLE_S, TURN_CHANCE, Drive, draw_drive
 from care_sim.streets.drive_traffic import DrivenLane
 from care_sim.streets.encounters import COMERS, Course, Wanted
+from care_sim.streets.footprints import footprints_meet
 from care_sim.streets.hiding import AT_KERB
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.crosser import Crosser, Meeting
@@ -127,11 +127,12 @@ def _walking(way: Floats) -> Motion:
     shares = np.arange(between)[:, None] / between
     moved = way[:-1, None, :2] + shares * np.diff(way[:, :2], axis=0)[:, None]
     headings = np.repeat(way[:-1, 2], between)
-    poses = np.column_stack([moved.reshape(-1, 2), headings])
+    xs, ys = moved.reshape(-1, 2).T.tolist()
+    yaws = headings.tolist()
 
     def pose(time: float) -> Pose:
-        x, y, heading = poses[min(round(time / WORLD_STEP_S), len(poses) - 1)].tolist()
-        return x, y, heading
+        place = min(round(time / WORLD_STEP_S), len(yaws) - 1)
+        return xs[place], ys[place], yaws[place]
 
     return pose
 

@@ -9,7 +9,6 @@ import numpy as np
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.conditions import Sensing
 from care_sim.core.pinhole import PinholeCamera
-from care_sim.core.pinhole_kernels import window_around
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
@@ -31,8 +30,7 @@ def window_on(camera: PinholeCamera, boxes: Floats) -> PixelWindow:
     """The rectangle of the picture that holds every sensor-frame box (n, 7); empty when none is in
     view.
     """
-    held: PixelWindow = window_around(camera.project_boxes(boxes), camera.width, camera.height)
-    return held
+    return camera.window_on(boxes)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Curve:
         turn = self.curvature * along
         # The chord of a circle's arc, 2 R sin(turn / 2) with the radius R = along / turn. NumPy's
         # sinc(x) is sin(pi x) / (pi x) and 1 at 0, where the road is straight and R infinite.
-        chord = along * np.sinc(turn / (2 * np.pi))
+        chord = along * np.sinc(turn / (2 * np.pi)) if self.curvature else along
         before = np.minimum(s, self.bend_at)
         after = np.maximum(s - self.bend_at - self.bend_length, 0.0)
         # Three parts, one after the other: the straight before lies along x, the chord at half the

@@ -4,7 +4,8 @@ more.
 
 import numpy as np
 
-from care_sim.core.arrays import Floats, Mask
+from care_sim.core.arrays import Floats
+from care_sim.streets.footprints import Footprint, meets_any, way_bounds
 from care_sim.world.bodies import CATALOGUE
 
 STEP_S = 0.1
@@ -17,37 +18,6 @@ KEYFRAMES = 40
 TIMES: Floats = STEP_S * np.arange(round(KEYFRAMES * STREET_KEYFRAME_S / STEP_S), dtype=np.float64)
 """(t,) seconds at which ways are sampled."""
 
-Footprint = tuple[float, float]
-"""Length and width in metres."""
-
-
-def footprints_meet(
-    poses: Floats, size: Floats, others: Floats, other_sizes: Floats, gap: Floats
-) -> Mask:
-    """(n,) whether rectangles come closer than `gap` (n,) along every axis (separating axis
-    theorem).
-
-    `poses` (n, 3) and `others` (n, 3) are x, y, heading; `size` and `other_sizes` (n, 2) length and
-    width.
-    """
-    # Rectangles are apart if they are so along the direction of some side of either.
-    meet = np.ones(len(poses), dtype=bool)
-    for angle in (poses[:, 2], poses[:, 2] + np.pi / 2, others[:, 2], others[:, 2] + np.pi / 2):
-        apart = np.abs(
-            (others[:, 0] - poses[:, 0]) * np.cos(angle)
-            + (others[:, 1] - poses[:, 1]) * np.sin(angle)
-        )
-        meet &= apart < _reach(poses, size, angle) + _reach(others, other_sizes, angle) + gap
-        if not meet.any():
-            break
-    return meet
-
-
-def _reach(poses: Floats, sizes: Floats, angle: Floats) -> Floats:
-    """(n,) half the extent of rectangles along directions `angle` (n,)."""
-    turn = angle - poses[:, 2]
-    return np.asarray(np.abs(np.cos(turn)) * sizes[:, 0] + np.abs(np.sin(turn)) * sizes[:, 1]) / 2
-
 
 class PlacedBodies:
     """Footprints with their ways, a row each in tables that grow. A way is (1, 3) for what stands,
@@ -59,46 +29,20 @@ class PlacedBodies:
         self._bounds: Floats = np.empty((0, 4))
         self._sizes: Floats = np.empty((0, 2))
         self._berths: Floats = np.empty(0)
-        self._reaches: Floats = np.empty(0)
 
     def add(self, way: Floats, size: Footprint, berth: float) -> None:
         """One more footprint, which others pass at `berth` metres or more."""
         ways = self._ways if len(self._ways) else np.empty((0, *way.shape))
         self._ways = np.concatenate([ways, way[None]])
-        self._bounds = np.vstack([self._bounds, _bounds(way)])
+        self._bounds = np.vstack([self._bounds, way_bounds(way)])
         self._sizes = np.vstack([self._sizes, size])
         self._berths = np.append(self._berths, berth)
-        # Rectangles that touch have centres no farther apart than half of both diagonals. The exact
-        # test moves every side out by the berth, and a corner then moves by sqrt(2) berths at most,
-        # at a right angle.
-        self._reaches = np.append(self._reaches, np.hypot(*size) / 2 + np.sqrt(2) * berth)
 
     def meets(self, way: Floats, size: Footprint) -> bool:
         """Whether a footprint on `way` (1, 3) or (t, 3) ever comes closer to one of these than its
         berth, along every axis.
         """
-        # First by what holds the whole ways, then by centres: that leaves few pairs for the exact
-        # test.
-        reaches = self._reaches + np.hypot(*size) / 2
-        bounds = _bounds(way)
-        gaps = np.maximum(self._bounds[:, :2] - bounds[2:], bounds[:2] - self._bounds[:, 2:])
-        (near,) = np.nonzero((gaps < reaches[:, None]).all(axis=1))
-        places = self._ways[near]  # (n, 1 or t, 3)
-        apart = np.hypot(places[..., 0] - way[:, 0], places[..., 1] - way[:, 1])
-        who, when = np.nonzero(apart < reaches[near, None])
-        if not len(who):
-            return False
-        # What stands has one pose, which holds at every time.
-        mine = way[when if len(way) > 1 else np.zeros_like(when)]
-        theirs = places[who, when if places.shape[1] > 1 else np.zeros_like(when)]
-        sizes, berths = self._sizes[near[who]], self._berths[near[who]]
-        own = np.broadcast_to(size, sizes.shape)
-        return bool(footprints_meet(mine, own, theirs, sizes, berths).any())
-
-
-def _bounds(way: Floats) -> Floats:
-    """(4,) least x and y, then greatest x and y, of the centres on a way (t, 3)."""
-    return np.concatenate([way[:, :2].min(axis=0), way[:, :2].max(axis=0)])
+        return bool(meets_any(way, size, self._ways, self._bounds, self._sizes, self._berths))
 
 
 TOUCH_M = 0.01

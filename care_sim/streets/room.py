@@ -6,8 +6,9 @@ import numpy as np
 
 from care_sim.core.arrays import Floats
 from care_sim.streets.curve import Curve
-from care_sim.streets.draft import Draft, Footprint, PlacedBodies
+from care_sim.streets.draft import Draft, PlacedBodies
 from care_sim.streets.encounters import Encounter
+from care_sim.streets.footprints import Footprint
 from care_sim.streets.furniture import Span
 from care_sim.streets.layouts import Joining, Plan
 from care_sim.world.bodies import CATALOGUE

@@ -5,10 +5,12 @@ The model (Treiber, Hennecke and Helbing 2000) and its numbers are those of high
 motion is the same, and a whole street costs less than one vehicle there.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats
 
 _MOST_MPS2 = 6.0
@@ -44,21 +46,37 @@ class LaneFlow:
 
     def _accelerations(self, others: Sequence[tuple[float, float]]) -> Floats:
         """(n,) m/s^2."""
-        free: Floats = 1 - (self.speeds / self._wanted) ** _EXPONENT
-        # Who drives ahead of each: the nearest of all whose place is greater.
-        places = np.append(self.places, [place for place, _ in others])
-        speeds = np.append(self.speeds, [speed for _, speed in others])
-        gaps = places - self.places[:, None]  # (n, n + others)
-        gaps[gaps <= 0] = np.inf
-        if not gaps.size:
-            return free
-        leads = np.argmin(gaps, axis=1)
-        gap = gaps[np.arange(len(gaps)), leads]
-        closing = self.speeds * (self.speeds - speeds[leads])
+        # The power is NumPy's, as compiled code may round it differently.
+        free = 1 - (self.speeds / self._wanted) ** _EXPONENT
+        ahead = np.array(others, float).reshape(-1, 2)
+        return np.asarray(_following(free, self.places, self.speeds, ahead))
+
+
+@compiled(error_model="numpy")
+def _following(free: Floats, places: Floats, speeds: Floats, others: Floats) -> Floats:
+    """(n,) the accelerations of drivers at `places` with `speeds`, who follow each other and
+    `others` (m, 2), places and speeds. `free` are the shares of their acceleration that each would
+    take on a free road.
+    """
+    accelerations = np.empty(len(places))
+    for n in range(len(places)):
+        # Who drives ahead: the nearest of all whose place is greater, of equally near ones the
+        # first.
+        gap, lead_mps = math.inf, 0.0
+        for other in range(len(places)):
+            apart = places[other] - places[n]
+            if 0.0 < apart < gap:
+                gap, lead_mps = apart, speeds[other]
+        for other in range(len(others)):
+            apart = others[other, 0] - places[n]
+            if 0.0 < apart < gap:
+                gap, lead_mps = apart, others[other, 1]
+        closing = speeds[n] * (speeds[n] - lead_mps)
         wished = (
             STANDING_GAP_M
-            + self.speeds * _TIME_GAP_S
-            + closing / (2 * np.sqrt(_GAINING_MPS2 * _BRAKING_MPS2))
+            + speeds[n] * _TIME_GAP_S
+            + closing / (2 * math.sqrt(_GAINING_MPS2 * _BRAKING_MPS2))
         )
-        wanted: Floats = _GAINING_MPS2 * (free - (wished / gap) ** 2)
-        return np.clip(wanted, -_MOST_MPS2, _MOST_MPS2)
+        wanted = _GAINING_MPS2 * (free[n] - (wished / gap) ** 2)
+        accelerations[n] = min(max(wanted, -_MOST_MPS2), _MOST_MPS2)
+    return accelerations

@@ -133,7 +133,9 @@ def _chord(along: Floats | float, curvature: Floats | float) -> tuple[Floats, Fl
 
 
 def _after(start: Pose, along: float, curvature: float) -> Pose:
-    x, y = turned(np.array(_chord(along, curvature), float), start[2])
+    # On a straight, by far the most frequent, the chord is the way itself.
+    chord = _chord(along, curvature) if curvature else (along, 0.0)
+    x, y = turned(np.array(chord, float), start[2])
     return start[0] + float(x), start[1] + float(y), start[2] + curvature * along
 
 

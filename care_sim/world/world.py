@@ -107,6 +107,7 @@ class World:
         self.meetings = []
         self.drawn = {}
         self._moving: list[Actor] = []
+        self._moving_bodies = [self.ego_body]
         self._events: list[tuple[float, Callable[[], None]]] = []
         self._every_step: list[Callable[[World], None]] = []
         self._ego_motion = Ego(ego_speed)
@@ -140,6 +141,7 @@ class World:
         self.actors.append(actor)
         if not isinstance(pose, tuple):
             self._moving.append(actor)
+            self._moving_bodies.append(body)
         return actor
 
     def at(self, time: float, event: Callable[[], None]) -> None:
@@ -221,7 +223,7 @@ class World:
         )
 
         # Poses are read after events, which may change who moves.
-        bodies = np.array([self.ego_body, *(actor.body for actor in self._moving)])
+        bodies = np.array(self._moving_bodies)
         poses = np.array([self.ego.pose, *(actor.pose_at(self.time) for actor in self._moving)])
         self._before = self._footprints.boxes[:, :2].copy()
         self.bullet.move_all(bodies, poses)

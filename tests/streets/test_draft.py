@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_sim.streets.draft import TIMES, Draft, PlacedBodies, footprints_meet
+from care_sim.streets.draft import TIMES, Draft, PlacedBodies
+from care_sim.streets.footprints import footprints_meet
 
 SQUARE = np.array([[2.0, 2.0]])
 

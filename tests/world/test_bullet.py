@@ -13,6 +13,8 @@ FORWARD = np.array([[1.0, 0.0, 0.0]])
 BLOCK = CATALOGUE["trailer"]
 NEAR_SIDE = 20.0 - BLOCK.size[1] / 2
 """Distance of a trailer that stands across the road 20 m away."""
+QUARTERS = [(20.0, 0.0), (0.0, 20.0), (-20.0, 0.0), (0.0, -20.0)]
+"""Ahead, left, behind and right, 20 m away."""
 
 
 def test_a_box_at_a_known_distance(bullet):
@@ -95,6 +97,29 @@ def test_clearance_between_two_bodies_leaves_a_third_one_to_be_told_of(bullet):
     bullet.move(third, (10.0, 0.0, np.pi / 2))
     assert bullet.clearance(near, far) == pytest.approx(10.0 - BLOCK.size[1], abs=1e-3)
     assert bullet.cast([0.0, 0.0, 1.0], FORWARD, 50.0)[1].tolist() == [third]
+
+
+def test_bodies_keep_their_ids_in_whatever_order_they_are_asked_about(bullet):
+    """Two of four are asked about first, the later before the earlier. Each stands alone in a
+    direction of its own.
+    """
+    bodies = [bullet.add(CATALOGUE["car"], (x, y, 0.0)) for x, y in QUARTERS]
+    assert bullet.clearance(bodies[3], bodies[1]) == pytest.approx(40.0 - 1.95, abs=1e-3)
+    rays = np.array([[x, y, 0.0] for x, y in QUARTERS]) / 20.0
+    assert bullet.cast([0.0, 0.0, 0.5], rays, 50.0)[1].tolist() == bodies
+    for body, (x, y) in zip(bodies, QUARTERS, strict=True):
+        picture = bullet.body_ids(FRONT_CAMERA, Frame(0.0, 0.0, 1.84, np.arctan2(y, x)))
+        assert set(picture.ravel().tolist()) == {NO_BODY, body}
+    late = bullet.add(CATALOGUE["bus"], (10.0, 0.0, 0.0))
+    assert bullet.cast([0.0, 0.0, 0.5], rays, 50.0)[1].tolist() == [late, *bodies[1:]]
+
+
+@pytest.mark.parametrize("ground", [True, False])
+def test_ids_count_from_the_ground_on(ground):
+    world = BulletWorld(ground)
+    bodies = [world.add(CATALOGUE["car"], (10.0 * n, 0.0, 0.0)) for n in range(3)]
+    assert bodies == [ground + n for n in range(3)]
+    world.close()
 
 
 def test_moving_all_is_moving_each(bullet):

@@ -14,8 +14,11 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.sensors.engines.geometry_kernels import body_axes, dot
+from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, dot
 from care_sim.world.bullet import NO_BODY, PixelWindow
+
+ROUNDING_PX = 0.1
+"""Room for rounding around the corners of a polyhedron in a picture: pixels."""
 
 
 class PlacedCamera(NamedTuple):
@@ -50,10 +53,10 @@ class Meshes(NamedTuple):
 
 
 class BodyInCamera(NamedTuple):
-    """From the frame of a body to that of a camera: first `turn` (3, 3), then `shift` (3,)."""
+    """From the frame of a body to that of a camera: first `turn`, row by row, then `shift`."""
 
-    turn: Floats
-    shift: Floats
+    turn: Axes
+    shift: Vector
 
 
 @compiled(error_model="numpy")
@@ -81,9 +84,10 @@ def render_bodies(
     nearest, farthest = depths
     ids = np.full((bottom - top, right - left), NO_BODY)
     inverse_depths = np.full(ids.shape, 1.0 / farthest)
+    surfaces = np.empty(right - left)
 
     # Part after part into one depth buffer. Whether the ball that holds it meets the view comes
-    # first, then its rows in the picture: a part above or below the window costs no more than its
+    # first, then its rectangle in the picture: a part beside the window costs no more than its
     # corners.
     view = nearest, farthest, left, right
     greatest = 1.0 / nearest
@@ -92,9 +96,9 @@ def render_bodies(
             continue
         begin, end = table.starts[part], table.starts[part + 1]
         body = _seen_from(eye, poses[owner])
-        upper, lower = _rows(table.corners[begin[0] : end[0]], body, optics, nearest)
-        upper, lower = max(upper, top), min(lower, bottom)
-        if upper >= lower:
+        held = _rectangle(table.corners[begin[0] : end[0]], body, optics, nearest)
+        upper, lower = max(held[1], top), min(held[3], bottom)
+        if upper >= lower or max(held[0], left) >= min(held[2], right):
             continue
 
         # The depth test: what is nearer than all before it, at an inverse depth within the bounds,
@@ -103,13 +107,16 @@ def render_bodies(
         towards, outline = _outline(planes, table.edges[begin[2] : end[2]])
         for row in range(upper, lower):
             first, last = _span(outline, row + 1.0, left, right)
+            if first >= last:
+                continue
+            surface = surfaces[first - left : last - left]
+            _lay_surface(towards, first, row + 1.0, surface)
             depth = inverse_depths[row - top, first - left : last - left]
             line = ids[row - top, first - left : last - left]
             for n in range(len(line)):
-                inverse = _surface(towards, first + n, row + 1.0)
-                if depth[n] <= inverse <= greatest:
-                    depth[n] = inverse
-                    line[n] = owner
+                is_seen = depth[n] <= surface[n] <= greatest
+                depth[n] = surface[n] if is_seen else depth[n]
+                line[n] = owner if is_seen else line[n]
     return ids
 
 
@@ -143,46 +150,61 @@ def _is_outside(
 def _seen_from(camera: PlacedCamera, pose: Floats) -> BodyInCamera:
     """A body at `pose` (7,) as the camera sees it."""
     place = camera.place
-    axes = camera.axes
     body = body_axes(pose[3], pose[4], pose[5], pose[6])
+    away = pose[0] - place[0], pose[1] - place[1], pose[2] - place[2]
     # A point p of the body lies at position + body . p in the world. Told along the axes of the
     # camera, from its place, that is turn . p + shift.
-    turn = np.empty((3, 3))
-    shift = np.empty(3)
-    for i in range(3):
-        shift[i] = dot(axes[i], (pose[0] - place[0], pose[1] - place[1], pose[2] - place[2]))
-        for j in range(3):
-            turn[i, j] = dot(axes[i], body[j])
-    return BodyInCamera(turn, shift)
+    ahead, left, up = _row(camera.axes, 0), _row(camera.axes, 1), _row(camera.axes, 2)
+    turn = _along_each(ahead, body), _along_each(left, body), _along_each(up, body)
+    return BodyInCamera(turn, _along_each(away, (ahead, left, up)))
 
 
 @compiled()
-def _rows(corners: Floats, body: BodyInCamera, lens: Lens, nearest: float) -> tuple[int, int]:
-    """First row of a polyhedron and the one after its last; all rows when it reaches through the
-    plane at the depth `nearest`.
+def _along_each(vector: Vector, axes: Axes) -> Vector:
+    """The parts of a vector along three axes."""
+    return dot(axes[0], vector), dot(axes[1], vector), dot(axes[2], vector)
+
+
+@compiled()
+def _row(table: Floats, n: int) -> Vector:
+    """The first three numbers of a row. Numbers at hand: a view on an array counts references."""
+    return table[n, 0], table[n, 1], table[n, 2]
+
+
+@compiled()
+def _rectangle(corners: Floats, body: BodyInCamera, lens: Lens, nearest: float) -> PixelWindow:
+    """The columns and rows of a polyhedron in the picture, as a window that ends before its right
+    and bottom; the whole picture when it reaches through the plane at the depth `nearest`.
     """
     # The picture of a convex body before the camera is bounded by those of its corners.
     turn = body.turn
     shift = body.shift
-    high, low = math.inf, -math.inf
+    least_u, most_u, least_v, most_v = math.inf, -math.inf, math.inf, -math.inf
     behind = 0
-    for corner in corners:
+    for n in range(len(corners)):
+        corner = _row(corners, n)
         depth = shift[0] + dot(turn[0], corner)
         if depth < nearest:
             behind += 1
         else:
-            v = lens.down - lens.focal * (shift[2] + dot(turn[2], corner)) / depth
-            high, low = min(high, v), max(low, v)
+            scale = lens.focal / depth
+            u = lens.across - scale * (shift[1] + dot(turn[1], corner))
+            v = lens.down - scale * (shift[2] + dot(turn[2], corner))
+            least_u, most_u = min(least_u, u), max(most_u, u)
+            least_v, most_v = min(least_v, v), max(most_v, v)
 
-    # The picture is as high as twice the principal point is down. Row j is sampled at v = j + 1, so
-    # the rows wanted are those from high - 1 to low - 1. One too many at either end does no harm:
-    # the outline leaves it empty.
+    # The picture is as wide and as high as twice the principal point lies across and down. Column i
+    # is sampled at u = i and row j at v = j + 1: many a thin body far away lies between two of
+    # them.
+    width, height = 2 * lens.across, 2 * lens.down
     if behind == len(corners):
-        return 0, 0
+        return 0, 0, 0, 0
     if behind > 0:
-        return 0, math.ceil(2 * lens.down)
-    first = math.floor(min(max(high, 0.0), 2 * lens.down)) - 1
-    return first, math.ceil(max(min(low, 2 * lens.down), 0.0))
+        return 0, 0, math.ceil(width), math.ceil(height)
+    first = math.ceil(min(max(least_u, 0.0), width) - ROUNDING_PX)
+    upper = math.ceil(min(max(least_v, 0.0), height) - 1.0 - ROUNDING_PX)
+    last = math.floor(max(min(most_u, width), 0.0) + ROUNDING_PX) + 1
+    return first, upper, last, math.floor(max(min(most_v, height), 0.0) - 1.0 + ROUNDING_PX) + 1
 
 
 @compiled(error_model="numpy")
@@ -196,14 +218,13 @@ def _planes(faces: Floats, body: BodyInCamera, lens: Lens) -> Floats:
     turn = body.turn
     shift = body.shift
     planes = np.empty((len(faces), 4))
-    for n, face in enumerate(faces):
+    for n in range(len(faces)):
         # A point p of the body is q = turn . p + shift in the camera's frame. The plane n . p = d
         # of the body becomes n' . q = h there, with the normal n' = turn . n, here its parts
         # (ahead, left, up), and h = d + n' . shift, here `offset`.
-        ahead = dot(turn[0], face)
-        left = dot(turn[1], face)
-        up = dot(turn[2], face)
-        offset = face[3] + ahead * shift[0] + left * shift[1] + up * shift[2]
+        normal = _row(faces, n)
+        ahead, left, up = dot(turn[0], normal), dot(turn[1], normal), dot(turn[2], normal)
+        offset = faces[n, 3] + ahead * shift[0] + left * shift[1] + up * shift[2]
 
         # The ray of pixel (u, v) at the depth z is q = z * (1, (across - u) / focal,
         # (down - v) / focal). Put into n' . q = h and solved for 1 / z:
@@ -254,7 +275,8 @@ def _span(outline: Floats, v: float, left: int, right: int) -> tuple[int, int]:
     # In one row each line of the outline leaves a half of the columns, from -here / slope on or up
     # to there, or all, or none. What is inside of every one is a stretch.
     first, last = float(left), right - 1.0
-    for slope, rise, start in outline:
+    for n in range(len(outline)):
+        slope, rise, start = _row(outline, n)
         here = start + rise * v
         if slope > 0.0:
             first = max(first, -here / slope)
@@ -266,11 +288,15 @@ def _span(outline: Floats, v: float, left: int, right: int) -> tuple[int, int]:
 
 
 @compiled()
-def _surface(towards: Floats, u: float, v: float) -> float:
-    """The inverse depth of a polyhedron at a pixel inside its outline."""
+def _lay_surface(towards: Floats, first: int, v: float, surface: Floats) -> None:
+    """Fill `surface` (n,) with the inverse depths of a polyhedron in the row at `v`, from the
+    column `first` on, at pixels inside its outline.
+    """
     # A ray is inside a convex body once it has passed all planes that face the camera. The farthest
-    # of them has the least inverse depth.
-    inverse = math.inf
-    for n in range(len(towards)):
-        inverse = min(inverse, towards[n, 2] + towards[n, 0] * u + towards[n, 1] * v)
-    return inverse
+    # of them has the least inverse depth. Face by face: so the processor takes several pixels at a
+    # time.
+    surface[:] = math.inf
+    for face in range(len(towards)):
+        across, down, start = _row(towards, face)
+        for n in range(len(surface)):
+            surface[n] = min(surface[n], start + across * (first + n) + down * v)

@@ -80,7 +80,7 @@ def cast_rays(
     x, y, z, yaw, roll, pitch = sensor
     pose = SensorPose(x, y, z, yaw, roll, pitch)
     grid = GridSpacing(*spacing)
-    placed = place_parts(pose, solids, poses, grid)
+    placed = place_parts(pose, solids, poses, grid, reach)
 
     # The road first, then part after part: what is nearer takes the ray. So no list of hits is
     # sorted, and the order of parts matters only where two are equally far.
@@ -89,6 +89,8 @@ def cast_rays(
     ranges, ids = _road_hits(cells, starts, rays, reach, RoadPlane(placed.up, z, ground))
 
     for part, (first, last, upper, lower) in enumerate(placed.windows):
+        if upper > lower:
+            continue
         solid = _solid(part, solids, placed.centres, placed.axes)
         for row in range(upper, lower + 1):
             # The fired cells of this row that lie in the window. A window that runs over a turn has

@@ -12,10 +12,12 @@ import numpy as np
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.grid_kernels import GridSpacing, row_at
-from care_sim.sensors.engines.geometry_kernels import Axes, body_axes, dot
+from care_sim.sensors.engines.geometry_kernels import Axes, Vector, body_axes, dot
 
 WINDOW_MARGIN = 1
 """Cells around a window, against rounding."""
+NO_CELLS = (0, 0, 0, -1)
+"""The window of a part that covers none."""
 
 
 class SensorPose(NamedTuple):
@@ -47,7 +49,8 @@ class PlacedParts(NamedTuple):
     angular rectangle of the box that holds each part.
 
     The first column lies within a turn, the last up to a turn beyond it. The first row lies below
-    the last where a part covers none. `up` (3,) is the world's up.
+    the last where a part covers none; of such a part nothing else need be told. `up` (3,) is the
+    world's up.
     """
 
     centres: Floats
@@ -57,16 +60,25 @@ class PlacedParts(NamedTuple):
 
 
 @compiled()
-def place_parts(sensor: SensorPose, parts: Parts, poses: Floats, grid: GridSpacing) -> PlacedParts:
-    """The parts of bodies at `poses` (m, 7: x, y, z, quaternion x, y, z, w), by body id."""
+def place_parts(
+    sensor: SensorPose, parts: Parts, poses: Floats, grid: GridSpacing, reach: float
+) -> PlacedParts:
+    """The parts of bodies at `poses` (m, 7: x, y, z, quaternion x, y, z, w), by body id. A part
+    wholly beyond the `reach` of a ray, metres, covers no cell.
+    """
     # Told along the axes of the sensor, a vector is three scalar products with them.
     centres = np.empty((len(parts.owners), 3))
     axes = np.empty((len(parts.owners), 3, 3))
+    windows = np.empty((len(parts.owners), 4), np.int64)
+    corners = np.empty((8, 3))
     sensor_axes = _sensor_axes(sensor.yaw, sensor.roll, sensor.pitch)
     for part, owner in enumerate(parts.owners):
         pose = poses[owner]
-        body = body_axes(pose[3], pose[4], pose[5], pose[6])
         away = (pose[0] - sensor.x, pose[1] - sensor.y, pose[2] - sensor.z)
+        if _is_beyond(away, parts.offsets[part], parts.halves[part], reach):
+            windows[part] = NO_CELLS
+            continue
+        body = body_axes(pose[3], pose[4], pose[5], pose[6])
         # Into the frame of the sensor: the origin of the body first, then the part's offset along
         # the axes of the body.
         for j, axis in enumerate(sensor_axes):
@@ -74,29 +86,37 @@ def place_parts(sensor: SensorPose, parts: Parts, poses: Floats, grid: GridSpaci
             for i in range(3):
                 axes[part, i, j] = dot(axis, body[i])
                 centres[part, j] += parts.offsets[part, i] * axes[part, i, j]
+        _lay_corners(centres[part], axes[part], parts.halves[part], corners)
+        windows[part] = _window(centres[part], corners, grid)
 
     up = np.array((sensor_axes[0][2], sensor_axes[1][2], sensor_axes[2][2]))
-    return PlacedParts(centres, axes, _windows(centres, axes, parts.halves, grid), up)
+    return PlacedParts(centres, axes, windows, up)
 
 
 @compiled()
-def _windows(centres: Floats, axes: Floats, halves: Floats, grid: GridSpacing) -> Integers:
-    """(k, 4) see `PlacedParts.windows`."""
-    windows = np.empty((len(centres), 4), np.int64)
-    corners = np.empty((8, 3))
-    for part, centre in enumerate(centres):
-        _lay_corners(centre, axes[part], halves[part], corners)
-        heading, right, left = _spread(centre, corners)
+def _is_beyond(away: Vector, offset: Floats, half: Floats, reach: float) -> bool:
+    """Whether a part lies wholly farther than `reach` from where its body is `away`, by the ball
+    about the body that holds it.
+    """
+    # A millimetre is room for rounding.
+    radius = math.sqrt(dot(offset, offset)) + math.sqrt(dot(half, half))
+    return math.sqrt(dot(away, away)) > reach + radius + 0.001
 
-        # Corners that spread over half a turn leave the sensor no side to look from: the part is
-        # around, above or below it, and may cover every column.
-        surrounds = left - right >= math.pi or (centre[0] == 0.0 and centre[1] == 0.0)
-        if surrounds:
-            heading = 0.0
-            right, left = -math.pi, math.pi
-        windows[part, 0], windows[part, 1] = _columns(heading + right, heading + left, grid)
-        windows[part, 2], windows[part, 3] = _rows(corners, surrounds, grid)
-    return windows
+
+@compiled()
+def _window(centre: Floats, corners: Floats, grid: GridSpacing) -> tuple[int, int, int, int]:
+    """See `PlacedParts.windows`."""
+    heading, right, left = _spread(centre, corners)
+
+    # Corners that spread over half a turn leave the sensor no side to look from: the part is
+    # around, above or below it, and may cover every column.
+    surrounds = left - right >= math.pi or (centre[0] == 0.0 and centre[1] == 0.0)
+    if surrounds:
+        heading = 0.0
+        right, left = -math.pi, math.pi
+    first, last = _columns(heading + right, heading + left, grid)
+    upper, lower = _rows(corners, surrounds, grid)
+    return first, last, upper, lower
 
 
 @compiled()

@@ -1,0 +1,136 @@
+"""The bodies of one world as its client of PyBullet holds them.
+
+PyBullet learns of a body, and of its pose, when it is first asked about it: most bodies of a street
+are never asked about, and to make one takes up to 2 ms.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from care_sim.core.arrays import Floats, Integers
+from care_sim.world.bodies import Part
+from care_sim.world.bullet_clients import pybullet
+
+NO_BODY = -1
+"""The id where there is no body, ours and PyBullet's."""
+OPAQUE, TRANSPARENT = 1, 2
+"""Groups of bodies that rays hit, and that they pass."""
+
+_SHAPES = {
+    "box": pybullet.GEOM_BOX,
+    "cylinder": pybullet.GEOM_CYLINDER,
+    "sphere": pybullet.GEOM_SPHERE,
+}
+
+
+class _Unmade(NamedTuple):
+    """A body that PyBullet does not know yet: all its parts, those that are seen, and its group."""
+
+    parts: Sequence[Part]
+    seen: Sequence[Part]
+    group: int
+
+
+class BulletBodies:
+    """Bodies by id, which count from 0 in the order in which they are added, the ground first."""
+
+    def __init__(self, client: int, ground: bool) -> None:
+        self._client = client
+        self._unmade: dict[int, _Unmade] = {}
+        self._moved: set[int] = set()
+        # By id the numbers of PyBullet, which counts in the order in which it learns of bodies.
+        self._numbers: dict[int, int] = {}
+        if ground:
+            self._numbers[0] = self._make_ground()
+
+    def add(self, parts: Sequence[Part], seen: Sequence[Part], group: int) -> int:
+        """Take in a body of `parts`, of which cameras are to see `seen`; its id."""
+        body = len(self._numbers) + len(self._unmade)
+        self._unmade[body] = _Unmade(parts, seen, group)
+        self._moved.add(body)
+        return body
+
+    def moved(self, bodies: Iterable[int]) -> None:
+        """Take note that bodies are elsewhere."""
+        self._moved.update(bodies)
+
+    def tell_all(self, poses: Floats) -> None:
+        """Let PyBullet know of every body, and where it is: `poses` (m, 7) by id."""
+        self._tell(self._moved, poses)
+
+    def tell(self, bodies: Sequence[int], poses: Floats) -> list[int]:
+        """Let PyBullet know of some bodies, as `tell_all` of all; its numbers of them."""
+        self._tell(self._moved.intersection(bodies), poses)
+        return [self._numbers[body] for body in bodies]
+
+    def ids_of(self, numbers: Integers) -> Integers:
+        """The ids of bodies that PyBullet tells by its own numbers; NO_BODY stays."""
+        # NO_BODY, which is -1, picks the last entry.
+        ids = np.full(len(self._numbers) + 1, NO_BODY)
+        ids[list(self._numbers.values())] = list(self._numbers)
+        return np.asarray(ids[numbers])
+
+    def _tell(self, moved: Iterable[int], poses: Floats) -> None:
+        # A copy: `moved` may be the very set that shrinks here. In the order of ids, so that what
+        # PyBullet holds depends on no order of a set.
+        for body in sorted(moved):
+            if body in self._unmade:
+                self._numbers[body] = self._make(self._unmade.pop(body))
+            pose = poses[body].tolist()
+            pybullet.resetBasePositionAndOrientation(
+                self._numbers[body], pose[:3], pose[3:], physicsClientId=self._client
+            )
+            self._moved.discard(body)
+
+    def _make(self, body: _Unmade) -> int:
+        # Mass 0: bodies stand where they are put, and nothing ever falls or is pushed.
+        number = pybullet.createMultiBody(
+            0,
+            self._collision_shape(body.parts),
+            self._visual_shape(body.seen) if body.seen else self._no_visual_shape(),
+            physicsClientId=self._client,
+        )
+        self._set_group(number, body.group)
+        return int(number)
+
+    def _make_ground(self) -> int:
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        unseen = self._no_visual_shape()
+        ground = pybullet.createMultiBody(0, plane, unseen, physicsClientId=self._client)
+        self._set_group(ground, OPAQUE)
+        return int(ground)
+
+    def _set_group(self, number: int, group: int) -> None:
+        pybullet.setCollisionFilterGroupMask(number, -1, group, group, physicsClientId=self._client)
+
+    def _collision_shape(self, parts: Sequence[Part]) -> int:
+        shapes = _collision(parts)
+        return int(pybullet.createCollisionShapeArray(physicsClientId=self._client, **shapes))
+
+    def _visual_shape(self, parts: Sequence[Part]) -> int:
+        return int(pybullet.createVisualShapeArray(physicsClientId=self._client, **_visual(parts)))
+
+    def _no_visual_shape(self) -> int:
+        """A speck deep below: without a visual shape PyBullet would draw the collision shape."""
+        return self._visual_shape(
+            [Part("box", (1e-4, 1e-4, 1e-4), (0.0, 0.0, -1e4), (0.0, 0.0, 0.0))]
+        )
+
+
+def _collision(parts: Sequence[Part]) -> dict[str, Any]:
+    return {
+        "shapeTypes": [_SHAPES[part.shape] for part in parts],
+        "halfExtents": [[extent / 2 for extent in part.size] for part in parts],
+        "radii": [part.size[0] / 2 for part in parts],
+        "lengths": [part.size[2] for part in parts],
+        "collisionFramePositions": [part.centre for part in parts],
+    }
+
+
+def _visual(parts: Sequence[Part]) -> dict[str, Any]:
+    shapes = _collision(parts)
+    shapes["visualFramePositions"] = shapes.pop("collisionFramePositions")
+    shapes["rgbaColors"] = [(*part.colour, 1.0) for part in parts]
+    return shapes
