@@ -40,7 +40,7 @@ class CareSector(Policy):
         check_whole("min_returns", min_returns, 1)
         self._hull_round = HULL_CELLS_PER_RETURN * min_returns
         self._wedge_round = WEDGE_CELLS_PER_RETURN * min_returns
-        self._rows = nearest_rows(rig.grid)
+        self._rows = nearest_rows(rig)
         row = self._rows[0] // rig.grid.columns
         self._sector = row * rig.grid.columns + columns_ahead(rig.grid)
 

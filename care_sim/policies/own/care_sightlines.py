@@ -73,7 +73,7 @@ class CareSightlines(Policy):
         self._looks_ahead = ahead
         self._rechecks = explained
         self._watches = sight_lines
-        pattern = nearest_rows(rig.grid)
+        pattern = nearest_rows(rig)
         self._row = int(pattern[0]) // rig.grid.columns
         self._rows = CellSets.of([pattern] if rows else [])
         self.reset()

@@ -1,15 +1,19 @@
 """Lines of sight on scans made by hand."""
 
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import care_sim
 from care_sim.core.belief import Belief
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.core.types import Ego, ImageDetections, Tracks
+from care_sim.policies.controls.rows import nearest_rows
 from care_sim.policies.own.sight_lines import EDGE_COLUMNS, SightLines
 
 GRID = AngularGrid()
@@ -193,3 +197,21 @@ def test_an_open_line_stays_open_where_float32_cannot_hold_the_reach(belief_of):
         lines.update(belief_of(ego=Ego(speed=10.0)))
     assert len(set(lines.ranges)) == 1
     assert len(lines.cells()) == COLUMNS
+
+
+@pytest.mark.parametrize("height", [0.5, 1.84, 3.0])
+def test_along_a_street_lines_of_sight_are_open_from_any_height(height):
+    """With the row at -1.33 degrees they would end on the road after 21 m from a LiDAR 0.5 m above
+    it, less than the 25 m that count as open.
+    """
+    setup = SensorSetup("one", AngularGrid(), (2.0, 0.0, height))
+    with gymnasium.make("CARE-CutIn-v0", sensor=setup, budget=0.05) as env:
+        policy = care_sim.make_policy("care-sightlines", env)
+        observation, _ = env.reset(seed=5)
+        for _ in range(3):
+            observation, *_ = env.step(policy(observation))
+        policy(observation)
+        row = nearest_rows(policy.rig)[0] // GRID.columns
+        open_lines = np.flatnonzero(observation["ranges"][row] > 30)
+        assert len(open_lines) > 80
+        assert set(row * COLUMNS + open_lines) <= set(policy.demanded.layers[4][0].tolist())
