@@ -15,14 +15,8 @@ from care_sim.core.cell_order_kernels import SetMargins
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.firing.base import Hardware
 from care_sim.core.firing.listing import CELLS, hardware_of, settled
-from care_sim.core.grid import (
-    AZIMUTH_MARGIN,
-    ELEVATION_MARGIN,
-    MOST_COLUMNS,
-    MOST_ROWS,
-    AngularGrid,
-    Cells,
-)
+from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.types import Demand

@@ -25,10 +25,11 @@ class SensorSetup:
     """One LiDAR and its cameras, by name.
 
     `position` is the LiDAR's x, y and z in the frame of the car: metres before, left of and above
-    the point on the road below the car's middle. Its axes are those of the car; it is turned by the
-    grid's `heading`. `cameras` are placed in the LiDAR's frame; without any, those of the scenario
-    stay where they are on the car. Raises InvalidInput for a value out of its bounds, and for a
-    camera that sees nothing of the grid.
+    the point on the road below the car's middle. The axes of the sensor frame are those of the car:
+    the grid's `heading`, `pitch` and `roll` turn the rays in it. So boxes and cameras stay upright,
+    however the LiDAR is mounted. `cameras` are placed in the sensor frame; without any, those of
+    the scenario stay where they are on the car. Raises InvalidInput for a value out of its bounds,
+    and for a camera that sees nothing of the grid.
     """
 
     name: str
@@ -62,6 +63,9 @@ class SensorSetup:
         """Hash of all but the name."""
         plain = asdict(self)
         del plain["name"]
+        # There was a time before grids could be tilted: a level one keeps the hash that it had.
+        if not self.grid.is_tilted:
+            del plain["grid"]["pitch"], plain["grid"]["roll"]
         return combined_digest([json.dumps(plain)])
 
     def equipped(self, cameras: Sequence[PinholeCamera]) -> tuple[PinholeCamera, ...]:

@@ -37,6 +37,8 @@ _LIDAR = (
     "field_of_view_deg",
     "position_m",
     "yaw_deg",
+    "pitch_deg",
+    "roll_deg",
 )
 _CAMERA = (
     "width",
@@ -150,6 +152,8 @@ def _grid(lidar: Mapping[str, Any]) -> AngularGrid:
         "range_m": lidar.get("range_m", usual.range_m),
         "field_of_view": _radians(lidar, "field_of_view_deg", 360.0),
         "heading": _radians(lidar, "yaw_deg", 0.0),
+        "pitch": _radians(lidar, "pitch_deg", 0.0),
+        "roll": _radians(lidar, "roll_deg", 0.0),
     }
     if "elevations_deg" in lidar:
         if twice := [name for name in _EQUAL_ROWS if name in lidar]:

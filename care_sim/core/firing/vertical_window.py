@@ -33,5 +33,5 @@ class VerticalWindow(Window):
         return places[np.argsort(np.abs(places - stood), kind="stable")]
 
     def _start(self, width: int) -> int:
-        horizon = int(np.argmin(np.abs(self.grid.elevations)))
+        horizon = int(np.argmin(np.abs(self.grid.elevations_ahead)))
         return min(max(horizon - width // 2, 0), self.units - width)

@@ -55,7 +55,7 @@ def nearest_rows(rig: Rig, elevation_deg: float | None = None) -> Cells:
     """
     grid = rig.grid
     wanted = entry_elevation_deg(rig) if elevation_deg is None else elevation_deg
-    rows = np.argsort(np.abs(np.rad2deg(grid.elevations) - wanted), kind="stable")
+    rows = np.argsort(np.abs(np.rad2deg(grid.elevations_ahead) - wanted), kind="stable")
     columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
     cells: Cells = (rows[:, None] * grid.columns + columns).ravel()
     return cells

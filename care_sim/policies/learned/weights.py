@@ -183,8 +183,9 @@ def _check_contents(entries: list[ZipInfo]) -> None:
 
 
 def _grid(plain: dict[str, Any]) -> AngularGrid:
-    # Cards of earlier versions are of grids that go all round in equal steps, and say no more.
-    numbers = {"field_of_view": 2 * np.pi, "heading": 0.0} | plain
+    # Cards of earlier versions are of level grids all round in equal steps, and say no more.
+    usual = {"field_of_view": 2 * np.pi, "heading": 0.0, "pitch": 0.0, "roll": 0.0}
+    numbers = usual | plain
     listed = numbers.pop("listed", [])
     names = {column.name for column in fields(AngularGrid)} - {"listed"}
     if set(numbers) != names or not (
