@@ -6,9 +6,9 @@ of rows are told.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -80,6 +80,10 @@ class GridRays:
         mounted = {"heading": heading, "pitch": pitch, "roll": roll}
         return cls(columns, len(listed), *ends, range_m, field_of_view, listed=listed, **mounted)
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Tables are megabytes for a large grid: a copy, in a worker for example, makes its own.
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
     def _settle_listed(self) -> None:
         """Check the listed elevations, and make them a tuple of plain numbers."""
         listed = self.listed
@@ -122,6 +126,11 @@ class GridRays:
     def turn(self) -> int:
         """How many columns of this width a whole turn has: all are the grid's if it has no gap."""
         return round(2 * np.pi / self.column_width)
+
+    @property
+    def goes_round(self) -> bool:
+        """Whether the last column borders on column 0."""
+        return self.columns == self.turn
 
     @property
     def row_height(self) -> float:

@@ -8,6 +8,7 @@ from functools import cached_property
 from care_sim.base.checks import check_number
 from care_sim.base.digests import combined_digest
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
@@ -57,6 +58,25 @@ class SensorSetup:
         check_number(f"z of the position{of}", z, _LOWEST_M, _HIGHEST_M)
         object.__setattr__(self, "position", _unsigned(self.position))
         self._check_cameras(of)
+
+    def to_json(self) -> str:
+        """As one line of text, from which `from_json` makes an equal one."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> "SensorSetup":
+        """Read text back. Raises InvalidInput for anything but a set-up."""
+        try:
+            plain = parsed_json(text)
+            cameras = tuple(PinholeCamera(**camera) for camera in plain.pop("cameras"))
+            return cls(grid=AngularGrid(**plain.pop("grid")), cameras=cameras, **plain)
+        except (ValueError, TypeError, AttributeError, KeyError) as error:
+            raise InvalidInput(f"no text of a sensor set-up ({error})") from error
+
+    @property
+    def label(self) -> str:
+        """Its name and its hash, for rigs and weights."""
+        return f"{self.name} {self.digest}"
 
     @cached_property
     def digest(self) -> str:

@@ -1,5 +1,6 @@
 """Sensor set-ups: those that come with the package, files of one's own, and what is refused."""
 
+import pickle
 from dataclasses import replace
 
 import gymnasium
@@ -110,7 +111,8 @@ def test_the_same_set_up_is_an_object_a_file_and_a_path_in_text(written):
     path = written(LISTED)
     setup = sensor_setup(path)
     assert sensor_setup(str(path)) == sensor_setup(setup) == setup
-    assert sensor_columns(str(path)) == {"sensor": "mine", "sensor_hash": setup.digest}
+    told = {"sensor": "mine", "sensor_hash": setup.digest, "sensor_setup": setup.to_json()}
+    assert sensor_columns(str(path)) == told
     path.write_text(LISTED.replace("80.0", "70.0"))
     assert sensor_setup(path).grid.range_m == 70.0
     assert sensor_setup(path).digest != setup.digest
@@ -128,6 +130,32 @@ def test_the_hash_is_of_what_is_mounted_not_of_the_name():
 def test_level_set_ups_keep_the_hashes_of_before_there_was_a_tilt():
     hashes = [sensor_setup(name).digest for name in ("hdl-32e", "paper-vehicle")]
     assert hashes == ["95162f4bf334eac9", "05db9f03aae1d6c1"]
+
+
+@pytest.mark.parametrize("name", setup_names())
+def test_a_set_up_is_read_back_from_its_text(name):
+    setup = sensor_setup(name)
+    again = SensorSetup.from_json(setup.to_json())
+    assert again == setup
+    assert again.digest == setup.digest
+
+
+@pytest.mark.parametrize(
+    "text", ["", "7", "{}", "[" * 3000, '{"name": "a", "grid": {"rows": 1}, "cameras": []}']
+)
+def test_another_text_is_refused_in_one_line(text):
+    with pytest.raises(InvalidInput, match="no text of a sensor set-up") as refused:
+        SensorSetup.from_json(text)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_set_up_is_sent_to_workers_without_the_tables_of_its_grid():
+    setup = SensorSetup("large", AngularGrid(2048, 128))
+    before = pickle.dumps(setup)
+    assert setup.grid.directions.shape == (2048 * 128, 3)
+    assert pickle.dumps(setup) == before
+    assert len(before) < 2000
+    assert pickle.loads(before) == setup
 
 
 def test_cameras_of_the_scenario_stay_where_they_are_on_the_car():

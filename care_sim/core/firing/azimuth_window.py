@@ -32,7 +32,7 @@ class AzimuthWindow(Window):
 
     def __init__(self, grid: AngularGrid, degrees: float):
         check_number("degrees of firing azimuth-window", degrees, 0, 180)
-        if grid.columns < grid.turn:
+        if not grid.goes_round:
             raise InvalidInput(
                 "firing azimuth-window turns all round, and the grid has no more than "
                 f"{np.rad2deg(grid.field_of_view):g} degrees"
