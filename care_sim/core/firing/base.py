@@ -84,3 +84,16 @@ def ranked(values: NDArray[Any]) -> Integers:
     chosen = np.flatnonzero(flat > 0)
     # Negated, a stable ascending sort puts the highest first and leaves ties in their order.
     return chosen[np.argsort(-flat[chosen].astype(np.float64), kind="stable")]
+
+
+def demanded(scores: NDArray[Any]) -> Cells:
+    """(k,) the cells with strictly positive `scores` (E, A), those of an action in float32, the
+    highest first, ties by ascending cell: as `ranked` has them.
+    """
+    flat = scores.ravel().astype(np.float32, copy=False)
+    (cells,) = (flat > 0).nonzero()
+    # Bits of positive floats ascend as their values do. A score and its cell are one whole number,
+    # and whole numbers are sorted in an eighth of the time of a stable argsort.
+    falling = (~flat[cells].view(np.uint32)).astype(np.uint64)
+    keys = np.sort(falling << np.uint64(32) | cells.astype(np.uint64))
+    return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.firing.base import Floor, Hardware, ranked
+from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
 from care_sim.core.grid import Cells
 
 
@@ -25,7 +25,7 @@ class Window(Hardware):
         """The window that serves the demand."""
         width = budget // self.unit_cells
         places = self._reached(width, last)
-        first = _best_place(ranked(scores), self.unit_of, places, width, self.units)
+        first = _best_place(demanded(scores), self.unit_of, places, width, self.units)
         fired = np.zeros(self.units, np.bool_)
         fired[self._window(first, width)] = True
         return np.flatnonzero(fired[self.unit_of])
