@@ -22,7 +22,8 @@ class Hardware(ABC):
 
     The budget is paid in units. Subclasses name what they stand for: `name` as `firing` has it, the
     `numbers` behind the colon of it, if any, with their `usual` values, the `unit` in one word, the
-    `product`, and its public `source`.
+    `product`, and its public `source`. `spends_floor` says whether the random floor gets what is
+    left of the budget.
     """
 
     name: ClassVar[str]
@@ -31,6 +32,7 @@ class Hardware(ABC):
     unit: ClassVar[str]
     product: ClassVar[str]
     source: ClassVar[str]
+    spends_floor: ClassVar[bool] = True
 
     def __init__(self, grid: AngularGrid, unit_cells: int):
         self.grid = grid

@@ -21,6 +21,8 @@ class Window(Hardware):
     stays where nothing is demanded. It always fires as a whole: nothing is left for the floor.
     """
 
+    spends_floor = False
+
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
         """The window that serves the demand."""
         width = budget // self.unit_cells
