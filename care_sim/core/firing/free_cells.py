@@ -17,7 +17,10 @@ class FreeCells(Hardware):
     name = "cells"
     unit = "cell"
     product = "agile scanner that aims single shots"
-    source = "AEye, white paper Rethinking the Three Rs of LiDAR: Rate, Resolution and Range"
+    source = (
+        "AEye, white paper Rethinking the Three Rs of LiDAR: Rate, Resolution and Range, "
+        "RRRWP_19_0812, 2019"
+    )
 
     def __init__(self, grid: AngularGrid):
         super().__init__(grid, unit_cells=1)

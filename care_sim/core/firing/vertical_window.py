@@ -17,7 +17,9 @@ class VerticalWindow(Window):
     name = "vertical-window"
     unit = "row"
     product = "long-range scanner with an adjustable vertical field of view"
-    source = "Luminar, Iris product sheet: vertical field of view dynamically adjustable"
+    source = (
+        "Luminar, Iris product sheet: vertical field of view dynamically adjustable (not opened)"
+    )
 
     def __init__(self, grid: AngularGrid):
         super().__init__(grid, grid.columns)
