@@ -15,8 +15,8 @@ class RingSegments(Blocks):
     unit = "segment"
     product = "spinning sensor with sections of azimuth for every channel"
     source = (
-        "Hesai, PandarQT user manual Q01-en-2101A1, Sec. 4.3, Azimuth FOV (Sec. 4.3.3, multi-section"
-        " FOV, not opened)"
+        "Hesai, PandarQT user manual Q01-en-2101A1, Sec. 4.3, Azimuth FOV (Sec. 4.3.3, "
+        "multi-section FOV, not opened)"
     )
 
     def __init__(self, grid: AngularGrid, columns: int):
