@@ -13,9 +13,10 @@ from care_sim.study.designs.firing import FIRING_POLICIES, firing_plays, firing_
 @dataclass(frozen=True, kw_only=True)
 class Firing(ProtocolVariants):
     """Play the dense street under every hardware, or with --source the first-sighting protocol, and
-    tell what a policy that knows its hardware has over one whose demand is projected. Units that do
-    not divide the grid of a set-up are left out, as are the study's policies with weights of
-    another grid; a line names each.
+    tell what a policy that knows its hardware has over one whose demand is projected.
+
+    Units that do not divide the grid of a set-up are left out, as are the study's policies with
+    weights of another grid; a line names each.
     """
 
     sensors: tuple[str, ...] = (DEFAULT_SETUP,)
