@@ -160,17 +160,25 @@ class GridRays:
         return elevations
 
     @cached_property
+    def elevations_everywhere(self) -> Floats:
+        """(rows, columns) elevation of every cell above the horizon, radians; (rows, 1) of a level
+        grid, whose columns are alike.
+        """
+        if not self.is_tilted:
+            return self.elevations[:, None]
+        heights = self.directions[:, 2].reshape(self.shape)
+        elevations: Floats = np.arcsin(np.clip(heights, -1.0, 1.0))
+        elevations.flags.writeable = False
+        return elevations
+
+    @property
     def elevations_ahead(self) -> Floats:
         """(rows,) elevation of every row above the horizon in the column that is nearest to
         straight ahead, radians.
         """
         if not self.is_tilted:
             return self.elevations
-        ahead = int(np.argmin(self.from_ahead))
-        heights = self.directions[ahead :: self.columns, 2]
-        elevations: Floats = np.arcsin(np.clip(heights, -1.0, 1.0))
-        elevations.flags.writeable = False
-        return elevations
+        return self.elevations_everywhere[:, int(np.argmin(self.from_ahead))]
 
     @cached_property
     def azimuths(self) -> Floats:

@@ -51,11 +51,21 @@ def entry_elevation_deg(rig: Rig) -> float:
 
 def nearest_rows(rig: Rig, elevation_deg: float | None = None) -> Cells:
     """(N,) all cells, row after row, the row nearest to an elevation first: the given one, else
-    `entry_elevation_deg`. Every first few cells of a row lie evenly over it.
+    `entry_elevation_deg`. Every first few cells of a row lie evenly over it. On a tilted grid every
+    column gives its own nearest cell to the first such row, and so on.
     """
     grid = rig.grid
     wanted = entry_elevation_deg(rig) if elevation_deg is None else elevation_deg
-    rows = np.argsort(np.abs(np.rad2deg(grid.elevations_ahead) - wanted), kind="stable")
+    off = np.abs(np.rad2deg(grid.elevations_everywhere) - wanted)
+    rows = np.broadcast_to(np.argsort(off, axis=0, kind="stable"), grid.shape)
     columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
-    cells: Cells = (rows[:, None] * grid.columns + columns).ravel()
+    cells: Cells = (rows[:, columns] * grid.columns + columns).ravel()
+    return cells
+
+
+def entry_cells(rig: Rig) -> Cells:
+    """(columns,) the cell of every column at which things enter the range of scoring."""
+    columns = rig.grid.columns
+    nearest = nearest_rows(rig)[:columns]
+    cells: Cells = nearest[np.argsort(nearest % columns)]
     return cells
