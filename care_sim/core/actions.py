@@ -14,8 +14,8 @@ from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Action, Demand
 
-SHARES = ("not fired", "exploitation", "reserve", "floor", "chosen")
-NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN = range(len(SHARES))
+SHARES = ("not fired", "exploitation", "reserve", "floor", "chosen", "along")
+NOT_FIRED, EXPLOITATION, RESERVE, FLOOR, CHOSEN, ALONG = range(len(SHARES))
 """Places in SHARES."""
 
 
@@ -48,8 +48,9 @@ def shares_of(fired: Cells, action: Action, demand: Demand | None, rig: Rig) -> 
             asked = taken
             kinds = np.where(np.arange(len(taken)) < len(first), EXPLOITATION, RESERVE)
 
-    # What fired and was not asked for came from the floor, or from the rest of a window, which
-    # always fires as a whole.
+    # What fired and was not asked for came from the floor; of hardware that spends none it fired
+    # along with the rest of a window.
+    unasked = FLOOR if rig.hardware.spends_floor else ALONG
     shares = np.full(rig.grid.size, NOT_FIRED, np.uint8)
-    shares[fired] = np.append(kinds, FLOOR)[rig.hardware.credited(asked, fired)]
+    shares[fired] = np.append(kinds, unasked)[rig.hardware.credited(asked, fired)]
     return shares.reshape(rig.grid.shape)

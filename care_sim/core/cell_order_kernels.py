@@ -7,8 +7,8 @@ import numpy as np
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Integers
-from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.grid_kernels import GridSpacing
+from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 
 ROWS_DOWN, ROWS_UP, COLUMNS, RANDOM, SPREAD, CORE_SPREAD = range(6)
 """The numbers of the orders."""

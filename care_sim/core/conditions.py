@@ -19,7 +19,8 @@ from care_sim.core.allocation import RESERVE_FRACTION
 from care_sim.core.cell_order import AS_DEMANDED
 from care_sim.core.driver_settings import DRIVER_SETTINGS, DriverSettings
 from care_sim.core.firing.listing import CELLS, settled
-from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, MOST_ROWS
+from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN
+from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""

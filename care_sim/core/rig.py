@@ -15,14 +15,8 @@ from care_sim.core.cell_order_kernels import SetMargins
 from care_sim.core.cell_sets import CellSets
 from care_sim.core.firing.base import Hardware
 from care_sim.core.firing.listing import CELLS, hardware_of, settled
-from care_sim.core.grid import (
-    AZIMUTH_MARGIN,
-    ELEVATION_MARGIN,
-    MOST_COLUMNS,
-    MOST_ROWS,
-    AngularGrid,
-    Cells,
-)
+from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, AngularGrid, Cells
+from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.core.pinhole import PinholeCamera, camera_models
 from care_sim.core.pinhole_kernels import CameraModels
 from care_sim.core.types import Demand
@@ -45,8 +39,9 @@ class Rig:
     `elevation_margin` rows. The LiDAR stands `sensor_height_m` above the road, `sensor_x_m` before
     and `sensor_y_m` left of the car's middle. The sets that a policy demands are listed in a
     `cell_order` (`care_sim.core.cell_order.CELL_ORDERS`) before cells are chosen. `firing` names
-    the hardware that fires them (`care_sim.core.firing`). Raises
-    InvalidInput for a value out of its bounds.
+    the hardware that fires them (`care_sim.core.firing`). `setup` tells the set-up by name and hash
+    (`care_sim.core.sensor_setup`); nothing of recordings, and of rigs that were made without one.
+    Raises InvalidInput for a value out of its bounds.
     """
 
     grid: AngularGrid = field(default_factory=AngularGrid)
@@ -61,6 +56,7 @@ class Rig:
     firing: str = CELLS
     sensor_x_m: float = bounded(LIDAR_X_M, -MOST_SHIFT_M, MOST_SHIFT_M)
     sensor_y_m: float = bounded(0.0, -MOST_SHIFT_M, MOST_SHIFT_M)
+    setup: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -8,6 +8,7 @@ from functools import cached_property
 from care_sim.base.checks import check_number
 from care_sim.base.digests import combined_digest
 from care_sim.base.errors import InvalidInput, shown
+from care_sim.base.json_text import parsed_json
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.rig import LIDAR_HEIGHT_M, LIDAR_X_M, MOST_SHIFT_M
@@ -25,10 +26,11 @@ class SensorSetup:
     """One LiDAR and its cameras, by name.
 
     `position` is the LiDAR's x, y and z in the frame of the car: metres before, left of and above
-    the point on the road below the car's middle. Its axes are those of the car; it is turned by the
-    grid's `heading`. `cameras` are placed in the LiDAR's frame; without any, those of the scenario
-    stay where they are on the car. Raises InvalidInput for a value out of its bounds, and for a
-    camera that sees nothing of the grid.
+    the point on the road below the car's middle. The axes of the sensor frame are those of the car:
+    the grid's `heading`, `pitch` and `roll` turn the rays in it. So boxes and cameras stay upright,
+    however the LiDAR is mounted. `cameras` are placed in the sensor frame; without any, those of
+    the scenario stay where they are on the car. Raises InvalidInput for a value out of its bounds,
+    and for a camera that sees nothing of the grid.
     """
 
     name: str
@@ -57,11 +59,33 @@ class SensorSetup:
         object.__setattr__(self, "position", _unsigned(self.position))
         self._check_cameras(of)
 
+    def to_json(self) -> str:
+        """As one line of text, from which `from_json` makes an equal one."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> "SensorSetup":
+        """Read text back. Raises InvalidInput for anything but a set-up."""
+        try:
+            plain = parsed_json(text)
+            cameras = tuple(PinholeCamera(**camera) for camera in plain.pop("cameras"))
+            return cls(grid=AngularGrid(**plain.pop("grid")), cameras=cameras, **plain)
+        except (ValueError, TypeError, AttributeError, KeyError) as error:
+            raise InvalidInput(f"no text of a sensor set-up ({error})") from error
+
+    @property
+    def label(self) -> str:
+        """Its name and its hash, for rigs and weights."""
+        return f"{self.name} {self.digest}"
+
     @cached_property
     def digest(self) -> str:
         """Hash of all but the name."""
         plain = asdict(self)
         del plain["name"]
+        # There was a time before grids could be tilted: a level one keeps the hash that it had.
+        if not self.grid.is_tilted:
+            del plain["grid"]["pitch"], plain["grid"]["roll"]
         return combined_digest([json.dumps(plain)])
 
     def equipped(self, cameras: Sequence[PinholeCamera]) -> tuple[PinholeCamera, ...]:

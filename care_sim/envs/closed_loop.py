@@ -196,6 +196,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
             keyframe_s=keyframe_s,
             secret=secret,
             scoring_info=scoring_info,
+            setup=setup.label,
         )
         made = detector_of(detector, detector_parameters, conditions, self.rig)
         # The proxy asks whose return each is, which the loop knows without a cloud.

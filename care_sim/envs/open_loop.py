@@ -82,6 +82,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         cameras: tuple[PinholeCamera, ...],
         position: Position,
         keyframe_s: float,
+        setup: str = "",
         *,
         budget: float = 0.10,
         detector: str = PROXY,
@@ -105,6 +106,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
             keyframe_s=keyframe_s,
             secret=secret,
             scoring_info=scoring_info,
+            setup=setup,
         )
         self._detector = detector_of(detector, detector_parameters, conditions, self.rig)
         self.metadata = {**self.metadata, "render_fps": 1 / keyframe_s}

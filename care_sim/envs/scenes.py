@@ -28,7 +28,7 @@ class StreetEnv(OpenLoopEnv):
         self._setup = setup = sensor_setup(sensor)
         cameras = setup.equipped(SURROUND_CAMERAS)
         mounted = setup.grid, cameras, setup.position
-        super().__init__(*mounted, STREET_KEYFRAME_S, **parameters)
+        super().__init__(*mounted, STREET_KEYFRAME_S, setup.label, **parameters)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

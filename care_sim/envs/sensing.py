@@ -56,6 +56,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
         keyframe_s: float,
         secret: str | bool,
         scoring_info: bool,
+        setup: str,
     ):
         check_secret(secret)
         check_flag("scoring_info", scoring_info)
@@ -81,6 +82,7 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             firing=conditions.firing,
             sensor_x_m=x,
             sensor_y_m=y,
+            setup=setup,
         )
         self.action_space = spaces.Box(0.0, 1.0, grid.shape, np.float32)
         self.observation_space = observation_space(self.rig)

@@ -19,6 +19,7 @@ from care_sim.reports.captions import (
 from care_sim.reports.figures.budget import BUDGET_FIGURES, sweep_figures
 from care_sim.reports.figures.crowding import CROWDING_FIGURE, crowding_figures
 from care_sim.reports.figures.faults import FAULT_FIGURES, fault_figures
+from care_sim.reports.figures.firing import FIRING_FIGURE, firing_figures
 from care_sim.reports.figures.ncap import NCAP_FIGURE, ncap_figures
 from care_sim.reports.figures.order import (
     OPEN_ORDER_FIGURE,
@@ -202,9 +203,9 @@ _ALL = (
         "firing",
         "Hardware in the closed loop",
         firing_tables,
-        _no_figures,
+        firing_figures,
         _sweep_closing,
-        (),
+        (FIRING_FIGURE,),
     ),
     Study(
         "validate",

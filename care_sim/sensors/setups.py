@@ -37,6 +37,8 @@ _LIDAR = (
     "field_of_view_deg",
     "position_m",
     "yaw_deg",
+    "pitch_deg",
+    "roll_deg",
 )
 _CAMERA = (
     "width",
@@ -77,12 +79,23 @@ def sensor_setup(sensor: Sensor) -> SensorSetup:
     return _read(path)
 
 
-def check_shipped(name: str, digest: str) -> None:
-    """Raise InvalidInput unless a set-up of this name and hash comes with the package: the rows of
-    results tell no more of it.
+def setup_of_columns(row: Mapping[str, Any]) -> str | SensorSetup:
+    """The set-up that `sensor_columns` told. Raises InvalidInput for one that does not come with
+    this version where the columns do not hold it, and for one of another hash.
     """
-    if name not in setup_names() or sensor_setup(name).digest != digest:
-        raise InvalidInput(f"the sensor set-up {name} {digest} does not come with this version")
+    name, digest = row.get("sensor"), row.get("sensor_hash")
+    if name is None:
+        return DEFAULT_SETUP
+    if text := row.get("sensor_setup"):
+        setup = SensorSetup.from_json(text)
+        if setup.digest != digest:
+            raise InvalidInput(
+                f"the sensor set-up {name} has the hash {setup.digest}, not {digest}"
+            )
+        return setup
+    if name in setup_names() and sensor_setup(name).digest == digest:
+        return sensor_setup(name)
+    raise InvalidInput(f"the sensor set-up {name} {digest} does not come with this version")
 
 
 def setup_lines() -> list[str]:
@@ -91,13 +104,16 @@ def setup_lines() -> list[str]:
 
 
 def sensor_columns(sensor: Sensor) -> dict[str, str]:
-    """Columns of a row that tell its set-up by name and hash; none of the default, so that rows and
-    their digests stay as they were before there was a choice.
+    """Columns of a row that tell its set-up by name and hash, and hold one that does not come with
+    the package; none of the default, so that rows and their digests stay as they were before there
+    was a choice.
     """
     setup = sensor_setup(sensor)
     if setup == sensor_setup(DEFAULT_SETUP):
         return {}
-    return {"sensor": setup.name, "sensor_hash": setup.digest}
+    told = {"sensor": setup.name, "sensor_hash": setup.digest}
+    shipped = setup.name in setup_names() and sensor_setup(setup.name) == setup
+    return told if shipped else told | {"sensor_setup": setup.to_json()}
 
 
 def _line(setup: SensorSetup) -> str:
@@ -150,6 +166,8 @@ def _grid(lidar: Mapping[str, Any]) -> AngularGrid:
         "range_m": lidar.get("range_m", usual.range_m),
         "field_of_view": _radians(lidar, "field_of_view_deg", 360.0),
         "heading": _radians(lidar, "yaw_deg", 0.0),
+        "pitch": _radians(lidar, "pitch_deg", 0.0),
+        "roll": _radians(lidar, "roll_deg", 0.0),
     }
     if "elevations_deg" in lidar:
         if twice := [name for name in _EQUAL_ROWS if name in lidar]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 from care_sim.base.checks import check_known
 from care_sim.base.digests import data_digest, file_digest
 from care_sim.base.errors import InvalidInput, shortened
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.loops.film import Film
 from care_sim.sensors.setups import DEFAULT_SETUP, sensor_columns, sensor_setup
 from care_sim.sources.recordings import RECORDING_KINDS, NuScenes, Recordings, recordings
@@ -38,8 +39,8 @@ class Source(Protocol):
         ...
 
     @property
-    def sensor(self) -> str:
-        """The name or file of the set-up whose grid its films hold."""
+    def sensor(self) -> str | SensorSetup:
+        """The set-up, its name or its file, whose grid its films hold."""
         ...
 
     def film(self, scene: Scene) -> Film:
@@ -56,12 +57,12 @@ class Source(Protocol):
 @dataclass(frozen=True)
 class Streets:
     """Generated streets: the 150 of the evaluation, or the 20 of the calibration. They are filmed
-    by the `sensor`, the name or file of a set-up.
+    by the `sensor`, a set-up, its name or its file.
     """
 
     kind = "streets"
     split: str = "evaluation"
-    sensor: str = DEFAULT_SETUP
+    sensor: str | SensorSetup = DEFAULT_SETUP
 
     def __post_init__(self) -> None:
         sensor_setup(self.sensor)
@@ -133,12 +134,12 @@ def source_of(text: str, **options: object) -> Source:
             raise InvalidInput(f"unknown source {text!r}; known: {known}")
         return Recorded(recordings(text, options))
     given = {name: value for name, value in options.items() if value is not None}
-    sensor = str(given.pop("sensor", DEFAULT_SETUP))
+    sensor = given.pop("sensor", DEFAULT_SETUP)
     split = str(given.pop("split", "evaluation"))
     if given:
         raise InvalidInput(f"{', '.join(given)} has no meaning for streets")
     check_known("split of the streets", split, SPLITS)
-    return Streets(split, sensor)
+    return Streets(split, sensor if isinstance(sensor, SensorSetup) else str(sensor))
 
 
 def chosen_scenes(scenes: list[Scene], names: tuple[str, ...]) -> list[Scene]:

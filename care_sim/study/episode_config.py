@@ -3,7 +3,7 @@ is written down.
 """
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import product
 from math import prod
 from typing import Any, Self
@@ -12,6 +12,7 @@ import gymnasium
 
 from care_sim.base.checks import check_known, check_seed
 from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, DEFAULTS, ClosedLoopConditions
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.envs import CLOSED_LOOP
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import make_scenario
@@ -50,7 +51,8 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
     policy: str
     budget: float = 0.1
     seed: int = 0
-    sensor: str = DEFAULT_SETUP
+    # Made, since a field with a name for its default takes nothing but names.
+    sensor: str | SensorSetup = field(default_factory=lambda: DEFAULT_SETUP)
     detector: str = PROXY
     detector_parameters: Parameters = ()
     scenario_parameters: Parameters = ()
@@ -120,7 +122,7 @@ class EpisodeConfig(ClosedLoopConditions, RunConfig):
         """A short name for people: scenario, policy, budget, seed and what departs from the
         defaults.
         """
-        main = ("scenario", "policy", "budget", "seed", "sensor_hash")
+        main = ("scenario", "policy", "budget", "seed", "sensor_hash", "sensor_setup")
         changes = departures(self, main)
         return " ".join(
             [f"{self.scenario} {self.policy} {self.budget:.4g} seed {self.seed}", *changes]

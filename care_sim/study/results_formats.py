@@ -71,6 +71,7 @@ _BY_WRITER = {
     "tags": as_optional(TEXT),
     "sensor": as_optional(TEXT),
     "sensor_hash": as_optional(TEXT),
+    "sensor_setup": as_optional(TEXT),
     "cell_order": CONDITION_COLUMNS["cell_order"],
 }
 """Columns that every study writes. Older files and those of others may lack them: a condition that
@@ -174,6 +175,7 @@ _PARAMETERS = frozenset(
         "scene",
         "sensor",
         "sensor_hash",
+        "sensor_setup",
         "detector",
         "camera_detections",
         "presence",

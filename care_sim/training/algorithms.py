@@ -32,9 +32,9 @@ def algorithm(name: str) -> Any:
     return {"ppo": PPO, "sac": SAC}[name]
 
 
-def make_learner(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
-    """A learner that has learned nothing yet."""
-    policy, options = _settings(config)
+def make_learner(config: AgentConfig, envs: Any, goes_round: bool = True) -> "BaseAlgorithm":
+    """A learner that has learned nothing yet; `goes_round` says whether the grid does."""
+    policy, options = _settings(config, goes_round)
     log = str(config.out / "tensorboard") if config.tensorboard else None
     learner: BaseAlgorithm = algorithm(config.algorithm)(
         policy=policy,
@@ -49,23 +49,20 @@ def make_learner(config: AgentConfig, envs: Any) -> "BaseAlgorithm":
     return learner
 
 
-def _settings(config: AgentConfig) -> tuple[Any, dict[str, Any]]:
+def _settings(config: AgentConfig, goes_round: bool) -> tuple[Any, dict[str, Any]]:
     """The policy, and the options that are the learner's own."""
     # The module subclasses PyTorch's and Stable-Baselines3's classes: optional extra 'rl'.
     from care_sim.training.networks import Sectored, SectorPolicy
 
-    shape = len(CHANNELS), config.rows, config.columns
+    seen = {"shape": (len(CHANNELS), config.rows, config.columns), "goes_round": goes_round}
     # PPO scores sectors with the network that `ppo` later runs in NumPy. The others keep their own
     # networks behind features of the sectors, since their critics or memories need a vector.
     own = {
         "features_extractor_class": Sectored,
-        "features_extractor_kwargs": {
-            "shape": shape,
-            "sectors": (config.elevations, config.azimuths),
-        },
+        "features_extractor_kwargs": seen | {"sectors": (config.elevations, config.azimuths)},
     }
     if isinstance(config, PpoConfig):
-        kwargs = {"shape": shape, "hidden": config.hidden, "log_std_init": math.log(config.noise)}
+        kwargs = seen | {"hidden": config.hidden, "log_std_init": math.log(config.noise)}
         return SectorPolicy, _on_policy(config) | {"policy_kwargs": kwargs}
     if isinstance(config, RecurrentPpoConfig):
         kwargs = own | {"log_std_init": math.log(config.noise)}

@@ -10,7 +10,7 @@ from care_sim.base.bounds import bounded, check_fields
 from care_sim.base.checks import LARGEST_INTEGER
 from care_sim.base.errors import InvalidInput
 from care_sim.base.seed_ranges import TRAINING, VALIDATION
-from care_sim.core.grid import MOST_COLUMNS, MOST_ROWS
+from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 from care_sim.envs.reward import HEAVIEST
 from care_sim.policies.learned.wrapping import Wrapping
 from care_sim.study.parameters import parameters

@@ -132,6 +132,7 @@ class Folder:
         return Card(
             kind="ppo",
             grid=rig.grid,
+            setup=rig.setup,
             # Trained at several budgets, the weights fit any.
             budget=rig.budget if len(config.budget) == 1 else None,
             wrapper=config.wrapping,

@@ -22,12 +22,20 @@ class Window(nn.Module):
     """(n, hidden, sectors) from what each sector sees: its blocks, one more on each side, and the
     car's motion. `care_sim.policies.learned.score_map` computes the same in NumPy.
 
-    `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths).
+    `shape` is (channels, rows, columns) of the blocks, `sectors` (elevations, azimuths);
+    `goes_round` says whether the grid does.
     """
 
-    def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
+    def __init__(
+        self,
+        shape: tuple[int, int, int],
+        sectors: tuple[int, int],
+        hidden: int,
+        goes_round: bool = True,
+    ):
         super().__init__()
         self.shape = shape
+        self.beside = "circular" if goes_round else "constant"
         stride = shape[1] // sectors[0], shape[2] // sectors[1]
         self.window = nn.Conv2d(
             shape[0], hidden, (stride[0] + 2 * BLOCK_MARGIN, stride[1] + 2 * BLOCK_MARGIN), stride
@@ -37,9 +45,9 @@ class Window(nn.Module):
 
     def forward(self, ego: Tensor, grid: Tensor) -> Tensor:
         """From ego (n, 4) and grid (n, channels * rows * columns)."""
-        # Round the car the columns go on over the seam; above and below the grid there is nothing.
+        # All round the car the columns go on over the seam; beyond the grid there is nothing.
         wrapped = pad(
-            grid.view(-1, *self.shape), (BLOCK_MARGIN, BLOCK_MARGIN, 0, 0), mode="circular"
+            grid.view(-1, *self.shape), (BLOCK_MARGIN, BLOCK_MARGIN, 0, 0), mode=self.beside
         )
         seen = (
             self.window(pad(wrapped, (0, 0, BLOCK_MARGIN, BLOCK_MARGIN)))
@@ -54,10 +62,16 @@ class Windows(nn.Module):
     The critic's sectors are pooled into mean and maximum.
     """
 
-    def __init__(self, shape: tuple[int, int, int], sectors: tuple[int, int], hidden: int):
+    def __init__(
+        self,
+        shape: tuple[int, int, int],
+        sectors: tuple[int, int],
+        hidden: int,
+        goes_round: bool = True,
+    ):
         super().__init__()
-        self.actor = Window(shape, sectors, hidden)
-        self.critic = Window(shape, sectors, hidden)
+        self.actor = Window(shape, sectors, hidden, goes_round)
+        self.critic = Window(shape, sectors, hidden, goes_round)
         self.valued = nn.Sequential(nn.Linear(2 * hidden + len(EGO_INPUTS), 2 * hidden), nn.ReLU())
         self.latent_dim_pi = hidden
         self.latent_dim_vf = 2 * hidden
@@ -114,10 +128,14 @@ class Sectored(BaseFeaturesExtractor):
     """
 
     def __init__(
-        self, observation_space: spaces.Dict, shape: tuple[int, int, int], sectors: tuple[int, int]
+        self,
+        observation_space: spaces.Dict,
+        shape: tuple[int, int, int],
+        sectors: tuple[int, int],
+        goes_round: bool = True,
     ):
         super().__init__(observation_space, len(EGO_INPUTS) + 4 * sectors[0] * sectors[1])
-        self.window = Window(shape, sectors, 4)
+        self.window = Window(shape, sectors, 4, goes_round)
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         """The car's motion, then four features per sector."""
@@ -126,15 +144,25 @@ class Sectored(BaseFeaturesExtractor):
 
 
 class SectorPolicy(ActorCriticPolicy):
-    """The score map as actor; `shape` as of `Window`, `hidden` its width."""
+    """The score map as actor; `shape` and `goes_round` as of `Window`, `hidden` its width."""
 
-    def __init__(self, *args: Any, shape: tuple[int, int, int], hidden: int = 16, **kwargs: Any):
+    def __init__(
+        self,
+        *args: Any,
+        shape: tuple[int, int, int],
+        hidden: int = 16,
+        goes_round: bool = True,
+        **kwargs: Any,
+    ):
         self._shape = shape
         self._hidden = hidden
+        self._goes_round = goes_round
         super().__init__(*args, **kwargs | {"features_extractor_class": Joined})
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor: Any = Windows(self._shape, self._sectors, self._hidden)
+        self.mlp_extractor: Any = Windows(
+            self._shape, self._sectors, self._hidden, self._goes_round
+        )
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)

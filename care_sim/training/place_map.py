@@ -17,6 +17,7 @@ from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.policies.learned.weights import Card, save_weights
 from care_sim.policies.paper.full import Full
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.street_films import street_film
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
@@ -76,6 +77,7 @@ def _card(grid: AngularGrid, count: int) -> Card:
     return Card(
         "place",
         grid,
+        setup=sensor_setup(DEFAULT_SETUP).label,
         scenario="CARE-Street-v0",
         data=f"cells of {count} first sightings that a full scan detects at once",
         seeds={"calibration": list(CALIBRATION_SEEDS)},

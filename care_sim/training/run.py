@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from care_sim.base.errors import InvalidInput, MissingExtra
 from care_sim.base.extras import import_torch
+from care_sim.envs.sensing import sensing
 from care_sim.study.progress import ProgressLines, Show, progress_bar, rounded_duration
 from care_sim.training import algorithms
 from care_sim.training.config import AgentConfig
@@ -40,7 +41,7 @@ def train_agent(config: AgentConfig) -> int:
         model = (
             _resumed(config, folder, envs)
             if config.resume
-            else algorithms.make_learner(config, envs)
+            else algorithms.make_learner(config, envs, sensing(env).rig.grid.goes_round)
         )
         folder.begin(model)
         for name, score in folder.rules(partial(_rules, config)).items():

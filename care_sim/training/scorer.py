@@ -24,6 +24,7 @@ from care_sim.base.extras import import_torch
 from care_sim.base.files import ZIP, check_output
 from care_sim.core.grid import AngularGrid
 from care_sim.policies.learned.weights import Arrays, Card, save_weights
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.streets.street import CALIBRATION_SEEDS
 from care_sim.study.provenance import machine_line, package_versions
 from care_sim.training.scorer_data import OTHER_CELLS, SCORER_BUDGETS, Examples, balanced, examples
@@ -150,6 +151,7 @@ def _card(made: TrainScorer, learned: Examples, losses: dict[str, float]) -> Car
     return Card(
         "learned-scorer",
         AngularGrid(),
+        setup=sensor_setup(DEFAULT_SETUP).label,
         scenario="CARE-Street-v0",
         data=f"{len(learned)} cells, {positive} of them positive, of generated streets "
         f"under history at {budgets} of "

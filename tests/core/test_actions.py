@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from care_sim.core.actions import (
+    ALONG,
     CHOSEN,
     EXPLOITATION,
     FLOOR,
@@ -88,3 +91,14 @@ def test_what_fires_along_has_the_share_of_the_first_of_its_unit():
     np.testing.assert_array_equal(shares_of(fired, action, demand, rig).ravel(), expected)
     expected[:8] = np.where(expected[:8], CHOSEN, NOT_FIRED)
     np.testing.assert_array_equal(shares_of(fired, action, None, rig).ravel(), expected)
+
+
+def test_what_a_window_fires_unasked_is_no_floor():
+    """Of the columns 1 and 2 the demand names a cell of the first."""
+    rig = replace(RIG, firing="azimuth-window:180", budget=6)
+    demand = Demand(layers=[[np.array([5])]])
+    action = scores_of(np.array([5]), RIG.grid.shape)
+    fired = rig.hardware.fire(action, rig.budget, None, np.array([1, 2, 5, 6, 9, 10]))
+    found = shares_of(fired, action, demand, rig)
+    expected = [[0, RESERVE, ALONG, 0]] * 3
+    np.testing.assert_array_equal(found, expected)

@@ -1,5 +1,6 @@
 """Sensor set-ups: those that come with the package, files of one's own, and what is refused."""
 
+import pickle
 from dataclasses import replace
 
 import gymnasium
@@ -8,6 +9,7 @@ import pytest
 
 import care_sim
 from care_sim.base.errors import InvalidInput
+from care_sim.core.belief import Belief
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
@@ -30,6 +32,8 @@ elevations_deg = [5.0, 1.0, -1.0, -9.0]
 field_of_view_deg = 90.0
 yaw_deg = 30.0
 range_m = 80.0
+pitch_deg = -2.0
+roll_deg = 1.0
 position_m = [1.0, 0.5, 0.75]
 
 [[cameras]]
@@ -96,6 +100,7 @@ def test_a_file_is_read_in_metres_and_degrees_of_the_car(written):
     assert (grid.columns, grid.range_m) == (180, 80.0)
     assert np.rad2deg(grid.elevations) == pytest.approx([5.0, 1.0, -1.0, -9.0])
     assert np.rad2deg(grid.azimuths[[0, -1]]) == pytest.approx([-14.75, 74.75])
+    assert np.rad2deg([grid.pitch, grid.roll]) == pytest.approx([-2.0, 1.0])
     (camera,) = setup.cameras
     assert camera.position == (0.5, -0.5, 0.5)
     angles = np.rad2deg([camera.horizontal_fov, camera.yaw, camera.pitch])
@@ -106,7 +111,8 @@ def test_the_same_set_up_is_an_object_a_file_and_a_path_in_text(written):
     path = written(LISTED)
     setup = sensor_setup(path)
     assert sensor_setup(str(path)) == sensor_setup(setup) == setup
-    assert sensor_columns(str(path)) == {"sensor": "mine", "sensor_hash": setup.digest}
+    told = {"sensor": "mine", "sensor_hash": setup.digest, "sensor_setup": setup.to_json()}
+    assert sensor_columns(str(path)) == told
     path.write_text(LISTED.replace("80.0", "70.0"))
     assert sensor_setup(path).grid.range_m == 70.0
     assert sensor_setup(path).digest != setup.digest
@@ -117,7 +123,39 @@ def test_the_hash_is_of_what_is_mounted_not_of_the_name():
     assert replace(setup, name="other").digest == setup.digest
     moved = replace(setup, position=(0.0, 0.0, 1.84))
     turned = replace(setup, cameras=(replace(FRONT_CAMERA, pitch=0.01),))
-    assert len({one.digest for one in (setup, moved, turned)}) == 3
+    tilted = replace(setup, grid=AngularGrid(roll=0.01))
+    assert len({one.digest for one in (setup, moved, turned, tilted)}) == 4
+
+
+def test_level_set_ups_keep_the_hashes_of_before_there_was_a_tilt():
+    hashes = [sensor_setup(name).digest for name in ("hdl-32e", "paper-vehicle")]
+    assert hashes == ["95162f4bf334eac9", "05db9f03aae1d6c1"]
+
+
+@pytest.mark.parametrize("name", setup_names())
+def test_a_set_up_is_read_back_from_its_text(name):
+    setup = sensor_setup(name)
+    again = SensorSetup.from_json(setup.to_json())
+    assert again == setup
+    assert again.digest == setup.digest
+
+
+@pytest.mark.parametrize(
+    "text", ["", "7", "{}", "[" * 3000, '{"name": "a", "grid": {"rows": 1}, "cameras": []}']
+)
+def test_another_text_is_refused_in_one_line(text):
+    with pytest.raises(InvalidInput, match="no text of a sensor set-up") as refused:
+        SensorSetup.from_json(text)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_set_up_is_sent_to_workers_without_the_tables_of_its_grid():
+    setup = SensorSetup("large", AngularGrid(2048, 128))
+    before = pickle.dumps(setup)
+    assert setup.grid.directions.shape == (2048 * 128, 3)
+    assert pickle.dumps(setup) == before
+    assert len(before) < 2000
+    assert pickle.loads(before) == setup
 
 
 def test_cameras_of_the_scenario_stay_where_they_are_on_the_car():
@@ -167,6 +205,50 @@ def test_a_return_lies_where_the_mount_and_the_grid_say():
         assert azimuths.max() < -1.0 + np.pi / 4
 
 
+TILTED = SensorSetup(
+    "tilted", AngularGrid(256, 24, 0.4, -0.7, pitch=np.deg2rad(-12), roll=np.deg2rad(7))
+)
+"""It looks down ahead and to the right."""
+
+
+def test_the_road_is_level_seen_from_a_tilted_lidar():
+    """Rows fall on it at other distances in every column, and each return lies on it."""
+    with gymnasium.make("CARE-CutIn-v0", sensor=TILTED, budget=1.0) as env:
+        env.reset(seed=0)
+        scan = env.unwrapped.loop.full_scan()
+        hit = np.isfinite(scan.ranges)
+        points = TILTED.grid.directions[scan.cells[hit]] * scan.ranges[hit, None]
+        assert points[:, 2].min() == pytest.approx(-1.84, abs=1e-9)
+        assert np.mean(points[:, 2] < -1.84 + 1e-9) > 0.5
+        # It looks down ahead: of a row that sees the road there, nothing comes back from behind.
+        ranges = np.full(TILTED.grid.size, np.inf)
+        ranges[scan.cells] = scan.ranges
+        row = ranges.reshape(TILTED.grid.shape)[10]
+        assert row[128] < 9
+        assert np.isinf(row[0])
+
+
+@pytest.mark.parametrize("environment", ["CARE-Dense-v0", "CARE-Street-v0"])
+def test_a_tilt_moves_no_camera_and_no_box(environment, short_streets):
+    """Level or tilted, a full scan finds the same bodies, at the same places."""
+    seen = []
+    level = replace(TILTED, grid=replace(TILTED.grid, pitch=0.0, roll=0.0))
+    for sensor in (level, TILTED):
+        with gymnasium.make(environment, sensor=sensor, budget=1.0) as env:
+            observation, _ = env.reset(seed=1)
+            pictures = observation["detections"].copy()
+            for _ in range(3):
+                observation, *_ = env.step(np.ones(env.action_space.shape, np.float32))
+            tracks = Belief.from_observation(observation).tracks
+            seen.append((pictures, tracks.boxes[tracks.ranges < 30], env.unwrapped.rig))
+    (level_pictures, level_boxes, _), (pictures, boxes, rig) = seen
+    assert np.array_equal(pictures, level_pictures)
+    near = [np.abs(boxes[:, :3] - box[:3]).max(axis=1).min() for box in level_boxes]
+    assert len(near) >= 4
+    assert np.mean(np.array(near) < 0.01) > 0.8
+    assert all(len(hull) for hull in rig.hulls(boxes))
+
+
 def test_what_is_in_the_way_of_the_car_counts_wherever_the_lidar_stands_across_it():
     """Seen from a LiDAR 1.9 m to the right the parked cars are ahead, and nobody brakes."""
     braking = []
@@ -199,6 +281,7 @@ def test_what_is_in_the_way_of_the_car_counts_wherever_the_lidar_stands_across_i
         ("width = 400", "width = 0", "width of the camera must be"),
         ("yaw_deg = 20.0", "yaw_deg = 200.0", "camera 0 .* sees nothing of the grid"),
         ("[[cameras]]", "[cameras]", "cameras must be tables"),
+        ("pitch_deg = -2.0", "pitch_deg = -50.0", "pitch of the grid must"),
         ("= 80.0", "= nan", "range_m of the grid must"),
         ("= 80.0", "= eighty", "no TOML"),
     ],

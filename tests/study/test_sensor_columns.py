@@ -1,13 +1,19 @@
 """Another sensor set-up in studies: its name and hash in rows, digests and tables."""
 
+import json
+
 import pytest
 
 from care_sim.base.errors import InvalidInput
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.reports.page.episodes import config_of
+from care_sim.reports.page.replay import replayed
 from care_sim.sensors.setups import sensor_setup
 from care_sim.sources.scenes import Streets, source_of
-from care_sim.study.episode_config import EpisodeConfig
-from care_sim.study.play_config import PlayConfig
+from care_sim.study.episode_config import EpisodeConfig, listed_episodes
+from care_sim.study.episode_play import trace
+from care_sim.study.play_config import PlayConfig, listed_plays
+from care_sim.study.rows.parquet import read_rows, write_rows
 from care_sim.study.rows.reading import setting_of
 
 FILE = """
@@ -67,12 +73,48 @@ def test_tables_keep_set_ups_of_one_name_apart(config, file):
     assert one.for_full() == one
 
 
-def test_an_episode_of_a_page_is_played_again_with_what_comes_with_the_package(file):
-    config = episode(sensor="m1-forward", budget=0.2)
-    row = config.row()
-    assert config_of(row) == config
-    for changed in (row | {"sensor_hash": "0" * 16}, episode(sensor=str(file)).row()):
-        with pytest.raises(InvalidInput, match="does not come with this version"):
+def test_a_row_holds_a_set_up_that_does_not_come_with_the_package(file):
+    row = episode(sensor=str(file)).row()
+    assert SensorSetup.from_json(row["sensor_setup"]) == sensor_setup(file)
+    assert "sensor_setup" not in episode(sensor="m1-forward").row()
+    # One that only has the name of a shipped one does not come with the package.
+    file.write_text(FILE.replace("mine", "m1-forward"))
+    assert "sensor_setup" in episode(sensor=str(file)).row()
+
+
+@pytest.mark.parametrize("config", [episode, play])
+def test_a_set_up_is_named_by_its_file_or_given_as_it_is(config, file):
+    named, given = config(sensor=str(file)), config(sensor=sensor_setup(file))
+    assert given.row() == named.row()
+    assert given.digest() == named.digest()
+    assert given.label == named.label
+    assert "columns" not in given.label
+    json.dumps(listed_episodes([given]) if config is episode else listed_plays([given]))
+
+
+def test_an_episode_of_a_page_is_played_again_without_the_file_of_its_set_up(file, tmp_path):
+    config = episode(sensor=str(file), budget=0.2, seed=3)
+    row, _ = trace(config)
+    file.unlink()
+    write_rows([row], tmp_path / "episodes.parquet")
+    (read,) = read_rows(tmp_path / "episodes.parquet")
+    again = replayed(config_of(read))
+    assert again.row["episode_hash"] == row["episode_hash"]
+    assert again.story["ego"]["reach"] == 5000
+
+
+def test_an_episode_of_a_page_is_not_played_again_with_another_set_up(file):
+    row = episode(sensor="m1-forward", budget=0.2).row()
+    assert config_of(row).row() == row
+    mine = episode(sensor=str(file)).row()
+    other = mine["sensor_setup"].replace("90", "45")
+    for changed, said in (
+        (row | {"sensor_hash": "0" * 16}, "does not come with this version"),
+        (mine | {"sensor_setup": None}, "does not come with this version"),
+        (mine | {"sensor_setup": other}, "has the hash"),
+        (mine | {"sensor_setup": "[]"}, "no text of a sensor set-up"),
+    ):
+        with pytest.raises(InvalidInput, match=said):
             config_of(changed)
 
 

@@ -13,7 +13,7 @@ from care_sim.commands.shared.selection import check_values, playable
 from care_sim.sources.scenes import chosen_scenes
 from care_sim.study.play_config import PlayConfig
 
-_CLOSED = ("seeds", "also")
+_CLOSED = ("seeds", "also", "sensors")
 _OPEN = ("policies", "budgets", "floor_seeds")
 
 

@@ -18,9 +18,10 @@ class AzimuthWindow(Window):
     """A spinning sensor that fires within a window of azimuth. The window turns by at most
     `degrees` from keyframe to keyframe, and stands straight ahead before the first one.
 
-    The sensor of the source restarts for another window: during a drive it has 0 degrees. The
-    usual 10 stand for a head that turns by 100 degrees a second; no product is known to.
-    Raises InvalidInput for degrees outside 0 to 180, and for a grid that does not go all round.
+    The sensor of the source restarts for another window, so that it has 0 degrees during a drive,
+    and its lasers go on firing outside: it saves data, not shots. The usual 10 stand for a head
+    that turns by 100 degrees a second; no product is known to. Raises InvalidInput for degrees
+    outside 0 to 180, and for a grid that does not go all round.
     """
 
     name = "azimuth-window"
@@ -28,11 +29,14 @@ class AzimuthWindow(Window):
     usual = (10.0,)
     unit = "column"
     product = "spinning sensor with one window of azimuth"
-    source = "Ouster, firmware user manual: azimuth_window"
+    source = (
+        "Ouster, firmware user manual, Azimuth Window: it masks what is sent, and the lasers go on "
+        "firing"
+    )
 
     def __init__(self, grid: AngularGrid, degrees: float):
         check_number("degrees of firing azimuth-window", degrees, 0, 180)
-        if grid.columns < grid.turn:
+        if not grid.goes_round:
             raise InvalidInput(
                 "firing azimuth-window turns all round, and the grid has no more than "
                 f"{np.rad2deg(grid.field_of_view):g} degrees"

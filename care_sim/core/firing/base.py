@@ -22,7 +22,8 @@ class Hardware(ABC):
 
     The budget is paid in units. Subclasses name what they stand for: `name` as `firing` has it, the
     `numbers` behind the colon of it, if any, with their `usual` values, the `unit` in one word, the
-    `product`, and its public `source`.
+    `product`, and its public `source`. `spends_floor` says whether the random floor gets what is
+    left of the budget.
     """
 
     name: ClassVar[str]
@@ -31,6 +32,7 @@ class Hardware(ABC):
     unit: ClassVar[str]
     product: ClassVar[str]
     source: ClassVar[str]
+    spends_floor: ClassVar[bool] = True
 
     def __init__(self, grid: AngularGrid, unit_cells: int):
         self.grid = grid
@@ -84,3 +86,16 @@ def ranked(values: NDArray[Any]) -> Integers:
     chosen = np.flatnonzero(flat > 0)
     # Negated, a stable ascending sort puts the highest first and leaves ties in their order.
     return chosen[np.argsort(-flat[chosen].astype(np.float64), kind="stable")]
+
+
+def demanded(scores: NDArray[Any]) -> Cells:
+    """(k,) the cells with strictly positive `scores` (E, A), those of an action in float32, the
+    highest first, ties by ascending cell: as `ranked` has them.
+    """
+    flat = scores.ravel().astype(np.float32, copy=False)
+    (cells,) = (flat > 0).nonzero()
+    # Bits of positive floats ascend as their values do. A score and its cell are one whole number,
+    # and whole numbers are sorted in an eighth of the time of a stable argsort.
+    falling = (~flat[cells].view(np.uint32)).astype(np.uint64)
+    keys = np.sort(falling << np.uint64(32) | cells.astype(np.uint64))
+    return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)

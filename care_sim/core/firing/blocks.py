@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from care_sim.base.compiled import compiled
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.firing.base import Floor, Hardware, ranked
+from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
 from care_sim.core.grid import AngularGrid, Cells
 
 
@@ -44,7 +44,7 @@ class Blocks(Hardware):
         """The blocks of the demanded cells in their order, then those of the floor."""
         taken = np.zeros(self.units, np.bool_)
         most = budget // self.unit_cells
-        count = _take(ranked(scores), self.unit_of, taken, 0, most)
+        count = _take(demanded(scores), self.unit_of, taken, 0, most)
         if floor is not None and count < most:
             _take(floor(), self.unit_of, taken, count, most)
         return np.flatnonzero(taken[self.unit_of])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.firing.base import Floor, Hardware, ranked
+from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
 from care_sim.core.grid import AngularGrid, Cells
 
 
@@ -17,7 +17,10 @@ class FreeCells(Hardware):
     name = "cells"
     unit = "cell"
     product = "agile scanner that aims single shots"
-    source = "AEye, white paper Rethinking the Three Rs of LiDAR: Rate, Resolution and Range"
+    source = (
+        "AEye, white paper Rethinking the Three Rs of LiDAR: Rate, Resolution and Range, "
+        "RRRWP_19_0812, 2019"
+    )
 
     def __init__(self, grid: AngularGrid):
         super().__init__(grid, unit_cells=1)
@@ -48,7 +51,7 @@ def fired_cells(scores: NDArray[np.floating] | Mask, budget: int, floor: Cells |
     flat = scores.ravel().astype(np.float32, copy=False)
     (chosen,) = (flat > 0).nonzero()
     if len(chosen) > budget:
-        chosen = ranked(scores)[:budget]
+        chosen = demanded(scores)[:budget]
     elif floor is not None and len(chosen) < budget:
         # So much of the floor is enough: at most len(chosen) of these cells are taken.
         free = floor[:budget]

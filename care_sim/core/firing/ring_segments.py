@@ -14,7 +14,10 @@ class RingSegments(Blocks):
     usual = (16,)
     unit = "segment"
     product = "spinning sensor with sections of azimuth for every channel"
-    source = "Hesai, PandarQT user manual, Sec. 4.3.3 (multi-section FOV)"
+    source = (
+        "Hesai, PandarQT user manual Q01-en-2101A1, Sec. 4.3, Azimuth FOV (Sec. 4.3.3, "
+        "multi-section FOV, not opened)"
+    )
 
     def __init__(self, grid: AngularGrid, columns: int):
         super().__init__(grid, 1, columns)

@@ -12,6 +12,6 @@ class Tiles(Blocks):
     unit = "tile"
     product = "solid-state flash sensor with addressable sub-arrays of emitters"
     source = (
-        "TriLumina, Progress in High-Power High-Speed VCSEL Arrays: sub-array regions are addressed"
-        " separately"
+        "TriLumina, Progress in High-Power High-Speed VCSEL Arrays, 2016, doi 10.1117/12.2215009: "
+        "sub-array regions are addressed separately"
     )

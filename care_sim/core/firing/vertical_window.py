@@ -17,7 +17,9 @@ class VerticalWindow(Window):
     name = "vertical-window"
     unit = "row"
     product = "long-range scanner with an adjustable vertical field of view"
-    source = "Luminar, Iris product sheet: vertical field of view dynamically adjustable"
+    source = (
+        "Luminar, Iris product sheet: vertical field of view dynamically adjustable (not opened)"
+    )
 
     def __init__(self, grid: AngularGrid):
         super().__init__(grid, grid.columns)
@@ -33,5 +35,5 @@ class VerticalWindow(Window):
         return places[np.argsort(np.abs(places - stood), kind="stable")]
 
     def _start(self, width: int) -> int:
-        horizon = int(np.argmin(np.abs(self.grid.elevations)))
+        horizon = int(np.argmin(np.abs(self.grid.elevations_ahead)))
         return min(max(horizon - width // 2, 0), self.units - width)

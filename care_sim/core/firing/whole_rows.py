@@ -10,7 +10,10 @@ class WholeRows(Blocks):
     name = "rows"
     unit = "row"
     product = "scanner with micro-mirrors that draws whole scan lines"
-    source = "Blickfeld, Qb2 documentation, scan pattern: scan lines, foveation"
+    source = (
+        "Blickfeld, Qb2 documentation, Scan Pattern: a scan line per half swing of the horizontal "
+        "mirror; their number and foveation"
+    )
 
     def __init__(self, grid: AngularGrid):
         super().__init__(grid, 1, grid.columns)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from care_sim.base.compiled import compiled
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.firing.base import Floor, Hardware, ranked
+from care_sim.core.firing.base import Floor, Hardware, demanded, ranked
 from care_sim.core.grid import Cells
 
 
@@ -21,11 +21,13 @@ class Window(Hardware):
     stays where nothing is demanded. It always fires as a whole: nothing is left for the floor.
     """
 
+    spends_floor = False
+
     def fire(self, scores: NDArray[Any], budget: int, floor: Floor, last: Cells) -> Cells:
         """The window that serves the demand."""
         width = budget // self.unit_cells
         places = self._reached(width, last)
-        first = _best_place(ranked(scores), self.unit_of, places, width, self.units)
+        first = _best_place(demanded(scores), self.unit_of, places, width, self.units)
         fired = np.zeros(self.units, np.bool_)
         fired[self._window(first, width)] = True
         return np.flatnonzero(fired[self.unit_of])

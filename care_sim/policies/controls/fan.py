@@ -27,7 +27,7 @@ class Fan(Policy):
     def __init__(self, rig: Rig):
         super().__init__(rig)
         grid = rig.grid
-        elevations = grid.elevations
+        elevations = grid.elevations_ahead
         is_low = (elevations < grid.row_height / 2) & (elevations > np.deg2rad(LOWEST_DEG))
         ahead = np.argsort(grid.from_ahead, kind="stable")
         parts = [np.flatnonzero(rows) * grid.columns + ahead[:, None] for rows in (is_low, ~is_low)]

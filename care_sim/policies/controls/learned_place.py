@@ -61,7 +61,7 @@ def _learned(rig: Rig, scenario: Scenario, seeds: int) -> Cells:
     for seed in training_seeds(seeds):
         # A hull is dilated by the paper's margins, its guess of how far off a box can be.
         sightings[_first_hull(rig, scenario, seed)] += 1
-    return likeliest_first(rig.grid, sightings)
+    return likeliest_first(rig, sightings)
 
 
 def _first_hull(rig: Rig, scenario: Scenario, seed: int) -> Cells:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_sim.core.belief import Belief
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
@@ -40,13 +40,13 @@ def likeliest_cells(rig: Rig, path: str | PathLike[str] | None) -> Cells:
     """(N,) all cells, those with most first sightings first; of equals, as `rows` has them."""
     weights = load_weights(shipped_weights("place") if path is None else path)
     weights.check("place", rig)
-    return likeliest_first(rig.grid, weights.array("sightings", *rig.grid.shape).ravel())
+    return likeliest_first(rig, weights.array("sightings", *rig.grid.shape).ravel())
 
 
-def likeliest_first(grid: AngularGrid, sightings: NDArray[np.floating]) -> Cells:
+def likeliest_first(rig: Rig, sightings: NDArray[np.floating]) -> Cells:
     """(N,) all cells, those with the highest `sightings` (N,) first; of equals, as `rows` has
     them.
     """
     # Most cells of a map have none: without the rows, larger budgets would go to the sky.
-    rows = nearest_rows(grid)
+    rows = nearest_rows(rig)
     return rows[np.argsort(-sightings[rows], kind="stable")]

@@ -1,24 +1,27 @@
 """A control: whole rows of the grid, without camera, tracks or memory."""
 
+import math
+
 import numpy as np
 
 from care_sim.base.checks import check_number
 from care_sim.core.belief import Belief
-from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.grid import Cells
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
 from care_sim.policies.paper.history_uniform import GOLDEN
 
-RING_ELEVATION_DEG = -1.25
-"""Where the middle of a car 1.5 m high stands, 50 m away, for the default sensor, 1.84 m above the
-road: atan((0.75 - 1.84) / 50). What enters the range of scoring by driving enters it there. It does
-not follow the rig's `sensor_height_m`."""
+ENTRY_HEIGHT_M = 0.75
+"""Of the middle of a car 1.5 m high above the road."""
+ENTRY_DISTANCE_M = 50.0
+"""The range of scoring: what enters it by driving enters it there."""
 
 
 class Rows(Policy):
     """Fires the rows nearest to the elevation at which things enter the range, nearest first; the
-    last row is thinned evenly. Raises InvalidInput for an elevation that is none.
+    last row is thinned evenly. That elevation follows from the rig (`entry_elevation_deg`), unless
+    one is given. Raises InvalidInput for one that is none.
     """
 
     name = "rows"
@@ -26,21 +29,43 @@ class Rows(Policy):
     source = "own: a pattern that never changes"
     is_pattern = True
 
-    def __init__(self, rig: Rig, elevation_deg: float = RING_ELEVATION_DEG):
+    def __init__(self, rig: Rig, elevation_deg: float | None = None):
         super().__init__(rig)
-        check_number("elevation_deg", elevation_deg, -90, 90)
-        self._pattern = nearest_rows(rig.grid, elevation_deg)
+        if elevation_deg is not None:
+            check_number("elevation_deg", elevation_deg, -90, 90)
+        self._pattern = nearest_rows(rig, elevation_deg)
 
     def demand(self, belief: Belief) -> Demand:
         """The same cells at every keyframe."""
         return Demand(layers=[[self._pattern[: belief.budget]]])
 
 
-def nearest_rows(grid: AngularGrid, elevation_deg: float = RING_ELEVATION_DEG) -> Cells:
-    """(N,) all cells, row after row, the row nearest to an elevation first; every first few cells
-    of a row lie evenly over it.
+def entry_elevation_deg(rig: Rig) -> float:
+    """Where the middle of a car stands that enters the range of scoring, seen from the LiDAR of a
+    rig: -1.25 degrees from the default one, 1.84 m above the road.
     """
-    rows = np.argsort(np.abs(np.rad2deg(grid.elevations) - elevation_deg), kind="stable")
+    # To a hundredth of a degree: results were published for -1.25 degrees, not for -1.2488.
+    rise = (ENTRY_HEIGHT_M - rig.sensor_height_m) / ENTRY_DISTANCE_M
+    return round(math.degrees(math.atan(rise)), 2)
+
+
+def nearest_rows(rig: Rig, elevation_deg: float | None = None) -> Cells:
+    """(N,) all cells, row after row, the row nearest to an elevation first: the given one, else
+    `entry_elevation_deg`. Every first few cells of a row lie evenly over it. On a tilted grid every
+    column gives its own nearest cell to the first such row, and so on.
+    """
+    grid = rig.grid
+    wanted = entry_elevation_deg(rig) if elevation_deg is None else elevation_deg
+    off = np.abs(np.rad2deg(grid.elevations_everywhere) - wanted)
+    rows = np.broadcast_to(np.argsort(off, axis=0, kind="stable"), grid.shape)
     columns = np.argsort(np.arange(grid.columns) * GOLDEN % 1)
-    cells: Cells = (rows[:, None] * grid.columns + columns).ravel()
+    cells: Cells = (rows[:, columns] * grid.columns + columns).ravel()
+    return cells
+
+
+def entry_cells(rig: Rig) -> Cells:
+    """(columns,) the cell of every column at which things enter the range of scoring."""
+    columns = rig.grid.columns
+    nearest = nearest_rows(rig)[:columns]
+    cells: Cells = nearest[np.argsort(nearest % columns)]
     return cells

@@ -97,6 +97,7 @@ class CellInputs:
             np.float32(GROUND_CLEARANCE_M - rig.sensor_height_m),
             rig.azimuth_margin,
             rig.elevation_margin,
+            rig.grid.turn,
         )
         mark_scan(seen.codes, seen.nearnesses, belief.ranges, self._heights, rules)
         return seen

@@ -36,6 +36,8 @@ class ScanRules(NamedTuple):
     """How high above the sensor a return must be."""
     margin_columns: int
     margin_rows: int
+    turn: int
+    """How many columns a whole turn has; the grid may have fewer."""
 
 
 class RigTerms(NamedTuple):
@@ -111,14 +113,15 @@ def mark_scan(
                 and not codes[cell] & MARK_HULL
             ):
                 codes[cell] |= MARK_STANDING
-                # Columns go round the car, rows end at the top and at the bottom.
+                # Columns go round the car, where the grid does; rows end at top and bottom.
                 first = max(row - rules.margin_rows, 0)
                 last = min(row + rules.margin_rows + 1, rows)
                 for near in range(first, last):
                     for by in range(
                         column - rules.margin_columns, column + rules.margin_columns + 1
                     ):
-                        codes[near * columns + by % columns] |= MARK_NEAR_STANDING
+                        if by % rules.turn < columns:
+                            codes[near * columns + by % rules.turn] |= MARK_NEAR_STANDING
 
 
 @compiled()

@@ -46,7 +46,7 @@ class PpoPolicy(Policy):
         self._reserve_alone = wrapping.action == "SectorReserve"
         self._features = GridFeatures(rig, wrapping.columns, wrapping.rows)
         self._sectors = Tiling(rig.grid, wrapping.azimuths, wrapping.elevations)
-        self._score_map = ScoreMap(file, wrapping)
+        self._score_map = ScoreMap(file, wrapping, rig.grid.goes_round)
 
     def demand(self, belief: Belief) -> Demand:
         """Hulls and the sectors scored above 0, best first; or, learned with `SectorScores`, the

@@ -1,8 +1,9 @@
 """The network of learned allocators in NumPy: one small network slides over the sectors and scores
 each.
 
-It sees the coarse blocks of a sector and one block more on each side, over the seam behind the car
-too, and the car's own motion. Hidden layers are rectified, scores are hyperbolic tangents of
+It sees the coarse blocks of a sector and one block more on each side, over the seam of a grid that
+goes all round, too, and the car's own motion. Hidden layers are rectified, scores are hyperbolic
+tangents of
 
     score.weight . relu(hidden.weight relu(window.weight * blocks + ego.weight ego + window.bias) +
     hidden.bias) + place
@@ -23,11 +24,12 @@ BLOCK_MARGIN = 1
 
 
 class ScoreMap:
-    """Scores of sectors from the observation of `GridObservation`. Raises InvalidInput for arrays
-    that do not fit.
+    """Scores of sectors from the observation of `GridObservation`; `goes_round` says whether the
+    grid does. Raises InvalidInput for arrays that do not fit.
     """
 
-    def __init__(self, weights: Weights, wrapping: Wrapping):
+    def __init__(self, weights: Weights, wrapping: Wrapping, goes_round: bool = True):
+        self._goes_round = goes_round
         self._shape = len(CHANNELS), wrapping.rows, wrapping.columns
         self._stride = wrapping.blocks_per_sector
         self._window = tuple(blocks + 2 * BLOCK_MARGIN for blocks in self._stride)
@@ -54,7 +56,7 @@ class ScoreMap:
         return np.asarray(np.tanh((hidden @ self._score).reshape(self._place.shape) + self._place))
 
     def _windows(self, grid: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(sectors, channels * blocks) what each sector sees; nothing above and below the grid."""
+        """(sectors, channels * blocks) what each sector sees; nothing beyond the grid."""
         channels, rows, columns = self._shape
         padded = np.zeros(
             (channels, rows + 2 * BLOCK_MARGIN, columns + 2 * BLOCK_MARGIN), np.float32
@@ -62,9 +64,10 @@ class ScoreMap:
         padded[:, BLOCK_MARGIN:-BLOCK_MARGIN, BLOCK_MARGIN:-BLOCK_MARGIN] = grid.reshape(
             self._shape
         )
-        # Columns go round the car: each end continues with the other one's blocks.
-        padded[:, :, :BLOCK_MARGIN] = padded[:, :, -2 * BLOCK_MARGIN : -BLOCK_MARGIN]
-        padded[:, :, -BLOCK_MARGIN:] = padded[:, :, BLOCK_MARGIN : 2 * BLOCK_MARGIN]
+        # Where columns go round the car, each end continues with the other one's blocks.
+        if self._goes_round:
+            padded[:, :, :BLOCK_MARGIN] = padded[:, :, -2 * BLOCK_MARGIN : -BLOCK_MARGIN]
+            padded[:, :, -BLOCK_MARGIN:] = padded[:, :, BLOCK_MARGIN : 2 * BLOCK_MARGIN]
         # Windows of neighbouring sectors overlap by the margins.
         tall, wide = self._stride
         windows = np.lib.stride_tricks.sliding_window_view(padded, self._window, axis=(1, 2))[

@@ -41,14 +41,16 @@ class Card:
     """What a file of weights is, what it fits, and how it was made.
 
     `kind` names the policy. `grid` is the one that was trained on. `budget` is the number of cells
-    per keyframe, None if any will do. `wrapper` says behind which wrappers the weights were
-    trained, None without. `scenario`, `data`, `seeds`, `steps`, `machine`, `versions` and `result`
-    tell people how the weights were trained and what they reached.
+    per keyframe, None if any will do. `setup` is the sensor set-up that was trained with, as a
+    `Rig` tells it. `wrapper` says behind which wrappers the weights were trained, None without.
+    `scenario`, `data`, `seeds`, `steps`, `machine`, `versions` and `result` tell people how the
+    weights were trained and what they reached.
     """
 
     kind: str
     grid: AngularGrid
     budget: int | None = None
+    setup: str = ""
     wrapper: Wrapping | None = None
     scenario: str | None = None
     data: str = ""
@@ -68,6 +70,8 @@ class Card:
         plain = parsed_json(text)
         if not isinstance(plain, dict) or plain.pop("format", None) != FORMAT:
             raise ValueError(f"its card is not of the format {FORMAT!r}")
+        # Cards of earlier versions do not tell the set-up.
+        plain.setdefault("setup", "")
         # Exactly the fields of a card: what a later form adds might change what the weights mean.
         if wrong := set(plain) ^ {column.name for column in fields(cls)}:
             raise ValueError(f"its card lacks or has too much: {', '.join(sorted(wrong))}")
@@ -115,6 +119,11 @@ class Weights:
                 raise InvalidInput(
                     f"weights {self.path}: {name} is {has}, needed is {wanted}{hint}"
                 )
+        # By the hash behind the name. A card or a rig that does not tell its set-up fits any.
+        if len({one.setup.rpartition(" ")[2] for one in (card, rig)} - {""}) > 1:
+            raise InvalidInput(
+                f"weights {self.path}: the set-up is {card.setup}, needed is {rig.setup}"
+            )
 
     def array(self, name: str, *shape: int | None) -> NDArray[np.float32]:
         """An array by name; None in `shape` is any length. Raises InvalidInput for a missing one,
@@ -183,8 +192,9 @@ def _check_contents(entries: list[ZipInfo]) -> None:
 
 
 def _grid(plain: dict[str, Any]) -> AngularGrid:
-    # Cards of earlier versions are of grids that go all round in equal steps, and say no more.
-    numbers = {"field_of_view": 2 * np.pi, "heading": 0.0} | plain
+    # Cards of earlier versions are of level grids all round in equal steps, and say no more.
+    usual = {"field_of_view": 2 * np.pi, "heading": 0.0, "pitch": 0.0, "roll": 0.0}
+    numbers = usual | plain
     listed = numbers.pop("listed", [])
     names = {column.name for column in fields(AngularGrid)} - {"listed"}
     if set(numbers) != names or not (

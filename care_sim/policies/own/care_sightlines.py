@@ -11,7 +11,7 @@ from care_sim.core.residual import camera_layers
 from care_sim.core.rig import Rig
 from care_sim.core.types import Demand
 from care_sim.policies.base import Policy
-from care_sim.policies.controls.rows import nearest_rows
+from care_sim.policies.controls.rows import entry_cells, nearest_rows
 from care_sim.policies.own.care_spread import (
     CORE_FIRST,
     HULL_CELLS_PER_RETURN,
@@ -73,14 +73,13 @@ class CareSightlines(Policy):
         self._looks_ahead = ahead
         self._rechecks = explained
         self._watches = sight_lines
-        pattern = nearest_rows(rig.grid)
-        self._row = int(pattern[0]) // rig.grid.columns
-        self._rows = CellSets.of([pattern] if rows else [])
+        self._entries = entry_cells(rig)
+        self._rows = CellSets.of([nearest_rows(rig)] if rows else [])
         self.reset()
 
     def reset(self) -> None:
         """Forget what was seen."""
-        self._lines = SightLines(self.rig, self._row)
+        self._lines = SightLines(self.rig, self._entries)
 
     def remember(self, belief: Belief) -> None:
         """Take in the last scan."""

@@ -29,7 +29,7 @@ _LAST_BITS = 1e-9
 
 
 class SightLines:
-    """A memory of the last range in every column of one `row`, moved with the car.
+    """A memory of the last range along one of the `cells` (A,) of every column, moved with the car.
 
     What drives into the range enters it at the end of an open line of sight; what was hidden shows
     itself at an edge. A line along which nothing is remembered counts as open. `ranges` (A,) are
@@ -42,8 +42,8 @@ class SightLines:
 
     ranges: Floats
 
-    def __init__(self, rig: Rig, row: int):
-        self._row = row
+    def __init__(self, rig: Rig, cells: Cells):
+        self._lines = cells
         self._keyframe_s = rig.keyframe_s
         self._spacing = rig.grid.spacing
         self._azimuths = rig.grid.azimuths
@@ -57,7 +57,7 @@ class SightLines:
 
     def update(self, belief: Belief) -> None:
         """Take in the last scan, and move what is remembered by what the car has driven since."""
-        seen = belief.ranges[self._row]
+        seen = belief.ranges.ravel()[self._lines]
         np.copyto(self.ranges, seen, where=seen > 0)
         driven = belief.ego.speed * self._keyframe_s
         turned = belief.ego.yaw_rate * self._keyframe_s
@@ -70,11 +70,11 @@ class SightLines:
         return self._cells(self._sector[self._watched[self._sector]])
 
     def cells(self) -> Cells:
-        """All that is worth a look in the row, ascending."""
+        """All that is worth a look, by ascending column."""
         return self._cells(np.flatnonzero(self._watched))
 
     def _cells(self, columns: Cells) -> Cells:
-        cells: Cells = self._row * len(self.ranges) + columns
+        cells: Cells = self._lines[columns]
         return cells
 
 

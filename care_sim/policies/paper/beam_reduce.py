@@ -34,9 +34,10 @@ def horizon_rows(grid: AngularGrid, count: int) -> list[Cells]:
 
     The last row is evenly thinned.
     """
-    # The height of a row's unit rays orders rows as their elevation does. Rows as far above the
-    # horizon as below keep the order of their index: the upper one first.
-    nearest = np.argsort(np.abs(grid.directions[:: grid.columns, 2]), kind="stable")
+    # The height of a row's unit ray straight ahead orders rows as their elevation does. Rows as far
+    # above the horizon as below keep the order of their index: the upper one first.
+    ahead = int(np.argmin(grid.from_ahead))
+    nearest = np.argsort(np.abs(grid.directions[ahead :: grid.columns, 2]), kind="stable")
     whole, rest = divmod(count, grid.columns)
     # Whole rows, then the rest in one more, if there is any.
     widths = [grid.columns] * whole + [rest] * (rest > 0)

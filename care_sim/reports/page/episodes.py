@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from care_sim.loops.records import Outcome
 from care_sim.reports.page.replay import Replay, replayed
-from care_sim.sensors.setups import check_shipped
+from care_sim.sensors.setups import setup_of_columns
 from care_sim.study.episode_config import PLAIN_FIELDS, EpisodeConfig
 from care_sim.study.episode_play import result_or_reason
 from care_sim.study.executors import ExecutorFactory, processes
@@ -87,15 +87,13 @@ def played_again(
 
 def config_of(row: Row) -> EpisodeConfig:
     """The configuration that a row was played with. Raises InvalidInput for one that this version
-    does not accept, and for a sensor set-up that does not come with it.
+    does not accept, and for a sensor set-up that is neither told nor comes with it.
     """
     # A condition that the file's version did not know, or the row does not tell, is the default.
     plain = {name: row[name] for name in PLAIN_FIELDS if row.get(name) is not None}
     if row.get("detector") is not None:
         plain["detector"] = row["detector"]
-    if row.get("sensor") is not None:
-        check_shipped(row["sensor"], row.get("sensor_hash") or "")
-        plain["sensor"] = row["sensor"]
+    plain["sensor"] = setup_of_columns(row)
     for kind in ("detector", "scenario", "policy"):
         plain[f"{kind}_parameters"] = _parameters(row, kind)
     return EpisodeConfig(**plain)

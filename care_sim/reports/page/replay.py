@@ -80,6 +80,7 @@ class Recorder:
     first_sighting: Actor | None = None
     ego_size: tuple[float, ...] = ()
     sensor: tuple[float, ...] = ()
+    reach: float = 0.0
     poses: list[list[Pose]] = field(default_factory=list)
     moments: list[dict[str, Any]] = field(default_factory=list)
     rays: list[str] = field(default_factory=list)
@@ -95,6 +96,7 @@ class Recorder:
         self.first_sighting = loop.world.first_sighting
         self.ego_size = loop.world.ego_kind.size
         self.sensor = loop.rig.sensor_position[:2]
+        self.reach = loop.rig.grid.range_m
         self._take(loop)
 
     def after(self, loop: ClosedLoop, frame: Keyframe) -> None:
@@ -121,6 +123,7 @@ class Recorder:
         ego = {
             "size": _whole(np.array(self.ego_size[:2]), _CENTI),
             "sensor": _whole(np.array(self.sensor), _CENTI),
+            "reach": _whole(self.reach, _CENTI),
         }
         # How it stands with each at every keyframe, and whom the strips and distances are of.
         about = self.first_sighting.kind.name if self.first_sighting else None

@@ -26,6 +26,7 @@ class Fast:
         self._cells = grid.size
         self._reach = float(grid.range_m)
         self._fan = grid.fan
+        self._tilt = grid.tilt if grid.is_tilted else None
         self._spacing = (*grid.spacing,)
 
     def cast(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
@@ -58,6 +59,9 @@ class Fast:
     def _cast_ascending(self, sensor: Frame, cells: Cells) -> tuple[Floats, Integers]:
         world = self._world
         parts = world.primitives
+        # The fan is about the grid's own axes: the rays are cast from a frame that has them.
+        if self._tilt is not None:
+            sensor = sensor.holding(np.zeros(3), self._tilt)
         pose = (sensor.x, sensor.y, sensor.z, sensor.yaw, sensor.roll, sensor.pitch)
         return cast_rays(
             cells,

@@ -1,8 +1,12 @@
 """The study of what the hardware can fire: the same tasks under every hardware, in either loop."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from care_sim.core.firing.listing import CELLS, HARDWARE, settled
+from care_sim.base.errors import InvalidInput
+from care_sim.core.firing.listing import CELLS, HARDWARE, hardware_of, settled
+from care_sim.core.sensor_setup import SensorSetup
+from care_sim.sensors.setups import DEFAULT_SETUP, sensor_setup
 from care_sim.sources.scenes import Scene, Source
 from care_sim.study.episode_config import EpisodeConfig, grid
 from care_sim.study.play_config import PlayConfig, play_grid
@@ -17,15 +21,54 @@ FIRING_BUDGETS = (0.03, 0.05, 0.1)
 """A row of 32 is 3.1% of the cells: less than half of that buys none."""
 
 
-def firing_study(seeds: Sequence[int], also: Sequence[str] = ()) -> list[EpisodeConfig]:
-    """The dense street under every hardware; `also` are further policies."""
-    policies = list(dict.fromkeys([*FIRING_POLICIES, *also]))
+class Fitting(NamedTuple):
+    """The hardware and the policies of the study that fit a sensor set-up, and a line for each
+    other one.
+    """
+
+    firings: list[str]
+    policies: list[str]
+    left_out: list[str]
+
+
+def fitting(sensor: str | SensorSetup) -> Fitting:
+    """What of the study fits a set-up: units that divide its grid and of which the least budget
+    buys one, and policies without weights of another grid.
+    """
+    setup = sensor_setup(sensor)
+    found = Fitting([], [], [])
+    for firing in FIRINGS:
+        try:
+            hardware_of(firing, setup.grid).budget_cells(FIRING_BUDGETS[0])
+            found.firings.append(firing)
+        except InvalidInput as error:
+            found.left_out.append(f"left out with {setup.name}: {firing} ({error})")
+    for policy in FIRING_POLICIES:
+        try:
+            grid(["dense"], [policy], FIRING_BUDGETS[-1:], [0], sensor=sensor)
+            found.policies.append(policy)
+        except InvalidInput as error:
+            found.left_out.append(f"left out with {setup.name}: {policy} ({error})")
+    return found
+
+
+def firing_study(
+    seeds: Sequence[int],
+    also: Sequence[str] = (),
+    sensors: Sequence[str | SensorSetup] = (DEFAULT_SETUP,),
+) -> list[EpisodeConfig]:
+    """The dense street with every set-up under every hardware that fits it; `also` are further
+    policies.
+    """
+    configs = []
+    for sensor in sensors:
+        fits = fitting(sensor)
+        policies = [*dict.fromkeys([*fits.policies, *also])]
+        for firing in fits.firings:
+            configs += grid(
+                ["dense"], policies, FIRING_BUDGETS, seeds, firing=firing, sensor=sensor
+            )
     # The full scan feels no hardware, and is played once for all.
-    configs = [
-        config
-        for firing in FIRINGS
-        for config in grid(["dense"], policies, FIRING_BUDGETS, seeds, firing=firing)
-    ]
     return [*dict.fromkeys(configs)]
 
 
@@ -36,10 +79,10 @@ def firing_plays(
     budgets: Sequence[float],
     floor_seeds: Sequence[int] = (0,),
 ) -> list[PlayConfig]:
-    """The first-sighting protocol under every hardware."""
+    """The first-sighting protocol under every hardware that fits the set-up of the source."""
     configs = [
         config
-        for firing in FIRINGS
+        for firing in fitting(source.sensor).firings
         for config in play_grid(source, scenes, policies, budgets, floor_seeds, firing=firing)
     ]
     return [*dict.fromkeys(configs)]

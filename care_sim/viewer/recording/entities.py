@@ -79,6 +79,7 @@ ENTITIES = {
     "budget/chosen": (
         "cells that a raw action scored, whose share is not known, percent of the budget"
     ),
+    "budget/along": "cells of a window that nothing asked for, percent of the budget",
     "states/actor": (
         "the first-sighting actor: in or out of view of the unimpaired camera, or detected by "
         "this scan"
@@ -97,8 +98,15 @@ BODY_COLOURS = dict(
     )
 )
 NO_CLASS = (120, 124, 132)
-SHARE_COLOURS = ((38, 41, 48), (80, 200, 255), (255, 150, 30), (112, 116, 132), (170, 225, 110))
-"""Not fired, exploitation, reserve, floor, chosen."""
+SHARE_COLOURS = (
+    (38, 41, 48),
+    (80, 200, 255),
+    (255, 150, 30),
+    (112, 116, 132),
+    (170, 225, 110),
+    (150, 120, 170),
+)
+"""Not fired, exploitation, reserve, floor, chosen, along."""
 EXPLAINED_RGB = (80, 200, 255)
 RESIDUAL_RGB = (255, 150, 30)
 MISSED_RGB = (255, 80, 120)

@@ -12,7 +12,10 @@ _EYE_M = (-11.0, 0.0, 6.0)
 _TARGET_M = (12.0, 0.0, -1.0)
 """Where it looks to."""
 _DARK = (24, 26, 30)
-_GRID_TITLE = "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action"
+_GRID_TITLE = (
+    "fired: blue exploitation, orange reserve, grey floor, green chosen by a raw action, purple "
+    "along in a window"
+)
 
 
 def blueprint(lanes: Sequence[str]) -> rrb.Blueprint:

@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 from rerun.components import InterpolationMode
 
-from care_sim.core.actions import CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
+from care_sim.core.actions import ALONG, CHOSEN, EXPLOITATION, FLOOR, RESERVE, SHARES
 from care_sim.core.arrays import Floats
 from care_sim.core.grid import Cells
 from care_sim.loops.records import Keyframe
@@ -90,9 +90,8 @@ class MeasureLog:
                 f"measures/{name}", np.array([getattr(frame, field) for frame in frames], float)
             )
         # Either a policy's demand tells the shares, or a raw action scored the cells itself.
-        for share in (
-            (CHOSEN, FLOOR) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE, FLOOR)
-        ):
+        asked = (CHOSEN,) if percents[:, CHOSEN].any() else (EXPLOITATION, RESERVE)
+        for share in (*asked, ALONG if percents[:, ALONG].any() else FLOOR):
             self._log_curve(f"budget/{SHARES[share]}", percents[:, share])
 
     def _log_curve(self, entity: str, values: Floats) -> None:

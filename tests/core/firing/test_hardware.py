@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.actions import scores_of
 from care_sim.core.conditions import Conditions
+from care_sim.core.firing.base import demanded, ranked
 from care_sim.core.firing.listing import HARDWARE, hardware_of, settled
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
@@ -109,6 +111,17 @@ def test_a_window_that_may_go_anywhere_serves_the_first_cell(name, demand, share
     units = round(share * hardware_of(name, GRID).units)
     assume(units > 0 and len(demand))
     assert demand[0] in fired(name, demand, units)
+
+
+@given(
+    arrays(
+        np.float32,
+        (4, 9),
+        elements=st.sampled_from([0.0, -0.0, -1.0, 1e-45, 1e-30, 0.25, 0.5, 1.0, np.inf]),
+    )
+)
+def test_the_order_of_a_demand_is_that_of_its_scores(scores):
+    assert demanded(scores).tolist() == ranked(scores).tolist()
 
 
 def test_blocks_by_hand():

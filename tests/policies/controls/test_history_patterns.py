@@ -24,7 +24,7 @@ def test_the_hull_of_the_track_comes_first_and_then_the_rows(belief_of, car):
     demand = HistoryRows(Rig()).demand(belief_of([car(1, 20)]))
     assert [cells.tolist() for cells in demand.exploitation] == [HULL]
     ((pattern,),) = demand.layers
-    assert np.array_equal(pattern, nearest_rows(GRID)[:819])
+    assert np.array_equal(pattern, nearest_rows(Rig())[:819])
 
 
 def test_the_hull_of_the_track_comes_first_and_then_the_map(belief_of, car, tmp_path):

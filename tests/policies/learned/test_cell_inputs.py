@@ -88,6 +88,16 @@ def test_a_standing_return_marks_its_surroundings_across_the_seam_too(seen_of):
     assert seen[seam, NEARNESS] == pytest.approx(0.8)
 
 
+def test_on_a_grid_with_a_gap_surroundings_end_where_it_ends(belief_of):
+    """Columns of a degree from -60 to 60: the last is no neighbour of column 0."""
+    grid = AngularGrid(120, 5, 0.2, -0.2, field_of_view=np.pi * 2 / 3)
+    scan = np.zeros(grid.shape, np.float32)
+    scan[2, 0] = 10.0
+    marks = CellInputs(Rig(grid)).of(belief_of(ranges=scan), []).rows(np.arange(grid.size))
+    assert cells_with(marks, STANDING) == [240]
+    assert {cell % 120 for cell in cells_with(marks, NEAR)} == {0, 1, 2}
+
+
 def test_the_road_a_hull_and_no_return_do_not_stand(seen_of, car):
     _, seen = seen_of((), [car(1, 12.0)], {DOWN: 6.7, AHEAD + 100: GRID.range_m, AHEAD: 12.0})
     assert cells_with(seen, FIRED) == sorted([DOWN, AHEAD + 100, AHEAD])

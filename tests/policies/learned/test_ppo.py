@@ -38,13 +38,13 @@ def env():
     made.close()
 
 
-def score_map(wrapping, **arrays):
+def score_map(wrapping, goes_round=True, **arrays):
     """A map of zeros but for the arrays."""
     zeros = {
         name: np.zeros(shape, np.float32) for name, shape in shapes(wrapping, hidden=1).items()
     }
     given = {name: np.asarray(array, np.float32) for name, array in arrays.items()}
-    return ScoreMap(Weights("hand", zeros | given, None), wrapping)
+    return ScoreMap(Weights("hand", zeros | given, None), wrapping, goes_round)
 
 
 def observation(wrapping, channel, *blocks):
@@ -69,6 +69,17 @@ def test_every_sector_sees_its_blocks_and_one_more_on_each_side_over_the_seam():
     }.items():
         np.testing.assert_allclose(scores(observation(wrapping, 1, blocks)), expected, atol=1e-6)
     assert not scores(observation(wrapping, 0, (0, 0))).any()
+
+
+def test_without_a_seam_the_last_sector_is_no_neighbour_of_the_first():
+    wrapping = Wrapping(azimuths=4, elevations=1, columns=4, rows=1)
+    kernel = np.ones((1, len(CHANNELS), 3, 3))
+    network = {"window.weight": kernel, "hidden.weight": [[1.0]], "score.weight": [0.1]}
+    lit = np.tanh(0.1)
+    for goes_round, expected in ((True, [lit, lit, 0, lit]), (False, [lit, lit, 0, 0])):
+        scores = score_map(wrapping, goes_round, **network)
+        found = scores(observation(wrapping, 1, (0, 0)))
+        np.testing.assert_allclose(found, [expected], atol=1e-6)
 
 
 def test_the_cars_own_motion_and_the_place_count():
@@ -101,7 +112,8 @@ def test_it_fires_what_its_learner_would_behind_the_wrappers(tmp_path, env, acti
     assert fired[0] == fired[1]
 
 
-def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
+@pytest.mark.parametrize("goes_round", [True, False])
+def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env, goes_round):
     pytest.importorskip("stable_baselines3")
     from care_sim.training.algorithms import make_learner
     from care_sim.training.config import PpoConfig
@@ -109,9 +121,9 @@ def test_numpy_predicts_what_stable_baselines3_does(tmp_path, env):
 
     config = PpoConfig(environments=2, rollout=32, batch=32, hidden=8)
     envs = side_by_side(config)
-    model = make_learner(config, envs).learn(128)
+    model = make_learner(config, envs, goes_round).learn(128)
     save_weights(tmp_path / "w.npz", model.policy.arrays(), Card("ppo", AngularGrid()))
-    numpy = ScoreMap(load_weights(tmp_path / "w.npz"), config.wrapping)
+    numpy = ScoreMap(load_weights(tmp_path / "w.npz"), config.wrapping, goes_round)
     observations = envs.reset()
     for _ in range(20):
         actions, _ = model.predict(observations, deterministic=True)

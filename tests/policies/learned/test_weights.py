@@ -16,6 +16,7 @@ import care_sim
 from care_sim.base.errors import InvalidInput
 from care_sim.core.grid import AngularGrid
 from care_sim.core.rig import Rig
+from care_sim.core.sensor_setup import SensorSetup
 from care_sim.policies.learned.weights import (
     LARGEST_WEIGHT,
     Card,
@@ -50,6 +51,35 @@ def test_what_is_written_is_read_back_bit_for_bit(saved):
     for name, array in ARRAYS.items():
         assert weights.arrays[name].dtype == np.float32
         np.testing.assert_array_equal(weights.arrays[name], array)
+
+
+def test_weights_of_another_set_up_are_refused_in_one_line(tmp_path):
+    """By its hash: another name for the same is none. What does not tell its set-up fits any."""
+    bumper = SensorSetup("bumper", position=(2.0, 0.0, 0.6))
+    card = Card("ppo", AngularGrid(), setup=bumper.label)
+    save_weights(tmp_path / "w.npz", ARRAYS, card)
+    weights = load_weights(tmp_path / "w.npz")
+    assert weights.card.setup == f"bumper {bumper.digest}"
+    for setup in (bumper.label, f"another name {bumper.digest}", ""):
+        weights.check("ppo", Rig(setup=setup))
+    replace(weights, card=replace(card, setup="")).check("ppo", Rig(setup="roof 123"))
+    with pytest.raises(InvalidInput, match=r"the set-up is bumper \w+, needed is roof 123$"):
+        weights.check("ppo", Rig(setup="roof 123"))
+
+
+@pytest.mark.parametrize("environment", ["CARE-Dense-v0", "CARE-Street-v0"])
+def test_an_environment_tells_its_set_up(environment, tmp_path):
+    """The map of `place` from the bumper is none for the roof, though both have one grid."""
+    bumper = SensorSetup("bumper", position=(2.0, 0.0, 0.6))
+    arrays = {"sightings": np.zeros(AngularGrid().shape)}
+    save_weights(tmp_path / "w.npz", arrays, Card("place", AngularGrid(), setup=bumper.label))
+    with gymnasium.make(environment, sensor=bumper) as env:
+        care_sim.make_policy("place", env, path=tmp_path / "w.npz")
+    with (
+        gymnasium.make(environment) as env,
+        pytest.raises(InvalidInput, match=r"the set-up is bumper \w+, needed is hdl-32e \w+$"),
+    ):
+        care_sim.make_policy("place", env, path=tmp_path / "w.npz")
 
 
 def in_the_first_form(path: Path, arrays, card, line: str) -> None:

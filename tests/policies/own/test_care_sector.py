@@ -35,7 +35,7 @@ def test_without_camera_and_tracks_it_is_the_sector_then_rows(belief_of):
     layers = CareSector(Rig()).demand(belief_of()).layers
     asked = [[cells.tolist() for cells in layer] for layer in layers]
     sector = (9 * 512 + columns_ahead(AngularGrid())).tolist()
-    rows = nearest_rows(AngularGrid()).tolist()
+    rows = nearest_rows(Rig()).tolist()
     assert asked == [[], [sector], [], [], [], [rows[:512]], [], [rows[:819]]]
 
 

@@ -3,7 +3,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const VIEW = { behind: 9, ahead: 41, side: 9.5 };
 const NARROW = { behind: 6, ahead: 26, side: 9.5 };
-const REACH = 50;
+const PATH = 40;
 const STATES = ["unseen", "in-view", "found"];
 
 function add(parent, name, attributes = {}, text = "") {
@@ -35,6 +35,7 @@ class View {
   // One episode on a stage of its own.
   constructor(root, episode, standing, story) {
     this.story = story;
+    this.reach = story.ego.reach / 100;
     this.last = story.time.length - 1;
     this.figure = root.appendChild(document.createElement("figure"));
     this.figure.className = "view";
@@ -66,7 +67,7 @@ class View {
     this.sensor = add(this.world, "g");
     this.sectors = [...this.story.rays[0]].map((_, n, all) => {
       const [from, to] = [n, n + 1].map((end) => ((2 * end) / all.length - 1) * Math.PI * 1000);
-      return add(this.sensor, "path", { d: fan(from, to, REACH), class: "ray" });
+      return add(this.sensor, "path", { d: fan(from, to, this.reach), class: "ray" });
     });
     this.wedges = add(this.sensor, "g");
     this.bodies = new Map();
@@ -79,7 +80,7 @@ class View {
     if (this.turns) {
       const way = this.story.way.map(([x, y]) => `${x / 100} ${-y / 100}`).join("L");
       this.world.insertBefore(add(this.world, "path", { d: `M${way}`, class: "way", "stroke-width": wide }), this.sensor);
-    } else add(this.ego, "rect", { x: 0, y: -wide / 2, width: REACH - 10, height: wide, class: "path" });
+    } else add(this.ego, "rect", { x: 0, y: -wide / 2, width: PATH, height: wide, class: "path" });
     box(this.ego, ego.size, "ego");
     this.lights = add(this.ego, "rect", { x: -ego.size[0] / 200, y: -ego.size[1] / 200, width: 0.8, height: ego.size[1] / 100, class: "brake" });
   }
@@ -148,7 +149,7 @@ class View {
     this.sensor.setAttribute("transform", place([x + ahead * cos - left * sin, y + ahead * sin + left * cos, yaw]));
     this.sectors.forEach((sector, n) => sector.setAttribute("fill-opacity", (0.75 * (parseInt(story.rays[frame][n], 36) / 35) ** 0.7).toFixed(3)));
     this.wedges.replaceChildren();
-    for (const [left, right, known] of story.camera[k]) add(this.wedges, "path", { d: fan(left, right, REACH), class: known ? "explained" : "unexplained" });
+    for (const [left, right, known] of story.camera[k]) add(this.wedges, "path", { d: fan(left, right, this.reach), class: known ? "explained" : "unexplained" });
     for (const [n, { rect }] of this.bodies) rect.classList.toggle("seen", story.seen[k][n] === "1");
     this.tracks.replaceChildren();
     for (const [id, tx, ty, heading, vx, vy, coasting] of story.tracks[k]) {
