@@ -133,6 +133,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `false_negative_burst` | camera | keyframes that a miss lasts |
     | `false_positive_rate` | camera | mean number of false boxes per picture |
     | `camera_latency` | camera | age of its detections, keyframes |
+    | `camera_latency_s` | camera | age of its detections, s; not with `camera_latency` |
     | `camera_jitter` | camera | most keyframes by which a picture comes later still |
     | `blackout_start_s`, `blackout_s` | camera | begin and length of a blackout, s |
     | `camera_rotation_sigma_deg` | camera | spread of the mount's error in yaw and pitch, degrees |

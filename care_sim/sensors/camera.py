@@ -17,6 +17,7 @@ from care_sim.sensors.camera_faults import Delay, Misses, mounted
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.box_kernels import visible_boxes
 from care_sim.sensors.false_boxes import FalseBoxes
+from care_sim.sensors.picture_timing import picture_timing
 from care_sim.world.bullet import PixelWindow
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
@@ -92,7 +93,8 @@ class CameraDetector:
     """Makes of faultless detections those that arrive: they err and lag as `sensing` says.
 
     `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows.
-    False boxes are made from `pool`.
+    False boxes are made from `pool`. Pictures can be taken every `step_s` seconds, by default at
+    keyframes alone.
     """
 
     def __init__(
@@ -103,6 +105,7 @@ class CameraDetector:
         seed: np.random.SeedSequence,
         cameras: Sequence[PinholeCamera],
         pool: BoxPool = EMPTY_POOL,
+        step_s: float | None = None,
     ):
         # Every fault has a random stream of its own: one switched on leaves the others as they are.
         false_boxes, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
@@ -110,17 +113,27 @@ class CameraDetector:
         self._sensing = sensing
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
         self._false_boxes = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), false_boxes)
-        self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
+        self.timing = picture_timing(sensing, keyframe_s, step_s or keyframe_s)
+        self._delay = Delay(self.timing, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
 
     def detect(
         self, seen: IdentifiedDetections, heading: float, ranges: Floats, time_s: float
     ) -> IdentifiedDetections:
-        """The newest detections that are due, the surest first, each with the object behind it.
+        """The newest detections at a keyframe whose pictures are taken at the keyframe itself: see
+        `take` and `newest`.
+        """
+        self.take(seen, heading, ranges, time_s)
+        return self.newest(heading)
 
-        `seen` are the faultless ones of this keyframe, at `time_s` and with the car's `heading`;
-        `ranges` (n,) are the distances of the objects in metres, in their order.
+    def take(
+        self, seen: IdentifiedDetections, heading: float, ranges: Floats, time_s: float
+    ) -> None:
+        """Take in the pictures of a keyframe.
+
+        `seen` are their faultless detections, at `time_s` and with the car's `heading`; `ranges`
+        (n,) are the distances of the objects in metres, in their order.
         """
         # Both faults draw at every keyframe, whatever is there and whatever becomes of it, so that
         # every policy meets the same ones.
@@ -142,7 +155,13 @@ class CameraDetector:
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
         order = reported[np.lexsort((rows[reported, ImageDetections.LEFT], -confidences[reported]))]
         detections = ImageDetections.from_checked_rows(rows[order])
-        return self._delay.newest(IdentifiedDetections(detections, objects[order]), heading)
+        self._delay.take(IdentifiedDetections(detections, objects[order]), heading)
+
+    def newest(self, heading: float) -> IdentifiedDetections:
+        """Begin a keyframe with the car's `heading`: the newest detections that are due, the surest
+        first, each with the object behind it.
+        """
+        return self._delay.newest(heading)
 
 
 def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:
