@@ -23,6 +23,8 @@ from care_sim.core.grid import AZIMUTH_MARGIN, ELEVATION_MARGIN, MOST_COLUMNS, M
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
+IDEAL_CAMERA = "ideal"
+"""The camera profile that reports whatever shows enough pixels."""
 CAMERA_CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
 MOST_FALSE_BOXES = 64
@@ -39,6 +41,10 @@ LONGEST_BLACKOUT_S = 3600.0
 class CameraFaults:
     """What the camera gets wrong."""
 
+    camera_profile: str = IDEAL_CAMERA
+    """The detector that the camera is like (`care_sim.sensors.camera_profiles`): `ideal`, or
+    `yolox`, which misses, confuses and invents objects as measured. The faults below come on top.
+    """
     false_negative_rate: float = bounded(0.0, 0, 1)
     """Share of the objects in a picture that the camera misses, 0 to 1."""
     false_negative_per_m: float = bounded(0.0, 0, 1)
@@ -178,7 +184,7 @@ class ClosedLoopConditions(DriverSettings, Conditions):
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
 OF_BOTH_LOOPS = tuple(field.name for field in fields(Conditions))
-COLUMNS_WHERE_CHANGED = (*DRIVER_SETTINGS, "firing", "camera_latency_s")
+COLUMNS_WHERE_CHANGED = (*DRIVER_SETTINGS, "firing", "camera_profile", "camera_latency_s")
 """Conditions that are a column of results only where they are not the default: so rows, and the
 digests made of them, stay as they were before there was a choice."""
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))

@@ -228,7 +228,7 @@ class ClosedLoop:
         boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
         taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
         seen = faultless_detections(taken, self._labels)
-        self._camera.take(seen, sensor.yaw, planar_ranges(boxes), self.world.time)
+        self._camera.take(seen, sensor.yaw, boxes, self.world.time)
         rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
         return ClosestApproach.over([before, rest])
 
@@ -252,7 +252,7 @@ class ClosedLoop:
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
         if not self._camera.timing.after_s:
-            self._camera.take(self.seen, sensor.yaw, planar_ranges(boxes), self.world.time)
+            self._camera.take(self.seen, sensor.yaw, boxes, self.world.time)
         arrived = self._camera.newest(sensor.yaw)
         ego = self._odometry.reading(self.world.ego_motion)
         tracks = self._memory.tracks(sensor)

@@ -248,7 +248,7 @@ def test_the_scoring_looks_through_a_camera_that_stands_straight():
 
 def test_all_faults_are_off_by_default():
     usual = Conditions()
-    assert {getattr(usual, name) for name in CAMERA_FAULTS} == {0, 1}
+    assert {getattr(usual, name) for name in CAMERA_FAULTS} == {"ideal", 0, 1}
     assert usual.false_negative_burst == 1
 
 
