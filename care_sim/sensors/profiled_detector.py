@@ -71,25 +71,18 @@ class ProfiledDetector:
         misses, jitter, confusion = (
             draws.next()[places] for draws in (self._misses, self._jitter, self._confusion)
         )
-        profile = self._profile
-        groups = profile.groups_of(seen.detections.classes)
-        heights, shares = seen_as(seen, boxes, self._cameras, profile.focal_px)
-        recalls = np.empty(len(seen))
-        for number, group in enumerate(profile.groups):
-            own = groups == number
-            recalls[own] = group.recall.at(heights[own], shares[own])
+        classes = seen.detections.classes
+        groups = self._profile.groups_of(classes)
+        own_misses = misses[np.arange(len(seen)), groups]
+        (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes))
 
-        (found,) = np.nonzero(misses[np.arange(len(seen)), groups] < recalls)
         rows = seen.detections.rows()[found]
-        of_cameras = seen.detections.cameras[found]
-        rows[:, ImageDetections.CLASS] = confused(
-            seen.detections.classes[found], confusion[found, 0], self._matrix
-        )
+        rows[:, ImageDetections.CLASS] = confused(classes[found], confusion[found, 0], self._matrix)
         rows[:, ImageDetections.BOX] = jittered(
             rows[:, ImageDetections.BOX],
             jitter[found],
             self._spreads[groups[found]],
-            of_cameras,
+            seen.detections.cameras[found],
             self._cameras,
         )
         return rows, seen.objects[found]
@@ -97,3 +90,12 @@ class ProfiledDetector:
     def ghosts(self, shown: Floats, time_s: float) -> Floats:
         """(k, 9) the ghosts of this keyframe's pictures, beside the boxes `shown` (n, 9)."""
         return self._ghosts.draw(shown, time_s)
+
+    def _recalls(self, seen: IdentifiedDetections, groups: Integers, boxes: Floats) -> Floats:
+        """(n,) the chances to find the objects `seen` (n,), of the `groups` (n,)."""
+        heights, shares = seen_as(seen, boxes, self._cameras, self._profile.focal_px)
+        recalls = np.empty(len(seen))
+        for number, group in enumerate(self._profile.groups):
+            own = groups == number
+            recalls[own] = group.recall.at(heights[own], shares[own])
+        return recalls

@@ -18,7 +18,7 @@ def row(place, shift=0.0):
     return [4, 0.5, left, 60.0, left + 4.0, 80.0, 0, 0.0, 0.0]
 
 
-def pool(pictures=400, objects=OBJECTS, pixels_per_keyframe=0.0):
+def pool(pictures=160, objects=OBJECTS, pixels_per_keyframe=0.0):
     """Objects side by side that move to the right together."""
     seen = [
         IdentifiedDetections(
@@ -35,16 +35,15 @@ def pool(pictures=400, objects=OBJECTS, pixels_per_keyframe=0.0):
 STILL = pool()
 
 
-def shown(lent=STILL, rate=2.0, time_s=0.5, keyframes=200, seed=0, true=NO_ROWS):
+def shown(lent=STILL, rate=2.0, time_s=0.5, keyframes=100, seed=0, true=NO_ROWS):
     ghosts = Ghosts(lent, rate, time_s, KEYFRAME_S, 1, np.random.default_rng(seed))
     return [ghosts.draw(true, KEYFRAME_S * k) for k in range(keyframes)]
 
 
 def test_there_are_as_many_as_stated_from_the_first_picture_on():
-    first = [len(shown(keyframes=1, seed=seed)[0]) for seed in range(300)]
-    later = [len(boxes) for boxes in shown(keyframes=300)]
-    assert np.mean(first) == pytest.approx(2.0, abs=0.25)
-    assert np.mean(later) == pytest.approx(2.0, abs=0.4)
+    lengths = np.array([list(map(len, shown(keyframes=12, seed=seed))) for seed in range(60)])
+    assert lengths[:, 0].mean() == pytest.approx(2.0, abs=0.6)
+    assert lengths.mean() == pytest.approx(2.0, abs=0.4)
 
 
 @pytest.mark.parametrize("time_s", [0.2, 0.5])
@@ -52,15 +51,15 @@ def test_they_live_as_long_as_stated(time_s):
     """The chance to last another keyframe is exp(-keyframe / time)."""
     stays = np.exp(-KEYFRAME_S / time_s)
     # Each has its own variation, and so keeps its own left edge in a pool that stands still.
-    frames = [set(boxes[:, 2].tolist()) for boxes in shown(time_s=time_s, keyframes=350)]
+    frames = [set(boxes[:, 2].tolist()) for boxes in shown(time_s=time_s, keyframes=150)]
     born_here = [b - a for a, b in zip([set(), *frames[:-1]], frames, strict=True)]
     lives = [
         next((n for n, later in enumerate(frames[k:]) if one not in later), len(frames) - k)
-        for k, born in enumerate(born_here[:250])
+        for k, born in enumerate(born_here[:110])
         for one in born
     ]
-    assert len(lives) > 80
-    assert np.mean(lives) == pytest.approx(1 / (1 - stays), rel=0.25)
+    assert len(lives) > 30
+    assert np.mean(lives) == pytest.approx(1 / (1 - stays), rel=0.35)
 
 
 def test_a_ghost_moves_as_the_object_that_it_follows():
@@ -70,9 +69,10 @@ def test_a_ghost_moves_as_the_object_that_it_follows():
         # One ghost is shown at most. It ends with the pool's last picture, and another may follow.
         lefts = [boxes[0, 2] for boxes in shown(moving, 1.0, 1e6, 10, seed) if len(boxes) == 1]
         steps += np.diff(lefts).tolist()
-    assert len(steps) > 15
+    # Near the pool's edges its variation is made the other way round: that step is another.
+    assert len(steps) > 12
     assert np.median(steps) == pytest.approx(3.0, abs=0.3)
-    assert np.mean(np.abs(np.array(steps) - 3.0) < 1.1) > 0.8
+    assert np.mean(np.abs(np.array(steps) - 3.0) < 1.1) > 0.7
 
 
 def test_it_ends_where_its_object_leaves_the_pictures():
