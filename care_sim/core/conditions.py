@@ -24,12 +24,16 @@ from care_sim.core.grid_rays import MOST_COLUMNS, MOST_ROWS
 
 MIN_RETURNS = 3
 """Fired rays that must hit an object. The fewest that span a surface."""
+IDEAL_CAMERA = "ideal"
+"""The camera profile that reports whatever shows enough pixels."""
 CAMERA_CONFIDENCE = 0.25
 """The public confidence threshold of the paper's camera detector (Remark 2)."""
 MOST_FALSE_BOXES = 64
 """False detections per picture, on average: half as many as a policy is shown at most."""
 MOST_KEYFRAMES = 1200
 """No fault needs to last longer: a minute in steps of 0.05 s, as long as an episode may be."""
+LONGEST_LATENCY_S = 60.0
+"""As long as `MOST_KEYFRAMES`."""
 LONGEST_BLACKOUT_S = 3600.0
 """Latest begin and longest time of a blackout: far beyond the end of any episode or scene."""
 
@@ -38,6 +42,10 @@ LONGEST_BLACKOUT_S = 3600.0
 class CameraFaults:
     """What the camera gets wrong."""
 
+    camera_profile: str = IDEAL_CAMERA
+    """The detector that the camera is like (`care_sim.sensors.camera_profiles`): `ideal`, or
+    `yolox`, which misses, confuses and invents objects as measured. The faults below come on top.
+    """
     false_negative_rate: float = bounded(0.0, 0, 1)
     """Share of the objects in a picture that the camera misses, 0 to 1."""
     false_negative_per_m: float = bounded(0.0, 0, 1)
@@ -51,6 +59,11 @@ class CameraFaults:
     """
     camera_latency: int = bounded(0, 0, MOST_KEYFRAMES)
     """Age of the camera's detections in whole keyframes."""
+    camera_latency_s: float = bounded(0.0, 0, LONGEST_LATENCY_S)
+    """Age of the camera's detections in seconds; not together with `camera_latency`. The picture is
+    of that instant, or of the newest before it at which there is one: in the closed loop the world
+    steps every 0.05 s, a film has its keyframes (`care_sim.sensors.picture_timing`).
+    """
     camera_jitter: int = bounded(0, 0, MOST_KEYFRAMES)
     """Most keyframes by which a picture may come later still; drawn evenly from 0 to this."""
     blackout_start_s: float = bounded(0.0, 0, LONGEST_BLACKOUT_S)
@@ -65,6 +78,12 @@ class CameraFaults:
     """Spread of the error in x, y and z with which the camera is mounted, metres; drawn once per
     episode.
     """
+
+    def _check_latency(self) -> None:
+        if self.camera_latency and self.camera_latency_s:
+            raise InvalidInput(
+                "give camera_latency (keyframes) or camera_latency_s (seconds), not both"
+            )
 
     def black_at(self, time_s: float) -> bool:
         """Whether a picture taken at `time_s` is black."""
@@ -121,6 +140,7 @@ class Sensing(CameraFaults, LidarFaults):
 
     def __post_init__(self) -> None:
         check_fields(self)
+        self._check_latency()
         self._check_rows()
 
 
@@ -165,7 +185,7 @@ class ClosedLoopConditions(DriverSettings, Conditions):
 
 DEFAULTS = {field.name: field.default for field in fields(ClosedLoopConditions)}
 OF_BOTH_LOOPS = tuple(field.name for field in fields(Conditions))
-COLUMNS_WHERE_CHANGED = (*DRIVER_SETTINGS, "firing")
+COLUMNS_WHERE_CHANGED = (*DRIVER_SETTINGS, "firing", "camera_profile", "camera_latency_s")
 """Conditions that are a column of results only where they are not the default: so rows, and the
 digests made of them, stay as they were before there was a choice."""
 CAMERA_FAULTS = tuple(field.name for field in fields(CameraFaults))

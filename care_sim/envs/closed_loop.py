@@ -23,6 +23,7 @@ from care_sim.loops.seeds import SensorSeeds
 from care_sim.perception.detectors import PROXY
 from care_sim.scenarios import SCENARIOS, make_scenario
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
+from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.engines import check_engine
 from care_sim.sensors.setups import DEFAULT_SETUP, Sensor, sensor_setup
 from care_sim.viewer.pictures.keyframe import draw_keyframe
@@ -128,11 +129,13 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `engine` | sensors | what casts the rays, "fast" or "bullet" |
     | `min_returns` | LiDAR detector | fired rays that must hit an object |
     | `camera_confidence` | camera detector | least confidence of a detection |
+    | `camera_profile` | camera | the detector that it is like, "ideal" or "yolox" |
     | `false_negative_rate` | camera | share of the objects that it misses |
     | `false_negative_per_m` | camera | growth of that share with distance, 1/m |
     | `false_negative_burst` | camera | keyframes that a miss lasts |
     | `false_positive_rate` | camera | mean number of false boxes per picture |
     | `camera_latency` | camera | age of its detections, keyframes |
+    | `camera_latency_s` | camera | age of its detections, s; not with `camera_latency` |
     | `camera_jitter` | camera | most keyframes by which a picture comes later still |
     | `blackout_start_s`, `blackout_s` | camera | begin and length of a blackout, s |
     | `camera_rotation_sigma_deg` | camera | spread of the mount's error in yaw and pitch, degrees |
@@ -268,7 +271,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
         They are those of another drive through this scenario. Its stream is its own, so that
         nothing in it tells of this episode.
         """
-        if not self.conditions.false_positive_rate:
+        if not invents_boxes(self.conditions):
             return EMPTY_POOL
         # The first five are those of `reset`, however many are asked for.
         _, camera, lidar, _, odometry, another = self._streams(entropy, count=6)

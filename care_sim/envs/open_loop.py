@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from care_sim.base.checks import check_arguments, check_choice
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.core.arrays import Mask
+from care_sim.core.conditions import IDEAL_CAMERA
 from care_sim.core.grid import AngularGrid
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.sensor_setup import Position
@@ -127,6 +128,11 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
         decide.
         """
         # By name: recorded scenes are all played with one seed, and should not share their faults.
+        if film.detected and self.conditions.camera_profile != IDEAL_CAMERA:
+            raise InvalidInput(
+                "camera_profile must be ideal where the camera's detections come from a file: "
+                "a detector made them, with its own errors"
+            )
         camera, lidar, floor, odometry = self._streams(seed, crc32(film.name.encode()), count=4)
         self._sightings = _sightings(film, self.presence)
         self.keyframes = []

@@ -31,7 +31,8 @@ from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera import CameraDetector, Picture, faultless_detections, window_on
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar
-from care_sim.world.world import World
+from care_sim.world.approach import ClosestApproach
+from care_sim.world.world import WORLD_STEP_S, World
 
 
 class ClosedLoop:
@@ -76,7 +77,13 @@ class ClosedLoop:
         self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
         self._lidar = Lidar(rig.grid, self._engine, conditions, seeds.lidar)
         self._camera = CameraDetector(
-            list(labels), conditions, rig.keyframe_s, seeds.camera, rig.cameras, pool
+            list(labels),
+            conditions,
+            rig.keyframe_s,
+            seeds.camera,
+            rig.cameras,
+            pool,
+            step_s=WORLD_STEP_S,
         )
         self._odometry = Odometry(conditions.ego_speed_sigma, seeds.odometry)
         self._detection = ScanDetection(rig.grid, labels, conditions.min_returns, detector)
@@ -129,7 +136,7 @@ class ClosedLoop:
         sights = self._sights(found)
 
         # The command holds until the next keyframe; then the camera looks and forecasts are due.
-        passage = world.advance(command.acceleration, self.rig.keyframe_s)
+        passage = self._advance(command.acceleration)
         self.index += 1
         self._memory.predict()
         self._look(self._range_image(scan))
@@ -209,6 +216,22 @@ class ClosedLoop:
         route = self.world.route
         return tracks if route is None else along_route(tracks, route, middle)
 
+    def _advance(self, acceleration: float) -> ClosestApproach:
+        """Let the world move on to the next keyframe, and the cameras take their pictures on the
+        way if their latency asks for it.
+        """
+        after_s = self._camera.timing.after_s
+        if not after_s:
+            return self.world.advance(acceleration, self.rig.keyframe_s)
+        before = self.world.advance(acceleration, after_s)
+        sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
+        boxes = sensor.boxes_to_local(self.world.boxes_of(self._reported))
+        taken = [self._photograph(camera, sensor, boxes) for camera in self._camera.mounted]
+        seen = faultless_detections(taken, self._labels)
+        self._camera.take(seen, sensor.yaw, boxes, self.world.time)
+        rest = self.world.advance(acceleration, self.rig.keyframe_s - after_s)
+        return ClosestApproach.over([before, rest])
+
     def _look(self, ranges: NDArray[np.float32]) -> None:
         """Take the cameras' pictures and form the belief on which the next cells are chosen."""
         self.sensor = sensor = Frame.mounted(self.world.ego.pose, self.rig.sensor_position)
@@ -228,7 +251,9 @@ class ClosedLoop:
 
         # The boxes that arrive, late and with errors, and the forecasts: all that is known when the
         # next cells are chosen.
-        arrived = self._camera.detect(self.seen, sensor.yaw, planar_ranges(boxes), self.world.time)
+        if not self._camera.timing.after_s:
+            self._camera.take(self.seen, sensor.yaw, boxes, self.world.time)
+        arrived = self._camera.newest(sensor.yaw)
         ego = self._odometry.reading(self.world.ego_motion)
         tracks = self._memory.tracks(sensor)
         self.belief = self._limits.belief(ego, arrived.detections, tracks, ranges)

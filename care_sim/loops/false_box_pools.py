@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from care_sim.base.times import LAST_BITS_S
-from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.conditions import IDEAL_CAMERA, ClosedLoopConditions
 from care_sim.core.rig import Rig
 from care_sim.loops.closed_loop import ClosedLoop
 from care_sim.loops.film import Film
@@ -46,9 +46,8 @@ def pool_of_another_drive(
     camera would be known among those of a crooked one.
     """
     with closing(world):
-        loop = ClosedLoop(
-            world, rig, replace(conditions, false_positive_rate=0.0), seeds, detector=detector
-        )
+        ideal = replace(conditions, false_positive_rate=0.0, camera_profile=IDEAL_CAMERA)
+        loop = ClosedLoop(world, rig, ideal, seeds, detector=detector)
         cells = np.arange(rig.grid.size)
         seen = []
         times_s = []
@@ -56,7 +55,7 @@ def pool_of_another_drive(
 
         # What the camera shows is taken before each keyframe, as the episode takes it.
         while not over:
-            seen.append(loop.seen.detections)
+            seen.append(loop.seen)
             times_s.append(world.time)
             hit = loop.keyframe(cells).impact_speed_mps is not None
             over = hit or world.time >= duration_s - LAST_BITS_S
@@ -72,5 +71,5 @@ def pool_of_film(film: Film) -> BoxPool:
     # From every time of a film of the length T, one of its ends is at least T / 2 away.
     times_s = [shot.time_s for shot in film.shots]
     apart_s = min(APART_S, (times_s[-1] - times_s[0]) / 2)
-    seen = [shot.seen.detections for shot in film.shots]
+    seen = [shot.seen for shot in film.shots]
     return BoxPool.of(seen, times_s, film.cameras, apart_s)

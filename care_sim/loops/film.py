@@ -38,7 +38,8 @@ class Film:
 
     `hidden` are the objects that its source annotates at the first keyframe though no sensor tells
     of them there: neither a return nor a pixel. No shot annotates them, so nobody has to find them;
-    they were present all the same.
+    they were present all the same. `detected` says that a detector made what the cameras have seen:
+    it errs by itself.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Film:
     hidden: Annotations = NO_ANNOTATIONS
     grid: AngularGrid = field(default_factory=AngularGrid)
     place: tuple[float, float] = LIDAR_POSITION[:2]
+    detected: bool = False
 
     @property
     def position(self) -> Position:

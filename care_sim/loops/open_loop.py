@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.belief import Belief
-from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.grid import Cells
 from care_sim.core.observation_limits import Limits
@@ -25,6 +24,7 @@ from care_sim.perception.tracker import TrackMemory
 from care_sim.sensors.annotated import Cloud
 from care_sim.sensors.box_pool import EMPTY_POOL
 from care_sim.sensors.camera import CameraDetector
+from care_sim.sensors.camera_profiles import invents_boxes
 from care_sim.sensors.recorded_lidar import RecordedLidar
 
 
@@ -70,7 +70,7 @@ class OpenLoop:
         # The camera errs object by object, so it is told of all that the film will ever show.
         self._rows = {number: row for row, number in enumerate(objects)}
         self._lidar = RecordedLidar(rig.grid, sensing, seeds.lidar)
-        pool = pool_of_film(film) if sensing.false_positive_rate else EMPTY_POOL
+        pool = pool_of_film(film) if invents_boxes(sensing) else EMPTY_POOL
         self._camera = CameraDetector(
             objects, sensing, film.keyframe_s, seeds.camera, film.cameras, pool
         )
@@ -148,21 +148,21 @@ class OpenLoop:
     def _look(self, ranges: NDArray[np.float32]) -> None:
         shot = self.shot
         self._arrived = self._camera.detect(
-            shot.seen, shot.sensor.yaw, self._distances(shot), shot.time_s
+            shot.seen, shot.sensor.yaw, self._boxes(shot), shot.time_s
         )
         ego = self._odometry.reading(shot.ego)
         tracks = self._memory.tracks(shot.sensor)
         self.belief = self._limits.belief(ego, self._arrived.detections, tracks, ranges)
 
-    def _distances(self, shot: Shot) -> Floats:
-        """(n,) metres to every object of the film, 0 for those that are not annotated now: else
-        distance would begin a burst of misses while they are away, and their appearance would fall
-        into it.
+    def _boxes(self, shot: Shot) -> Floats:
+        """(n, 7) sensor-frame boxes of every object of the film, 0 of those that are not annotated
+        now: else their distance would begin a burst of misses while they are away, and their
+        appearance would fall into it.
         """
-        distances = np.zeros(len(self._rows))
+        boxes = np.zeros((len(self._rows), 7))
         rows = [self._rows[number] for number in shot.annotations.objects.tolist()]
-        distances[rows] = planar_ranges(shot.annotations.boxes)
-        return distances
+        boxes[rows] = shot.annotations.boxes
+        return boxes
 
     def _range_image(self, fired: Cells, cloud: Cloud) -> NDArray[np.float32]:
         ranges = np.zeros(self.rig.grid.size, np.float32)

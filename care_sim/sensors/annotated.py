@@ -56,11 +56,13 @@ class Cloud:
 @dataclass(frozen=True)
 class IdentifiedDetections:
     """Camera detections, with `objects` (n,) the annotated object or the body behind each box, or
-    NO_OBJECT.
+    NO_OBJECT. `visible` (n,) is the share of each object that its picture shows, where the source
+    annotates it; else boxes are those of what is visible.
     """
 
     detections: ImageDetections
     objects: Integers
+    visible: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.objects)

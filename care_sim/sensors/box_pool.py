@@ -10,6 +10,7 @@ from care_sim.base.times import LAST_BITS_S
 from care_sim.core.arrays import Floats, Integers, Mask
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
+from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.confidence import confidence_of, pixels_of
 
 NEARER = 0.05
@@ -33,7 +34,7 @@ NO_ROWS = np.empty((0, len(ImageDetections.COLUMNS)))
 class BoxPool:
     """Boxes of other times: `rows` (n, 9) as `ImageDetections.rows`, `times_s` (n,) when each was
     seen, `middles` (n, 2) of their pictures in pixels, `picture_times_s` (k,) when pictures were
-    taken.
+    taken, `objects` (n,) the object or body behind each.
 
     At a time those are usable that were seen at least `apart_s` and at most `near_s` before or
     after it.
@@ -43,25 +44,32 @@ class BoxPool:
     times_s: Floats
     middles: Floats
     picture_times_s: Floats
+    objects: Integers
     apart_s: float = 0.0
     near_s: float = np.inf
 
     @classmethod
     def of(
         cls,
-        seen: Sequence[ImageDetections],
+        seen: Sequence[IdentifiedDetections],
         times_s: Sequence[float],
         cameras: Sequence[PinholeCamera],
         apart_s: float = 0.0,
         near_s: float = np.inf,
     ) -> "BoxPool":
         """All that `cameras` have `seen` (k,) at the times `times_s` (k,)."""
-        rows = np.concatenate([NO_ROWS, *(detections.rows() for detections in seen)])
+        rows = np.concatenate([NO_ROWS, *(one.detections.rows() for one in seen)])
         middles = np.array([(camera.width / 2, camera.height / 2) for camera in cameras])
         own_middles = middles.reshape(-1, 2)[rows[:, _CAMERA].astype(np.int64)]
         picture_times = np.asarray(times_s, float)
-        times = np.repeat(picture_times, [len(detections) for detections in seen])
-        return cls(rows, times, own_middles, picture_times, apart_s, near_s)
+        times = np.repeat(picture_times, [len(one) for one in seen])
+        objects = np.concatenate([np.empty(0, np.int64), *(one.objects for one in seen)])
+        return cls(rows, times, own_middles, picture_times, objects, apart_s, near_s)
+
+    @cached_property
+    def cameras(self) -> Integers:
+        """(n,) the place of the camera of each box."""
+        return self.rows[:, _CAMERA].astype(np.int64)
 
     def usable(self, time_s: float) -> Integers:
         """The rows that are usable at a time."""
@@ -186,7 +194,7 @@ class BoxPool:
         return [cameras == camera for camera in np.unique(cameras)]
 
 
-EMPTY_POOL = BoxPool(NO_ROWS, np.empty(0), np.empty((0, 2)), np.empty(0))
+EMPTY_POOL = BoxPool(NO_ROWS, np.empty(0), np.empty((0, 2)), np.empty(0), np.empty(0, np.int64))
 
 
 def box_areas(boxes: Floats) -> Floats:

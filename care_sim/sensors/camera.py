@@ -7,15 +7,19 @@ from functools import cached_property
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
+from care_sim.core.boxes import planar_ranges
 from care_sim.core.conditions import Sensing
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
 from care_sim.sensors.box_pool import EMPTY_POOL, BoxPool
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
+from care_sim.sensors.camera_profiles import PROFILES
 from care_sim.sensors.confidence import MIN_PIXELS, confidence_of
 from care_sim.sensors.engines.box_kernels import visible_boxes
 from care_sim.sensors.false_boxes import FalseBoxes
+from care_sim.sensors.picture_timing import picture_timing
+from care_sim.sensors.profiled_detector import ProfiledDetector
 from care_sim.world.bullet import PixelWindow
 
 CAMERA_FROM_LIDAR = (0.76, 0.0, -0.33)
@@ -90,7 +94,8 @@ class CameraDetector:
     """Makes of faultless detections those that arrive: they err and lag as `sensing` says.
 
     `objects` (n,) are all that the detector may ever report; `cameras` those that the rig knows.
-    False boxes are made from `pool`.
+    False boxes are made from `pool`. Pictures can be taken every `step_s` seconds, by default at
+    keyframes alone.
     """
 
     def __init__(
@@ -101,31 +106,50 @@ class CameraDetector:
         seed: np.random.SeedSequence,
         cameras: Sequence[PinholeCamera],
         pool: BoxPool = EMPTY_POOL,
+        step_s: float | None = None,
     ):
         # Every fault has a random stream of its own: one switched on leaves the others as they are.
-        false_boxes, delay, mount = (np.random.default_rng(child) for child in seed.spawn(3))
+        *own, errors, jitter, confusion, ghosts = seed.spawn(7)
+        false_boxes, delay, mount = (np.random.default_rng(child) for child in own)
         self._objects = np.asarray(objects, np.int64)
         self._sensing = sensing
         self._misses = Misses(len(objects), sensing, np.random.default_rng(seed))
         self._false_boxes = FalseBoxes(pool, sensing.false_positive_rate, len(cameras), false_boxes)
-        self._delay = Delay(sensing.camera_latency, sensing.camera_jitter, keyframe_s, delay)
+        self.timing = picture_timing(sensing, keyframe_s, step_s or keyframe_s)
+        self._delay = Delay(self.timing, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
+        self._profiled = self._made(keyframe_s, pool, (errors, jitter, confusion, ghosts))
 
     def detect(
-        self, seen: IdentifiedDetections, heading: float, ranges: Floats, time_s: float
+        self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
     ) -> IdentifiedDetections:
-        """The newest detections that are due, the surest first, each with the object behind it.
-
-        `seen` are the faultless ones of this keyframe, at `time_s` and with the car's `heading`;
-        `ranges` (n,) are the distances of the objects in metres, in their order.
+        """The newest detections at a keyframe whose pictures are taken at the keyframe itself: see
+        `take` and `newest`.
         """
-        # Both faults draw at every keyframe, whatever is there and whatever becomes of it, so that
+        self.take(seen, heading, boxes, time_s)
+        return self.newest(heading)
+
+    def take(
+        self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
+    ) -> None:
+        """Take in the pictures of a keyframe.
+
+        `seen` are their faultless detections, at `time_s` and with the car's `heading`; `boxes`
+        (n, 7) are those of the objects in the sensor frame, in their order, 0 of one that is
+        nowhere.
+        """
+        # All faults draw at every keyframe, whatever is there and whatever becomes of it, so that
         # every policy meets the same ones.
         rows = seen.detections.rows()
         objects = seen.objects
-        missed = self._misses.draw(ranges)
+        missed = self._misses.draw(planar_ranges(boxes))
         false = self._false_boxes.draw(rows, time_s)
+        if self._profiled is not None:
+            ghosts = self._profiled.ghosts(np.concatenate([rows, false]), time_s)
+            false = np.concatenate([false, ghosts])
+            places = self._places(objects)
+            rows, objects = self._profiled.report(seen, places, boxes[places])
         if missed.any():
             left = ~np.isin(objects, self._objects[missed])
             rows = rows[left]
@@ -140,7 +164,27 @@ class CameraDetector:
         # Of equally sure boxes the leftmost comes first: nothing depends on the order of bodies.
         order = reported[np.lexsort((rows[reported, ImageDetections.LEFT], -confidences[reported]))]
         detections = ImageDetections.from_checked_rows(rows[order])
-        return self._delay.newest(IdentifiedDetections(detections, objects[order]), heading)
+        self._delay.take(IdentifiedDetections(detections, objects[order]), heading)
+
+    def newest(self, heading: float) -> IdentifiedDetections:
+        """Begin a keyframe with the car's `heading`: the newest detections that are due, the surest
+        first, each with the object behind it.
+        """
+        return self._delay.newest(heading)
+
+    def _made(
+        self, keyframe_s: float, pool: BoxPool, seeds: Sequence[np.random.SeedSequence]
+    ) -> ProfiledDetector | None:
+        """The detector of the profile, None of the ideal camera."""
+        profile = PROFILES[self._sensing.camera_profile]
+        if profile is None:
+            return None
+        return ProfiledDetector(profile, len(self._objects), self.mounted, keyframe_s, pool, seeds)
+
+    def _places(self, objects: Integers) -> Integers:
+        """(n,) the places of `objects` (n,) among all."""
+        order = np.argsort(self._objects)
+        return order[np.searchsorted(self._objects, objects, sorter=order)]
 
 
 def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:

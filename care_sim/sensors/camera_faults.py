@@ -12,6 +12,7 @@ from care_sim.core.conditions import CameraFaults
 from care_sim.core.pinhole import PinholeCamera
 from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.picture_timing import PictureTiming
 
 NOTHING_SEEN = IdentifiedDetections(
     ImageDetections.from_rows(np.empty((0, len(ImageDetections.COLUMNS)))), np.empty(0, np.int64)
@@ -72,8 +73,8 @@ class Misses:
 
 
 class _SentPicture(NamedTuple):
-    """The detections of a picture on their way: taken at `keyframe` with the car's `heading`, they
-    arrive at the keyframe `due`.
+    """The detections of a picture on their way: that of `keyframe`, taken with the car's `heading`,
+    they arrive at the keyframe `due`.
     """
 
     seen: IdentifiedDetections
@@ -86,26 +87,35 @@ class _SentPicture(NamedTuple):
 class Delay:
     """Hands out the newest picture that has arrived.
 
-    Each is late by `latency` keyframes, and by 0 to `jitter` more that are drawn for it.
+    One is taken per keyframe, as `timing` says. Each is late by its keyframes, and by 0 to `jitter`
+    more that are drawn for it.
     """
 
-    latency: int
+    timing: PictureTiming
     jitter: int
     keyframe_s: float
     rng: np.random.Generator
 
     def __post_init__(self) -> None:
         self._sent: list[_SentPicture] = []
+        self._taken = 0
         self._keyframe = -1
 
-    def newest(self, seen: IdentifiedDetections, heading: float) -> IdentifiedDetections:
-        """Take in this keyframe's detections; return the newest that are due, with age and yaw
-        change.
+    def take(self, seen: IdentifiedDetections, heading: float) -> None:
+        """Take in the detections of a keyframe's picture, and the car's heading when it was taken,
+        radians.
         """
         # Lateness is drawn for every picture in turn, whatever it shows.
+        late = self.timing.keyframes
+        late += int(self.rng.integers(self.jitter + 1)) if self.jitter else 0
+        self._sent.append(_SentPicture(seen, heading, self._taken, self._taken + late))
+        self._taken += 1
+
+    def newest(self, heading: float) -> IdentifiedDetections:
+        """Begin a keyframe with the car's `heading`, radians; return the newest detections that are
+        due, with age and yaw change.
+        """
         self._keyframe += 1
-        late = self.latency + (int(self.rng.integers(self.jitter + 1)) if self.jitter else 0)
-        self._sent.append(_SentPicture(seen, heading, self._keyframe, self._keyframe + late))
         arrived = [n for n, picture in enumerate(self._sent) if picture.due <= self._keyframe]
         if not arrived:
             return NOTHING_SEEN
@@ -114,7 +124,7 @@ class Delay:
         return self._aged(self._sent[0], heading)
 
     def _aged(self, picture: _SentPicture, heading: float) -> IdentifiedDetections:
-        age_s = (self._keyframe - picture.keyframe) * self.keyframe_s
+        age_s = (self._keyframe - picture.keyframe) * self.keyframe_s - self.timing.after_s
         detections = picture.seen.detections.aged(age_s, heading - picture.heading)
         return IdentifiedDetections(detections, picture.seen.objects)
 

@@ -50,14 +50,20 @@ class FalseBoxes:
         # A draw from 0 to 1 picks each of the usable boxes with equal chance; three vary it.
         picks = usable[(draws[..., 0] * len(usable)).astype(np.int64)]
         varied = self._pool.varied(picks.ravel(), draws[..., 1:].reshape(-1, 3))
+        return without_duplicates(varied.reshape(*picks.shape, -1), true)
 
-        # One false box after another takes its first try that is free, beside those before it.
-        shown = true
-        for tries in varied.reshape(*picks.shape, -1):
-            is_free = ~_lie_on(tries, shown)
-            if is_free.any():
-                shown = np.concatenate([shown, tries[is_free.argmax()][None]])
-        return shown[len(true) :]
+
+def without_duplicates(tries: Floats, true: Floats) -> Floats:
+    """(j, 9) of each of k boxes its first of m `tries` (k, m, 9) that lies on none of the `true`
+    boxes (n, 9) of its class and picture, and on none of those before it; boxes without such a try
+    are left out.
+    """
+    shown = true
+    for own in tries:
+        is_free = ~_lie_on(own, shown)
+        if is_free.any():
+            shown = np.concatenate([shown, own[is_free.argmax()][None]])
+    return shown[len(true) :]
 
 
 def _lie_on(boxes: Floats, others: Floats) -> Mask:

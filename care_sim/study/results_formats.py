@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from care_sim.core.conditions import COLUMNS_WHERE_CHANGED
+from care_sim.core.conditions import COLUMNS_WHERE_CHANGED, OF_BOTH_LOOPS
 from care_sim.study.episode_config import PLAIN_FIELDS, listed_episodes
 from care_sim.study.episode_play import play_episodes
 from care_sim.study.mechanism_play import (
@@ -117,8 +117,7 @@ _OF_SOME_PLAYS = {
     "recording": as_optional(TEXT),
     "camera_detections": as_optional(TEXT),
     "presence": as_optional(TEXT),
-    "firing": CONDITION_COLUMNS["firing"],
-}
+} | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED if name in OF_BOTH_LOOPS}
 _PLAYS = Schema(
     _ANY_PLAY
     | dict.fromkeys(SUMS, TALLY)

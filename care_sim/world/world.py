@@ -189,12 +189,8 @@ class World:
         """
         # Looked at after every step: between two keyframes the car may hit something and be past
         # it, or come closest to it.
-        steps = [self._step(acceleration) for _ in range(whole_steps(duration))]
-        impacts = (step.impact for step in steps if step.impact is not None)
-        return ClosestApproach(
-            min(step.nearest_m for step in steps),
-            min(step.clearance_m for step in steps),
-            next(impacts, None),
+        return ClosestApproach.over(
+            [self._step(acceleration) for _ in range(whole_steps(duration))]
         )
 
     def close(self) -> None:

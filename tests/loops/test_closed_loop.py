@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from care_sim.core.conditions import ClosedLoopConditions
+from care_sim.core.frames import Frame
 from care_sim.core.rig import Rig
 from care_sim.core.sensor_setup import LIDAR_POSITION
 from care_sim.core.types import CLASSES
@@ -221,6 +222,50 @@ def test_fresh_detections_are_of_the_picture_just_taken(street):
         detections = loop.belief.detections
         assert (detections.ages.tolist(), detections.yaw_changes.tolist()) == ([0.0], [0.0])
         assert detections.boxes[0] == pytest.approx(expected, abs=4.0)
+
+
+@pytest.mark.parametrize(
+    ("latency_s", "age_s"), [(0.05, 0.05), (0.12, 0.15), (0.15, 0.15), (0.3, 0.3)]
+)
+def test_a_latency_in_seconds_shows_the_picture_of_that_instant(street, latency_s, age_s):
+    """It is rounded up to the world's steps of 0.05 s."""
+    world = street()
+    person = world.add("person", "pedestrian", lambda time: (20.0, 3.0 - 2.0 * time, 0.0))
+    expected = {}
+
+    # At every step of the world, what the camera would show there and then.
+    def note(_=None):
+        sensor = Frame.mounted(world.ego.pose, LIDAR_POSITION)
+        x, y = world.actors[0].pose_at(world.time)[:2]
+        box = np.array([[x, y, 0.88, *person.kind.size, 0.0]])
+        expected[world.time] = FRONT_CAMERA.project_boxes(sensor.boxes_to_local(box))[0]
+
+    note()
+    world.at_every_step(note)
+    loop = loop_in(world, camera_latency_s=latency_s)
+    for _ in range(8):
+        loop.keyframe(NOTHING)
+        detections = loop.belief.detections
+        taken = round(world.time - age_s, 9)
+        assert len(detections) == (taken >= 0)
+        if taken >= 0:
+            assert detections.ages.tolist() == pytest.approx([age_s])
+            assert detections.boxes[0] == pytest.approx(expected[taken], abs=1.5)
+
+
+def test_a_picture_between_keyframes_leaves_the_world_as_it_is(row_of_cars):
+    """The same keyframes come of it, hits included."""
+
+    def played(latency_s):
+        world = row_of_cars()
+        world.first_sighting = world.add("wall", "wall", (6.0, 0.0, 1.57))
+        loop = loop_in(world, camera_latency_s=latency_s)
+        return [vars(loop.keyframe(NOTHING)) for _ in range(6)]
+
+    ours, theirs = played(0.05), played(0.0)
+    assert any(record["impact"] for record in ours)
+    for our, their in zip(ours, theirs, strict=True):
+        np.testing.assert_equal(our, their)
 
 
 def misses_and_losses(world, seeds):

@@ -61,8 +61,8 @@ def scene(world, sensor, person):
     labels = {actor.body: actor.label for actor in world.actors if actor.label is not None}
     picture = Picture.of(world.bullet.body_ids(FRONT_CAMERA, sensor))
     camera = CameraDetector(list(labels), Sensing(), 0.1, np.random.SeedSequence(0), [FRONT_CAMERA])
-    ranges = np.full(len(labels), 20.0)
-    seen = camera.detect(faultless_detections([picture], labels), 0.0, ranges, 0.0).detections
+    anywhere = np.zeros((len(labels), 7))
+    seen = camera.detect(faultless_detections([picture], labels), 0.0, anywhere, 0.0).detections
     (of_person,) = [n for n in range(len(seen)) if seen.classes[n] == person.label]
     cells = wedges(seen, RIG)
     return GRID.hulls(nearest_first), cells, cells[of_person]

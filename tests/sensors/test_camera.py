@@ -25,13 +25,14 @@ class Detector(CameraDetector):
     def __init__(self, labels, sensing, keyframe_s, seed):
         super().__init__(list(labels), sensing, keyframe_s, seed, [FRONT_CAMERA])
         self.labels = labels
-        self.ranges, self.keyframe_s, self.frame = np.full(len(labels), 20.0), keyframe_s, -1
+        self.boxes = np.tile([20.0, 0, 0, 1, 1, 1, 0], (len(labels), 1))
+        self.keyframe_s, self.frame = keyframe_s, -1
 
     def detect(self, picture, heading):
         self.frame += 1
         seen = faultless_detections([picture], self.labels)
         time_s = self.frame * self.keyframe_s
-        return super().detect(seen, heading, self.ranges, time_s).detections
+        return super().detect(seen, heading, self.boxes, time_s).detections
 
 
 def detector(labels, keyframe_s=0.1, seed=0, **faults):

@@ -13,6 +13,7 @@ from care_sim.core.types import ImageDetections
 from care_sim.sensors.annotated import IdentifiedDetections
 from care_sim.sensors.camera import FRONT_CAMERA
 from care_sim.sensors.camera_faults import Delay, Misses, mounted
+from care_sim.sensors.picture_timing import PictureTiming
 
 NEAR, FAR = np.full(40, 10.0), np.full(40, 30.0)
 
@@ -76,8 +77,11 @@ def tagged(number):
 
 
 def delivered(latency, jitter, frames, seed=0):
-    delay = Delay(latency, jitter, 0.1, np.random.default_rng(seed))
-    handed_out = [delay.newest(tagged(n), 0.01 * n) for n in range(frames)]
+    delay = Delay(PictureTiming(latency, 0.0), jitter, 0.1, np.random.default_rng(seed))
+    handed_out = []
+    for n in range(frames):
+        delay.take(tagged(n), 0.01 * n)
+        handed_out.append(delay.newest(0.01 * n))
     assert all(seen.objects.tolist() == seen.detections.boxes[:, 0].tolist() for seen in handed_out)
     return [seen.detections for seen in handed_out]
 
@@ -244,7 +248,7 @@ def test_the_scoring_looks_through_a_camera_that_stands_straight():
 
 def test_all_faults_are_off_by_default():
     usual = Conditions()
-    assert {getattr(usual, name) for name in CAMERA_FAULTS} == {0, 1}
+    assert {getattr(usual, name) for name in CAMERA_FAULTS} == {"ideal", 0, 1}
     assert usual.false_negative_burst == 1
 
 

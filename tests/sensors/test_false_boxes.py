@@ -49,7 +49,11 @@ def table(*boxes, pixels=400, label=CAR, camera=0):
 def pool(rows, times=None, cameras=(FRONT_CAMERA,), apart=0.0):
     """A pool of rows, each seen at its time."""
     times = np.zeros(len(rows)) if times is None else times
-    return BoxPool.of([ImageDetections.from_rows(row[None]) for row in rows], times, cameras, apart)
+    seen = [
+        IdentifiedDetections(ImageDetections.from_rows(row[None]), np.array([number]))
+        for number, row in enumerate(rows)
+    ]
+    return BoxPool.of(seen, times, cameras, apart)
 
 
 def spread(number, seed=0):
@@ -396,7 +400,7 @@ def test_of_boxes_that_sort_alike_the_order_does_not_say_which_is_false():
         lent.__dict__["varied"] = lambda rows, draws, lent=lent: lent.rows[rows]
         camera = CameraDetector([], Sensing(false_positive_rate=9), 0.1, SEED, [FRONT_CAMERA], lent)
         identified = IdentifiedDetections(ImageDetections.from_rows(true), np.array([0]))
-        arrived = camera.detect(identified, 0.0, np.empty(0), 0.0)
+        arrived = camera.detect(identified, 0.0, np.empty((0, 7)), 0.0)
         orders.append(arrived.detections.boxes.tolist())
         behind.append(arrived.objects.tolist())
     assert orders[0] == orders[1] == [high[0, 2:6].tolist(), low[0, 2:6].tolist()]

@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers
-from care_sim.core.boxes import planar_ranges
 from care_sim.core.driver_settings import DriverSettings
 from care_sim.core.frames import Frame
 from care_sim.core.grid import Cells
@@ -146,9 +145,8 @@ class StageByStage:
         ids = watch("camera", self._engine.body_ids, camera, self._sensor, window)
         picture = watch("camera", Picture.of, ids, window)
         seen = faultless_detections([picture], self._labels)
-        ranges = planar_ranges(boxes)
         heading = self._sensor.yaw
-        arrived = watch("camera", self._camera.detect, seen, heading, ranges, self.world.time)
+        arrived = watch("camera", self._camera.detect, seen, heading, boxes, self.world.time)
         return arrived.detections
 
     def _local_boxes(self, bodies: Integers) -> Floats:

@@ -91,6 +91,7 @@ def projected_detections(
     """
     rows = [np.empty((0, len(ImageDetections.COLUMNS)))]
     objects = [np.empty(0, np.int64)]
+    visible = [np.empty(0)]
     for number, camera in enumerate(cameras):
         boxes = projected(camera, annotations.boxes)
         area = np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0, None), axis=1)
@@ -100,8 +101,11 @@ def projected_detections(
         columns = annotations.classes, confidence_of(pixels), boxes
         rows.append(_rows([column[seen] for column in columns], number))
         objects.append(annotations.objects[seen])
+        visible.append(shares[seen])
     return IdentifiedDetections(
-        ImageDetections.from_rows(np.concatenate(rows)), np.concatenate(objects)
+        ImageDetections.from_rows(np.concatenate(rows)),
+        np.concatenate(objects),
+        np.concatenate(visible),
     )
 
 

@@ -74,7 +74,16 @@ def nuscenes_film(
     )
     cameras = tuple(camera.pinhole for camera in setup.cameras)
     hidden = setup.hidden(samples[0], cars[0])
-    return Film(scene["name"], cameras, setup.lidar.z, NUSCENES_KEYFRAME_S, shots, hidden, grid)
+    return Film(
+        scene["name"],
+        cameras,
+        setup.lidar.z,
+        NUSCENES_KEYFRAME_S,
+        shots,
+        hidden,
+        grid,
+        detected=detections is not None,
+    )
 
 
 @dataclass(frozen=True)

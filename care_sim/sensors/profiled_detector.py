@@ -1,0 +1,101 @@
+"""A camera detector with the errors of a profile: misses, confused classes, jitter, ghosts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from care_sim.core.arrays import Floats, Integers
+from care_sim.core.pinhole import PinholeCamera
+from care_sim.core.types import ImageDetections
+from care_sim.sensors.annotated import IdentifiedDetections
+from care_sim.sensors.box_jitter import jittered
+from care_sim.sensors.box_pool import BoxPool
+from care_sim.sensors.camera_profiles import CameraProfile
+from care_sim.sensors.class_confusion import confused
+from care_sim.sensors.detector_recall import seen_as
+from care_sim.sensors.ghosts import Ghosts
+from care_sim.sensors.persistent_draws import PersistentDraws
+
+_JITTERED = 4
+"""A box's middle across and down, its width and its height."""
+
+
+class ProfiledDetector:
+    """Makes of faultless detections what a detector of a profile reports.
+
+    `objects` is how many there are in all, `cameras` are those that take the pictures. Ghosts are
+    made from `pool`. Every kind of error has a random stream of its own.
+    """
+
+    def __init__(
+        self,
+        profile: CameraProfile,
+        objects: int,
+        cameras: Sequence[PinholeCamera],
+        keyframe_s: float,
+        pool: BoxPool,
+        seeds: Sequence[np.random.SeedSequence],
+    ):
+        misses, jitter, confusion, ghosts = (np.random.default_rng(seed) for seed in seeds)
+        self._profile = profile
+        self._cameras = cameras
+        self._matrix = profile.confusion_matrix()
+        self._spreads = np.array([group.jitter for group in profile.groups])
+        # A number for every group: no class need be known of an object before it is seen.
+        times_s = [group.miss_time_s for group in profile.groups]
+        self._misses = PersistentDraws(objects, times_s, keyframe_s, misses)
+        jitter_times_s = [profile.jitter_time_s] * _JITTERED
+        self._jitter = PersistentDraws(objects, jitter_times_s, keyframe_s, jitter)
+        self._confusion = PersistentDraws(
+            objects, [profile.confusion_time_s], keyframe_s, confusion
+        )
+        self._ghosts = Ghosts(
+            pool,
+            profile.ghosts_per_picture,
+            profile.ghost_time_s,
+            keyframe_s,
+            len(cameras),
+            ghosts,
+        )
+
+    def report(
+        self, seen: IdentifiedDetections, places: Integers, boxes: Floats
+    ) -> tuple[Floats, Integers]:
+        """What is reported of the faultless detections `seen` (n,): rows (k, 9) as
+        `ImageDetections.rows`, and (k,) the object behind each.
+
+        `places` (n,) are those of the detections' objects among all, `boxes` (n, 7) their 3D boxes
+        in the sensor frame.
+        """
+        # All numbers are drawn at every keyframe, whatever is there.
+        misses, jitter, confusion = (
+            draws.next()[places] for draws in (self._misses, self._jitter, self._confusion)
+        )
+        classes = seen.detections.classes
+        groups = self._profile.groups_of(classes)
+        own_misses = misses[np.arange(len(seen)), groups]
+        (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes))
+
+        rows = seen.detections.rows()[found]
+        rows[:, ImageDetections.CLASS] = confused(classes[found], confusion[found, 0], self._matrix)
+        rows[:, ImageDetections.BOX] = jittered(
+            rows[:, ImageDetections.BOX],
+            jitter[found],
+            self._spreads[groups[found]],
+            seen.detections.cameras[found],
+            self._cameras,
+        )
+        return rows, seen.objects[found]
+
+    def ghosts(self, shown: Floats, time_s: float) -> Floats:
+        """(k, 9) the ghosts of this keyframe's pictures, beside the boxes `shown` (n, 9)."""
+        return self._ghosts.draw(shown, time_s)
+
+    def _recalls(self, seen: IdentifiedDetections, groups: Integers, boxes: Floats) -> Floats:
+        """(n,) the chances to find the objects `seen` (n,), of the `groups` (n,)."""
+        heights, shares = seen_as(seen, boxes, self._cameras, self._profile.focal_px)
+        recalls = np.empty(len(seen))
+        for number, group in enumerate(self._profile.groups):
+            own = groups == number
+            recalls[own] = group.recall.at(heights[own], shares[own])
+        return recalls
