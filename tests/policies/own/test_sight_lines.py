@@ -61,6 +61,24 @@ def test_a_wall_all_round_has_no_edge_over_the_seam(lines, belief_of):
     assert columns_of(lines) == sorted(near)
 
 
+def test_every_column_is_remembered_along_a_cell_of_its_own(belief_of):
+    """The left half along row 9, the right half along row 11: there the wall stands, and what other
+    rows meet says nothing.
+    """
+    right = np.arange(COLUMNS // 2)
+    cells = np.concatenate([11 * COLUMNS + right, LINES[COLUMNS // 2 :]])
+    lines = SightLines(Rig(keyframe_s=0.5), cells)
+    ranges = np.full(GRID.size, GRID.range_m, np.float32)
+    ranges[cells] = 10
+    lines.update(belief_of(ranges=ranges.reshape(GRID.shape)))
+    assert lines.cells().tolist() == []
+    ranges[cells[:2]] = GRID.range_m
+    lines.update(belief_of(ranges=ranges.reshape(GRID.shape)))
+    # Open are columns 0 and 1, and watched the edges about them, over the seam, too.
+    near = [*range(2 + EDGE_COLUMNS), *range(COLUMNS - EDGE_COLUMNS, COLUMNS)]
+    assert lines.cells().tolist() == cells[near].tolist()
+
+
 @pytest.mark.parametrize(("wall", "watched"), [(24.9, 0), (25.1, COLUMNS)])
 @pytest.mark.parametrize("reach", [50.0, 100.0])
 def test_a_line_is_open_from_half_the_range_of_scoring_on(wall, watched, reach, belief_of):
