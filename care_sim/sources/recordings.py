@@ -16,8 +16,8 @@ from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.argoverse2.tables import ANNOTATION_FILES, POSE_FILE
 from care_sim.sources.nuscenes import films, splits
 from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.table_files import JsonRow
-from care_sim.sources.nuscenes.tables import FIELDS, Database
+from care_sim.sources.nuscenes.table_files import FIELDS, JsonRow
+from care_sim.sources.nuscenes.tables import Database
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def nuscenes_film(
     grid = grid or AngularGrid()
     setup = _scene_setup(database, samples, data[0], grid, detections)
     cars = [
-        _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
+        _frame(database, "ego_pose", database.pose_of(recordings[LIDAR])) for recordings in data
     ]
     # Timestamps are microseconds. The motion is that of the poses at which the sweeps were taken.
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
@@ -123,7 +123,7 @@ class _SceneSetup:
         return [
             box
             for box in boxes
-            if _has_points(box) == seen and _class_name(self.database, box) is not None
+            if box["has_points"] == seen and _class_name(self.database, box) is not None
         ]
 
     def _seen(
@@ -160,21 +160,21 @@ def _recordings(database: Database, sample: JsonRow) -> dict[str, JsonRow]:
     return found
 
 
-def _frame(database: Database, table: str, token: str) -> Frame:
+def _frame(database: Database, table: str, row: JsonRow) -> Frame:
     # The tables write w first, SciPy writes it last.
-    w, x, y, z = database.numbers(table, token, "rotation", 4).tolist()
+    w, x, y, z = database.numbers(table, row, "rotation", 4).tolist()
     mounted = table == "calibrated_sensor"
     fault = quaternion_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
     if fault is not None:
-        raise InvalidInput(f"{database.path(table)}: rotation of {token!r}: {fault[1]}")
-    origin = database.numbers(table, token, "translation", 3, within=MOUNT_M if mounted else MAP_M)
+        raise InvalidInput(f"{database.path(table)}: rotation of {row['token']!r}: {fault[1]}")
+    origin = database.numbers(table, row, "translation", 3, within=MOUNT_M if mounted else MAP_M)
     return Frame.turned_by(Rotation.from_quat([x, y, z, w]), origin)
 
 
 def _lidar_mount(database: Database, data: JsonRow) -> Frame:
     """The sensor frame in the car's: x forward where LIDAR_TOP has y forward."""
     token = data["calibrated_sensor_token"]
-    own = _frame(database, "calibrated_sensor", token)
+    own = _frame(database, "calibrated_sensor", database.row("calibrated_sensor", token))
     # The car's frame stands on the road.
     if own.z < 0:
         path = database.path("calibrated_sensor")
@@ -184,7 +184,8 @@ def _lidar_mount(database: Database, data: JsonRow) -> Frame:
 
 def _camera(database: Database, data: JsonRow, lidar: Frame) -> RecordedCamera:
     token = data["calibrated_sensor_token"]
-    intrinsic = database.numbers("calibrated_sensor", token, "camera_intrinsic", 3, 3)
+    row = database.row("calibrated_sensor", token)
+    intrinsic = database.numbers("calibrated_sensor", row, "camera_intrinsic", 3, 3)
     if not FOCALS[0] <= intrinsic[0, 0] <= FOCALS[1]:
         raise InvalidInput(
             f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose focal "
@@ -197,7 +198,7 @@ def _camera(database: Database, data: JsonRow, lidar: Frame) -> RecordedCamera:
             "principal point lies "
             f"outside the picture of {PICTURE[0]} x {PICTURE[1]}"
         )
-    return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
+    return recorded_camera(_frame(database, "calibrated_sensor", row), intrinsic, lidar)
 
 
 def _class_name(database: Database, box: JsonRow) -> str | None:
@@ -206,10 +207,6 @@ def _class_name(database: Database, box: JsonRow) -> str | None:
         return class_of(database.row("category", token)["name"])
     except UnknownCategory as error:
         raise InvalidInput(f"{database.path('category')}: {token!r}: {error}") from None
-
-
-def _has_points(box: JsonRow) -> bool:
-    return bool(box["num_lidar_pts"] + box["num_radar_pts"] > 0)
 
 
 def _object_numbers(database: Database, samples: list[JsonRow]) -> dict[str, int]:
@@ -242,9 +239,9 @@ def _annotations(
 
 def _world_box(database: Database, box: JsonRow) -> tuple[float, ...]:
     """Centre, length, width, height and heading; the table has width, length, height."""
-    frame = _frame(database, "sample_annotation", box["token"])
+    frame = _frame(database, "sample_annotation", box)
     width, length, height = database.numbers(
-        "sample_annotation", box["token"], "size", 3, within=SIZES_M
+        "sample_annotation", box, "size", 3, within=SIZES_M
     ).tolist()
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 
