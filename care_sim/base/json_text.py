@@ -15,9 +15,9 @@ MOST_BYTES = 2**28
 """Bytes of a file: more than the longest of ours, the configurations of a study (100,000 tasks of 2
 kB).
 """
-MOST_CHARACTERS = 2**20
-"""Characters of one value of a list that is read value by value: two thousand times a row."""
-_CHUNK = 2**24
+MOST_CHARACTERS = 2**18
+"""Characters of one value of a list that is read value by value: five hundred times a row."""
+_CHUNK = 2**21
 _OPENED = re.compile(r"[ \t\n\r]*\[[ \t\n\r]*(\][ \t\n\r]*)?")
 _VALUE_ENDED = re.compile(r"[ \t\n\r]*([,\]])[ \t\n\r]*")
 

@@ -1,4 +1,4 @@
-"""A table that takes long to make, kept in a file that later processes map into their memory."""
+"""Tables that take long to make, kept in files that later processes map into their memory."""
 
 import fcntl
 import hashlib
@@ -12,39 +12,38 @@ import pyarrow as pa
 from care_sim.base.errors import InvalidInput
 from care_sim.base.files import check_output, replacing
 
-NAME = "care-sim.arrow"
 ARROW = rb"ARROW1"
 _STAMP = b"made of"
 
 
 def cached_table(
-    folder: Path, form: str, files: Iterable[Path], make: Callable[[], pa.Table]
+    file: Path, form: str, sources: Iterable[Path], make: Callable[[], pa.Table]
 ) -> pa.Table:
-    """The table that `make` makes in the given `form` of the `files`, which lie in `folder`.
+    """The table that `make` makes of the files `sources`, in the given `form`.
 
-    It is kept in that folder, or where that cannot be written in the user's cache folder
-    (`XDG_CACHE_HOME`, else `~/.cache`). It is made anew when one of the files has changed, when it
-    is cut short, and when nothing can be kept. Processes that want it at once wait for the first.
+    It is kept in `file`, or where that cannot be written in the user's cache folder
+    (`XDG_CACHE_HOME`, else `~/.cache`). It is made anew when a source has changed, when the file is
+    cut short, and when nothing can be kept. Of processes that want it at once the first makes it.
     """
-    stamp = _stamp(form, files)
-    for place in _places(folder):
+    stamp = _stamp(form, sources)
+    for place in _places(file):
         table = _kept(place, stamp, make)
         if table is not None:
             return table
     return make()
 
 
-def _places(folder: Path) -> Iterator[Path]:
-    yield folder / NAME
-    own = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
+def _places(file: Path) -> Iterator[Path]:
+    yield file
+    folder = hashlib.sha256(os.fsencode(file.parent.resolve())).hexdigest()[:16]
     with suppress(RuntimeError):  # the user has no home folder
         caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        yield caches / "care-sim" / f"nuscenes-{own}.arrow"
+        yield caches / "care-sim" / folder / file.name
 
 
-def _stamp(form: str, files: Iterable[Path]) -> str:
-    """Tells the files as they are now from the same at another time."""
-    stats = [file.stat() for file in files if file.is_file()]
+def _stamp(form: str, sources: Iterable[Path]) -> str:
+    """Tells the sources as they are now from the same at another time."""
+    stats = [source.stat() for source in sources if source.is_file()]
     # A file that is written anew keeps neither of its times; the last one no program can set back.
     times = [(stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns) for stat in stats]
     return hashlib.sha256(repr((form, times)).encode()).hexdigest()

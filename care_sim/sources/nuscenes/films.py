@@ -32,12 +32,11 @@ from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.table_files import JsonRow
-from care_sim.sources.nuscenes.tables import Database
+from care_sim.sources.nuscenes.tables import LIDAR, Database
 from care_sim.sources.plausible import AWAY_M, MAP_M, MOUNT_M, SIZES_M, quaternion_fault
 
 NUSCENES_KEYFRAME_S = 0.5
 """nuScenes annotates its keyframes at 2 Hz."""
-LIDAR = "LIDAR_TOP"
 FOCALS = (10.0, 1e5)
 """Pixels: of a picture 1600 wide, views of 179 degrees and of one."""
 _FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)

@@ -1,7 +1,7 @@
 """The JSON files of a nuScenes database: rows of plain data, each field of its kind."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ FIELDS: dict[str, dict[str, type]] = {
         "calibrated_sensor_token": str,
         "filename": str,
         "is_key_frame": bool,
+        "timestamp": int,
     },
     "calibrated_sensor": {
         "sensor_token": str,
@@ -74,19 +75,20 @@ def table_rows(path: Path, is_needed: Callable[[JsonRow], bool] | None = None) -
     lacks a field or has another kind of value in it.
     """
     kinds = {"token": str, **FIELDS[path.stem]}
+    wanted = [*kinds.values()]
     for number, row in enumerate(_values(path)):
         if not isinstance(row, dict):
             raise InvalidInput(f"{path}: row {number} must be a map of fields")
         if is_needed is not None and not is_needed(row):
             continue
-        for name, kind in kinds.items():
-            # Not isinstance: to Python true is an int.
-            if type(row.get(name)) is not kind:
-                raise InvalidInput(f"{path}: {_what_is_wrong(row, number, name, kind)}")
-        yield {name: row[name] for name in kinds}
+        taken = {name: row.get(name) for name in kinds}
+        # Not isinstance: to Python true is an int.
+        if [*map(type, taken.values())] != wanted:
+            raise InvalidInput(f"{path}: {_what_is_wrong(row, number, kinds)}")
+        yield taken
 
 
-def check_tokens(path: Path, tokens: Sequence[str]) -> None:
+def check_tokens(path: Path, tokens: list[str]) -> None:
     """Raise InvalidInput for a token that stands twice in a table."""
     if len(set(tokens)) < len(tokens):
         (token, count), *_ = Counter(tokens).most_common(1)
@@ -113,10 +115,11 @@ def _values(path: Path) -> Iterator[Any]:
         raise InvalidInput(f"{path}: no readable JSON file ({error})") from error
 
 
-def _what_is_wrong(row: JsonRow, number: int, name: str, kind: type) -> str:
+def _what_is_wrong(row: JsonRow, number: int, kinds: dict[str, type]) -> str:
     which = f"row {row.get('token') or number}"
+    name = next(name for name, kind in kinds.items() if type(row.get(name)) is not kind)
     return (
-        f"{which}: {name} must be {KIND_WORDS[kind]}, got {row[name]!r}"
+        f"{which}: {name} must be {KIND_WORDS[kinds[name]]}, got {row[name]!r}"
         if name in row
         else f"{which} lacks {name!r}"
     )

@@ -1,7 +1,7 @@
 """The JSON tables of a nuScenes v1.0 database. Errors name the file and the token."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
-from care_sim.sources.nuscenes.by_sample import FORM, LONG_TABLES, by_sample
+from care_sim.sources.nuscenes.by_sample import FORM, boxes_by_sample, recordings_by_sample
 from care_sim.sources.nuscenes.cache import cached_table
 from care_sim.sources.nuscenes.table_files import (
     JsonRow,
@@ -21,6 +21,7 @@ from care_sim.sources.nuscenes.table_files import (
 )
 from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 
+LIDAR = "LIDAR_TOP"
 UNBOUNDED: ValueRange = (float("-inf"), float("inf"))
 
 
@@ -78,8 +79,15 @@ class Database:
 
     def keyframe_data(self, sample: str) -> dict[str, JsonRow]:
         """The keyframe recordings of a sample by channel."""
-        recordings = self._of_sample("recordings", sample)
-        return {self.sensor_of(row)["channel"]: row for row in recordings}
+        return {
+            self.sensor_of(row)["channel"]: row
+            for row in self.recordings(sample)
+            if row["is_key_frame"]
+        }
+
+    def recordings(self, sample: str) -> list[JsonRow]:
+        """The recordings of the keyframe of a sample, and all of its LiDAR."""
+        return self._of_sample(self._recordings, sample)
 
     def sensor_of(self, data: JsonRow) -> JsonRow:
         """The sensor that made a recording."""
@@ -88,7 +96,7 @@ class Database:
         )
 
     def pose_of(self, data: JsonRow) -> JsonRow:
-        """The pose of the car at a recording."""
+        """The pose of the car at a recording of the LiDAR."""
         token = data["ego_pose_token"]
         if data["pose"] is None:
             raise InvalidInput(f"{self.path('ego_pose')}: no row with the token {token!r}")
@@ -96,7 +104,7 @@ class Database:
 
     def annotations(self, sample: str) -> Sequence[JsonRow]:
         """The annotated boxes of a sample, one per instance."""
-        boxes = self._of_sample("boxes", sample)
+        boxes = self._of_sample(self._boxes, sample)
         for token, count in Counter(box["instance_token"] for box in boxes).items():
             if count > 1:
                 table = self.path("sample_annotation")
@@ -132,24 +140,49 @@ class Database:
     @cached_property
     def pictures(self) -> frozenset[str]:
         """The tokens and the file names of all recordings of keyframes."""
-        recordings = pc.list_flatten(self._by_sample["recordings"])
-        names = (pc.struct_field(recordings, field) for field in ("token", "filename"))
+        recordings = pc.list_flatten(self._recordings["rows"])
+        keyframes = recordings.filter(pc.struct_field(recordings, "is_key_frame"))
+        names = (pc.struct_field(keyframes, field) for field in ("token", "filename"))
         return frozenset(name for column in names for name in column.to_pylist())
 
-    def _of_sample(self, kind: str, sample: str) -> list[JsonRow]:
-        """The `recordings` or the `boxes` of a sample."""
-        rows: list[JsonRow] = self._by_sample[kind][self._numbers_of_samples[sample]].as_py()
+    def _of_sample(self, table: pa.Table, sample: str) -> list[JsonRow]:
+        rows: list[JsonRow] = table["rows"][self._numbers_of_samples[sample]].as_py()
         return rows
 
     @cached_property
-    def _by_sample(self) -> pa.Table:
-        samples = list(self.rows("sample"))
-        files = [self.path(table) for table in ("sample", *LONG_TABLES)]
-        return cached_table(self.folder, FORM, files, lambda: by_sample(self.path, samples))
+    def _boxes(self) -> pa.Table:
+        tables = ("sample", "sample_annotation")
+        return self._cached("boxes", tables, lambda: boxes_by_sample(self.path, self._samples))
+
+    @cached_property
+    def _recordings(self) -> pa.Table:
+        tables = ("sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor")
+        return self._cached(
+            "recordings",
+            tables,
+            lambda: recordings_by_sample(self.path, self._samples, self._lidars()),
+        )
+
+    def _cached(self, name: str, tables: tuple[str, ...], make: Callable[[], pa.Table]) -> pa.Table:
+        file = self.folder / f"care-sim-{name}.arrow"
+        return cached_table(file, FORM, map(self.path, tables), make)
+
+    def _lidars(self) -> list[str]:
+        """The tokens under which the LiDAR was calibrated."""
+        sensors = self.rows("sensor")
+        return [
+            token
+            for token, row in self.rows("calibrated_sensor").items()
+            if sensors.get(row["sensor_token"], {}).get("channel") == LIDAR
+        ]
+
+    @property
+    def _samples(self) -> list[str]:
+        return list(self.rows("sample"))
 
     @cached_property
     def _numbers_of_samples(self) -> dict[str, int]:
-        return {token: number for number, token in enumerate(self.rows("sample"))}
+        return {token: number for number, token in enumerate(self._samples)}
 
 
 def _check_stamp(path: Path, sample: JsonRow) -> None:
