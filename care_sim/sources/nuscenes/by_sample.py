@@ -167,10 +167,12 @@ def _grouped(table: pa.Table, samples: pa.Array) -> pa.Table:
     # The sort is stable and puts nulls last.
     order = pc.sort_indices(numbers)[: len(numbers) - numbers.null_count]
     edges = np.searchsorted(numbers.take(order).to_numpy(), np.arange(len(samples) + 1))
-    # Column by column, so that the table is never held twice.
+    # Column by column, and what Arrow keeps for later is given back each time: so the table is
+    # never held twice.
     columns = {}
     for name in table.drop_columns("sample_token").column_names:
         columns[name] = table[name].take(order).combine_chunks()
         table = table.drop_columns(name)
+        pa.default_memory_pool().release_unused()
     rows = pa.StructArray.from_arrays(list(columns.values()), list(columns))
     return pa.table({"rows": pa.ListArray.from_arrays(pa.array(edges, pa.int32()), rows)})
