@@ -7,7 +7,14 @@ from itertools import chain
 
 import numpy as np
 
-from tests.helpers.nuscenes_database import CATEGORIES, LEVELS, SENSORS, calibration, modality
+from tests.helpers.nuscenes_database import (
+    CATEGORIES,
+    LEVELS,
+    SENSORS,
+    START_US,
+    calibration,
+    modality,
+)
 
 TRAINVAL_SCENES = 855
 """With so many every table is at least as long as that of v1.0-trainval, which has 850: 34,200
@@ -21,7 +28,6 @@ COUNTS = dict.fromkeys((*SENSORS, *RADARS), 6) | {"LIDAR_TOP": 11}
 RECORDED = [(channel, n) for channel, count in COUNTS.items() for n in range(count)]
 """Channel and number of every recording of a sample; number 0 is the keyframe."""
 UNQUOTED = "%r"
-START_US = 1_532_402_927_000_000
 STEP_US = 500_000
 POINT = np.array([[10.0, 2.0, 0.5, 7.0, 3.0]], "<f4")
 PLACE = [411.3039349319818, 1180.8903791765097, 0.0]
