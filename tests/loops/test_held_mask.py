@@ -99,12 +99,13 @@ def test_returns_of_sweeps_count_for_a_detection_and_no_ray_is_counted_but_the_k
     """Two sweeps and the keyframe hit the walker once each, the sweeps the car too."""
     (cell, *_) = returns_of(WALKER, 1)
     on_both = np.array([AHEAD, WALKER])
-    hits = [sweep(t, [LEFT, cell], film_sensor(), on_both) for t in (0.3, 0.4)]
+    hits = [sweep(t, [LEFT, cell], film_sensor(), on_both, ranges=5.0) for t in (0.3, 0.4)]
     _, records, loop = played(swept(*hits), [LEFT, cell], [cell])
     assert records[1].detections.returns.tolist() == [3], "of the car there are but two"
     assert records[1].fired.tolist() == [cell]
     image = loop.belief.ranges.ravel()
     assert np.flatnonzero(image).tolist() == [cell], "the image is of the keyframe's sweep alone"
+    assert image[cell] == 15.0
     _, without, _ = played(handmade_film(), [cell], [cell])
     assert len(without[1].detections.classes) == 0
 

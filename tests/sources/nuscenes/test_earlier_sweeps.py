@@ -11,8 +11,8 @@ from care_sim.study.scene_play import film_hash
 from tests.helpers.nuscenes_database import START_US, as_recorded, change, pose
 from tests.helpers.nuscenes_scene import CAR, SCENE, WORLD, database, first
 
-REAR = np.array([[18.0, 2.0, 0.8], [30.0, -5.0, 0.1]])
-"""Points in the world: on the rear of CAR, and on the road."""
+SEEN = np.array([[22.0, 2.0, 0.8], [30.0, -5.0, 0.1]])
+"""Points in the world: at the front of CAR, and on the road."""
 
 
 def swept(folder, *moments, filed=1):
@@ -21,9 +21,15 @@ def swept(folder, *moments, filed=1):
     """
     samples = [([CAR], pose(4.0 * n), as_recorded(WORLD - [4.0 * n, 0, 0])) for n in range(3)]
     root = database(folder, samples)
+    change(root, "sample_data", stamp_keyframes)
     for moment in moments:
         add_sweep(root, moment, filed)
     return root
+
+
+def stamp_keyframes(rows):
+    for row in rows:
+        row["timestamp"] = START_US + 500_000 * int(row["sample_token"].removeprefix(f"{SCENE}-"))
 
 
 def add_sweep(root, moment, filed):
@@ -37,7 +43,7 @@ def add_sweep(root, moment, filed):
     change(root, "sample_data", lambda rows: rows.append(rows[0] | data))
     change(root, "ego_pose", lambda rows: rows.append({"token": name} | pose(x)))
     (root / file).parent.mkdir(parents=True, exist_ok=True)
-    as_recorded(REAR - [x, 0, 0]).astype("<f4").tofile(root / file)
+    as_recorded(SEEN - [x, 0, 0]).astype("<f4").tofile(root / file)
 
 
 def test_a_film_serves_none_unless_asked(tmp_path):
@@ -69,8 +75,8 @@ def test_a_sweep_holds_its_own_cells_and_the_points_lie_in_the_boxes_of_the_keyf
     assert sweep.sensor.x == pytest.approx(shot.sensor.x - 2.0)
     assert sweep.cloud.cells.tolist() == AngularGrid().cells_of(sweep.cloud.points).tolist()
     world = sweep.sensor.origin + sweep.sensor.vectors_to_world(sweep.cloud.points)
-    assert sorted(map(tuple, world.round(3))) == sorted(map(tuple, REAR))
-    on_the_car = np.isclose(world[:, 0], 18.0, atol=0.01)
+    assert sorted(map(tuple, world.round(3))) == sorted(map(tuple, SEEN))
+    on_the_car = np.isclose(world[:, 0], 22.0, atol=0.01)
     assert sweep.cloud.objects[on_the_car].tolist() == [shot.annotations.objects[0]]
     assert sweep.cloud.objects[~on_the_car].tolist() == [NO_OBJECT]
 
