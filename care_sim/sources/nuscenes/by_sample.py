@@ -63,7 +63,7 @@ def boxes_by_sample(path: TablePath, samples: Sequence[str]) -> pa.Table:
     Raises InvalidInput as `table_rows` does, for a token that stands twice, and for a box of a
     sample that there is not.
     """
-    tokens = pa.array(samples, pa.string())
+    tokens = _column(path("sample"), samples, pa.string())
     return _grouped(_boxes(path, tokens), tokens)
 
 
@@ -76,9 +76,8 @@ def recordings_by_sample(
 
     Raises InvalidInput as `table_rows` does, and for a token that stands twice.
     """
-    return _grouped(
-        _with_poses(path, _recordings(path, lidars), lidars), pa.array(samples, pa.string())
-    )
+    tokens = _column(path("sample"), samples, pa.string())
+    return _grouped(_with_poses(path, _recordings(path, lidars), lidars), tokens)
 
 
 def _boxes(path: TablePath, samples: pa.Array) -> pa.Table:
@@ -108,7 +107,8 @@ def _recordings(path: TablePath, lidars: Sequence[str]) -> pa.Table:
 
 
 def _with_poses(path: TablePath, recordings: pa.Table, lidars: Sequence[str]) -> pa.Table:
-    of_lidars = pc.is_in(recordings["calibrated_sensor_token"], pa.array(lidars, pa.string()))
+    known = _column(path("calibrated_sensor"), lidars, pa.string())
+    of_lidars = pc.is_in(recordings["calibrated_sensor_token"], known)
     tokens = pc.if_else(of_lidars, recordings["ego_pose_token"], None)
     poses = _poses(path("ego_pose"), set(tokens.drop_null().to_pylist()))
     places = poses.drop_columns("token").to_struct_array().combine_chunks()
@@ -129,12 +129,7 @@ def _columns(path: Path, rows: Iterable[JsonRow], schema: pa.Schema) -> pa.Table
     left = iter(rows)
     batches = []
     while some := list(islice(left, _ROWS_AT_ONCE)):
-        try:
-            columns = [_column([row[field.name] for row in some], field.type) for field in schema]
-        except (UnicodeEncodeError, OverflowError) as error:
-            raise InvalidInput(
-                f"{path}: half a character or too large a number ({error})"
-            ) from error
+        columns = [_column(path, [row[field.name] for row in some], field.type) for field in schema]
         batches.append(pa.record_batch(columns, schema))
     table = pa.Table.from_batches(batches, schema)
     _check_tokens(path, table["token"])
@@ -148,9 +143,14 @@ def _check_tokens(path: Path, tokens: pa.ChunkedArray) -> None:
         check_tokens(path, tokens.to_pylist())
 
 
-def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
+def _column(path: Path, values: Sequence[Any], kind: pa.DataType) -> pa.Array:
     if not pa.types.is_fixed_size_list(kind):
-        return pa.array(values, kind)
+        try:
+            return pa.array(values, kind)
+        except (UnicodeEncodeError, OverflowError) as error:
+            raise InvalidInput(
+                f"{path}: half a character or too large a number ({error})"
+            ) from error
     count = kind.list_size
     numbers = finite_numbers(values, len(values), count)
     if numbers is None:

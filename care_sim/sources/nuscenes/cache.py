@@ -55,17 +55,25 @@ def _kept(place: Path, stamp: str, make: Callable[[], pa.Table]) -> pa.Table | N
     if table is not None:
         return table
     try:
-        check_output(place, ARROW)
-    except (OSError, InvalidInput):
+        place.parent.mkdir(parents=True, exist_ok=True)
+    except OSError:
         return None
     with _alone(place.parent):
         # Another process may have made it while this one waited.
         table = _mapped(place, stamp)
-        if table is None:
+        if table is None and _can_be_written(place):
             with suppress(OSError):  # the disk is full
                 _write(place, make().replace_schema_metadata({_STAMP: stamp}))
             table = _mapped(place, stamp)
     return table
+
+
+def _can_be_written(place: Path) -> bool:
+    try:
+        check_output(place, ARROW)
+    except (OSError, InvalidInput):
+        return False
+    return True
 
 
 def _mapped(place: Path, stamp: str) -> pa.Table | None:
@@ -89,7 +97,11 @@ def _write(place: Path, table: pa.Table) -> None:
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Other processes that ask for the same wait meanwhile."""
-    handle = os.open(folder, os.O_RDONLY)
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # a folder that may not be listed
+        yield
+        return
     try:
         with suppress(OSError):  # a file system without locks
             fcntl.flock(handle, fcntl.LOCK_EX)

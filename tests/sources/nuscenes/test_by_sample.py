@@ -156,10 +156,11 @@ def test_odd_numbers_are_refused_where_they_are_needed_alone(tmp_path):
         ("sample_data", {"timestamp": 10**22}),
         ("sample_data", {"filename": "\ud800"}),
         ("sample_annotation", {"instance_token": "\ud800"}),
+        ("sample", {"token": "\ud800"}),
     ],
 )
 def test_what_no_column_holds_is_named(tmp_path, table, edit):
     root = database(tmp_path)
-    change(root, table, lambda rows: rows[0].update(edit))
+    change(root, table, lambda rows: rows.append(rows[0] | edit))
     with pytest.raises(InvalidInput, match=f"{table}.json: half a character or too large a number"):
         first(root)
