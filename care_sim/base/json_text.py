@@ -1,8 +1,9 @@
 """JSON from a user's files: whatever is wrong with it is a ValueError."""
 
 import json
+import re
 import stat
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,15 @@ MOST_BYTES = 2**28
 """Bytes of a file: more than the longest of ours, the configurations of a study (100,000 tasks of 2
 kB).
 """
+MOST_CHARACTERS = 2**18
+"""Characters of one value of a list that is read value by value: five hundred times a row."""
+_CHUNK = 2**21
+_OPENED = re.compile(r"[ \t\n\r]*\[[ \t\n\r]*(\][ \t\n\r]*)?")
+_VALUE_ENDED = re.compile(r"[ \t\n\r]*([,\]])[ \t\n\r]*")
 
 
-def json_content(
-    path: Path, most: int = MOST_BYTES, taken: Callable[[dict[str, Any]], object] | None = None
-) -> Any:
-    """The content of a file of at most `most` bytes, every map in it replaced by what is `taken` of
-    it.
+def json_content(path: Path, most: int = MOST_BYTES) -> Any:
+    """The content of a file of at most `most` bytes.
 
     Raises OSError for a file that cannot be read, ValueError as `check_file_size` and `parsed_json`
     do, and for one that the memory does not hold.
@@ -29,9 +32,43 @@ def json_content(
     # memory.
     check_file_size(path, most)
     try:
-        return parsed_json(path.read_text(encoding="utf-8"), taken)
+        return parsed_json(path.read_text(encoding="utf-8"))
     except MemoryError as error:
         raise ValueError("it is larger than the memory that is free") from error
+
+
+def listed_values(path: Path, most: int = MOST_BYTES) -> Iterator[Any]:
+    """The values of the list that a file of at most `most` bytes holds, one after the other: only
+    some of them lie in memory at a time. Each may be `MOST_CHARACTERS` long.
+
+    Raises OSError for a file that cannot be read, ValueError as `check_file_size` does, for what is
+    no JSON or no list, and for a value too deep for Python; values before it have come by then.
+    """
+    check_file_size(path, most)
+    decode = json.JSONDecoder().raw_decode
+    with path.open(encoding="utf-8") as file:
+        text = file.read(_CHUNK)
+        opened = _OPENED.match(text)
+        if opened is None:
+            raise ValueError("it holds no list")
+        place = opened.end()
+        is_open = opened[1] is None
+        while is_open:
+            # From here on the text holds the next value as a whole, or all that is left.
+            if len(text) - place < MOST_CHARACTERS:
+                text, place = text[place:] + file.read(_CHUNK), 0
+            try:
+                value, place = decode(text, place)
+            except RecursionError as error:
+                raise ValueError("it is nested too deep") from error
+            yield value
+            ended = _VALUE_ENDED.match(text, place)
+            if ended is None:
+                raise ValueError("neither a comma nor the end of the list after a value")
+            place = ended.end()
+            is_open = ended[1] == ","
+        if place < len(text) or file.read(1):
+            raise ValueError("text after the end of the list")
 
 
 def check_file_size(path: Path, most: int = MOST_BYTES) -> None:
@@ -45,14 +82,14 @@ def check_file_size(path: Path, most: int = MOST_BYTES) -> None:
         raise ValueError(f"it holds {there.st_size} bytes and may hold {most}")
 
 
-def parsed_json(text: str | bytes, taken: Callable[[dict[str, Any]], object] | None = None) -> Any:
-    """The content of a text, every map in it replaced by what is `taken` of it.
+def parsed_json(text: str | bytes) -> Any:
+    """The content of a text.
 
     Raises ValueError for what is no JSON, and for what is nested deeper than `MOST_LEVELS`, or so
     deep that Python cannot read it.
     """
     try:
-        content = json.loads(text, object_hook=taken)
+        content = json.loads(text)
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
     if _is_deep(content):

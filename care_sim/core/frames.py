@@ -112,6 +112,10 @@ class Frame:
         """World vectors (..., 3) along the axes of this frame."""
         return turned(vectors, -self.yaw) if self._upright else vectors @ self.rotation.as_matrix()
 
+    def points_of(self, other: "Frame", points: Floats) -> Floats:
+        """Points (n, 3) of another frame in this one."""
+        return self.vectors_to_local(other.origin + other.vectors_to_world(points) - self.origin)
+
     def boxes_to_local(self, boxes: Floats) -> Floats:
         """World boxes (n, 7) seen in this frame: exact centres, headings projected on its x, y
         plane.

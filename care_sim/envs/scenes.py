@@ -46,10 +46,10 @@ class ReplayEnv(FilmEnv):
     """`CARE-Replay-v0`: a recorded scene, at 2 Hz.
 
     `source` names the recordings, `argoverse2:FOLDER` or `nuscenes:FOLDER`, and `scene` one of
-    their scenes by name; the first, unless given. `split`, `version` and `camera_detections` are
-    those of `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged, or a token
-    that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of `reset` draws
-    faults, noise and floor.
+    their scenes by name; the first, unless given. `split`, `version`, `camera_detections` and
+    `sweeps` are those of `care_sim.sources.recordings.NuScenes`. A file that is missing or damaged,
+    or a token that points nowhere, raises `care_sim.InvalidInput` with its name. The seed of
+    `reset` draws faults, noise and floor.
     """
 
     __doc__ = f"{__doc__}\n    {OpenLoopEnv.__doc__}"
@@ -62,13 +62,19 @@ class ReplayEnv(FilmEnv):
         split: str | None = None,
         version: str | None = None,
         camera_detections: str | PathLike[str] | None = None,
+        sweeps: int | None = None,
         **parameters: Any,
     ):
         # Before the scene is read, so that a wrong name is refused at once.
         check_film_arguments(type(self), parameters)
         if not isinstance(scene, str | None):
             raise InvalidInput(f"scene must be a name, got {shown(scene)}")
-        options = {"split": split, "version": version, "camera_detections": camera_detections}
+        options = {
+            "split": split,
+            "version": version,
+            "camera_detections": camera_detections,
+            "sweeps": sweeps,
+        }
         recorded = recordings(source, options)
         super().__init__(
             film_of(recorded, recorded.scenes()[0] if scene is None else scene), **parameters

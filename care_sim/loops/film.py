@@ -16,9 +16,22 @@ from care_sim.sensors.annotated import NO_ANNOTATIONS, Annotations, Cloud, Ident
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """One turn of the LiDAR between two keyframes: `time_s` from the start, its own `sensor` frame,
+    and its returns in that frame. Nobody annotated it: its points belong to the boxes of the coming
+    keyframe in which they lie.
+    """
+
+    time_s: float
+    sensor: Frame
+    cloud: Cloud
+
+
+@dataclass(frozen=True)
 class Shot:
     """One keyframe: `time_s` from the start, `token` by which its source names it, the LiDAR's
-    `sensor` frame, the car's own motion, and everything that could be seen.
+    `sensor` frame, the car's own motion, and everything that could be seen. `sweeps` are those
+    since the keyframe before, in order of time, where the source serves them.
     """
 
     time_s: float
@@ -28,6 +41,7 @@ class Shot:
     annotations: Annotations
     seen: IdentifiedDetections
     cloud: Cloud
+    sweeps: tuple[Sweep, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from care_sim.core.types import Detections, Scan, Tracks
 from care_sim.driving.odometry import Odometry
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
+from care_sim.loops.held_mask import with_sweeps
 from care_sim.loops.seeds import SensorSeeds
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
@@ -79,6 +80,7 @@ class OpenLoop:
         self._limits = Limits(rig)
         self._memory = TrackMemory(film.keyframe_s)
         self._track_objects = TrackObjects()
+        self._held: Cells = np.empty(0, np.int64)
         self.index = 0
         self._look(np.zeros(rig.grid.shape, np.float32))
 
@@ -99,7 +101,9 @@ class OpenLoop:
 
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
-        detections, objects = self._detector.detect(cloud, shot.annotations)
+        gathered = with_sweeps(cloud, self._lidar, self._held, shot)
+        self._held = fired
+        detections, objects = self._detector.detect(gathered, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
         self._track_objects.note(tracks, objects)
         velocities = self._memory.velocities(tracks, shot.sensor)

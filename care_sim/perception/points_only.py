@@ -32,6 +32,8 @@ class PointDetector(Protocol):
         0.
 
         The sensor is `sensor_height_m` above the road. The points are the detector's own to change.
+        A detector whose attribute `wants_times` is true gets (P, 4): last the time of each point in
+        seconds from the keyframe, 0 or less.
         `returns` are the points on each object, `scores` confidences from 0 to 1, or None. Whatever
         is returned becomes a track, so what is too unsure to act on is left out here; at most
         MOST_DETECTIONS.
@@ -58,6 +60,9 @@ class PointsOnly:
         """
         # A copy: what the detector does to its points must not reach the film, which is shared.
         points = np.array(cloud.points, dtype=np.float64)
+        if getattr(self._detector, "wants_times", False):
+            times = np.zeros(len(cloud)) if cloud.times is None else cloud.times
+            points = np.column_stack([points, times])
         try:
             found = self._detector.detect(points, self._sensor_height_m)
         except MissingExtra:

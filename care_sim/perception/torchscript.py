@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from care_sim.base.checks import check_flag
 from care_sim.base.errors import InvalidInput
 from care_sim.base.extras import import_torch
 from care_sim.core.arrays import Floats
@@ -35,11 +36,14 @@ class TorchScriptDetector:
 
     `points` is a float32 tensor (P, 3) in the sensor frame, `sensor_height_m` a float; `classes`
     (n,) index `care_sim.core.types.CLASSES`, `boxes` (n, 7) are x, y, z, length, width, height, yaw
-    in the sensor frame, `scores` (n,) lie in [0, 1]. Runs on the CPU. Needs torch. Raises
-    MissingExtra without it, InvalidInput for a file that is no TorchScript module.
+    in the sensor frame, `scores` (n,) lie in [0, 1]. With `times` the points are (P, 4), last the
+    seconds from the keyframe, 0 or less. Runs on the CPU. Needs torch. Raises MissingExtra without
+    it, InvalidInput for a file that is no TorchScript module.
     """
 
-    def __init__(self, file: str | PathLike[str]):
+    def __init__(self, file: str | PathLike[str], times: bool = False):
+        check_flag("times", times)
+        self.wants_times = times
         self._torch = import_torch()
         self._file = fspath(file)
         if not Path(file).is_file():
@@ -59,4 +63,4 @@ class TorchScriptDetector:
                 self._torch.from_numpy(points.astype(np.float32)), float(sensor_height_m)
             )
         classes, boxes, scores = (output.numpy() for output in outputs)
-        return Detections(classes, boxes, inside(points, boxes).sum(axis=1), scores)
+        return Detections(classes, boxes, inside(points[:, :3], boxes).sum(axis=1), scores)

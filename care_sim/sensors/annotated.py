@@ -37,12 +37,14 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 @dataclass(frozen=True)
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
-    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT.
+    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
+    `times` (P,), seconds from the keyframe, where they have their own.
     """
 
     cells: Cells
     points: Floats
     objects: Integers
+    times: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -50,7 +52,12 @@ class Cloud:
     def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
         rows = np.flatnonzero(kept)
-        return Cloud(self.cells[rows], self.points.take(rows, axis=0), self.objects[rows])
+        return Cloud(
+            self.cells[rows],
+            self.points.take(rows, axis=0),
+            self.objects[rows],
+            None if self.times is None else self.times[rows],
+        )
 
 
 @dataclass(frozen=True)

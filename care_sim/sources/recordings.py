@@ -9,15 +9,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
 
-from care_sim.base.checks import check_known, check_path
+from care_sim.base.checks import check_known, check_path, check_whole
 from care_sim.base.errors import InvalidInput, shown
 from care_sim.loops.film import Film
 from care_sim.sources.argoverse2 import films as argoverse2
 from care_sim.sources.argoverse2.tables import ANNOTATION_FILES, POSE_FILE
 from care_sim.sources.nuscenes import films, splits
 from care_sim.sources.nuscenes.detections import DetectionFile
-from care_sim.sources.nuscenes.table_files import JsonRow
-from care_sim.sources.nuscenes.tables import FIELDS, Database
+from care_sim.sources.nuscenes.table_files import FIELDS, JsonRow
+from care_sim.sources.nuscenes.tables import Database
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,18 @@ class Argoverse2(Recordings):
 class NuScenes(Recordings):
     """A nuScenes v1.0 database: the scenes of a `split`, of a `version` if the folder holds
     several. The cameras' boxes come from the file `camera_detections`, or else from projected
-    annotations.
+    annotations. A detector gets `sweeps` of the LiDAR at a keyframe: its own, and the last of those
+    since the keyframe before, under whose mask they were fired (`care_sim.loops.held_mask`).
     """
 
     kind = "nuscenes"
     split: str = "val"
     version: str | None = None
     camera_detections: Path | None = None
+    sweeps: int = 1
+
+    def __post_init__(self) -> None:
+        check_whole("sweeps", self.sweeps, 1)
 
     def scenes(self) -> list[str]:
         """The names of the split's scenes."""
@@ -90,7 +95,10 @@ class NuScenes(Recordings):
         check_known(f"scene of the split {self.split} in {self.folder}", scene, rows)
         detections = _detections(self.camera_detections) if self.camera_detections else None
         return films.nuscenes_film(
-            _database(self.folder, self.version), rows[scene], detections=detections
+            _database(self.folder, self.version),
+            rows[scene],
+            detections=detections,
+            sweeps=self.sweeps,
         )
 
     def files(self, scene: str) -> list[Path]:

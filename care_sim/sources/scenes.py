@@ -103,15 +103,19 @@ class Recorded:
         return self.recordings.film(scene.name)
 
     def row(self, scene: Scene) -> dict[str, Any]:
-        """The kind, the hash of the scene's files, and that of the camera detections where there
-        are some.
+        """The kind, the hash of the scene's files, that of the camera detections where there are
+        some, and the number of sweeps where it is not one.
         """
         own: dict[str, Any] = {
             "source": self.kind,
             "recording": data_digest(self.recordings.files(scene.name)),
         }
-        if isinstance(self.recordings, NuScenes) and self.recordings.camera_detections:
+        if not isinstance(self.recordings, NuScenes):
+            return own
+        if self.recordings.camera_detections:
             own["camera_detections"] = file_digest(self.recordings.camera_detections)
+        if self.recordings.sweeps > 1:
+            own["sweeps"] = self.recordings.sweeps
         return own
 
 

@@ -116,6 +116,7 @@ _ANY_PLAY = {
 _OF_SOME_PLAYS = {
     "recording": as_optional(TEXT),
     "camera_detections": as_optional(TEXT),
+    "sweeps": as_optional(COUNT),
     "presence": as_optional(TEXT),
 } | {name: CONDITION_COLUMNS[name] for name in COLUMNS_WHERE_CHANGED if name in OF_BOTH_LOOPS}
 _PLAYS = Schema(
@@ -177,6 +178,7 @@ _PARAMETERS = frozenset(
         "sensor_setup",
         "detector",
         "camera_detections",
+        "sweeps",
         "presence",
         "driver",
     }

@@ -191,6 +191,8 @@ def film_hash(film: Film) -> str:
             )
         )
         content.update(portable_bytes(cloud.cells, cloud.objects))
+        for sweep in shot.sweeps:
+            content.update(portable_bytes(sweep.time_s, sweep.cloud.cells, sweep.cloud.objects))
     hidden = film.hidden
     content.update(portable_bytes(hidden.objects, hidden.classes, hidden.boxes))
     return content.hexdigest()[:16]

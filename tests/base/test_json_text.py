@@ -6,9 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
+from care_sim.base import json_text
 from care_sim.base.errors import InvalidInput
-from care_sim.base.json_text import MOST_BYTES, MOST_LEVELS, json_content, parsed_json
+from care_sim.base.json_text import (
+    MOST_BYTES,
+    MOST_LEVELS,
+    json_content,
+    listed_values,
+    parsed_json,
+)
 from care_sim.policies.learned.weights import load_weights
 from care_sim.reports.page.provenance import CONFIG, _description
 from care_sim.sources.nuscenes.table_files import LARGEST_TABLE, read_json
@@ -21,7 +30,6 @@ DEEP = {n: "[" * n + "]" * n for n in (MOST_LEVELS, MOST_LEVELS + 1, 980, 100_00
 def test_what_is_not_too_deep_comes_back():
     for text in ('{"a": [1, {"b": null}]}', DEEP[MOST_LEVELS], "3", '"\\ud800"'):
         assert parsed_json(text) == json.loads(text)
-    assert parsed_json('{"a": {"b": 1}}', len) == 1
     wide = json.dumps([[[n]] for n in range(1000)])
     assert parsed_json(wide) == json.loads(wide)
 
@@ -93,3 +101,54 @@ def test_what_exceeds_the_memory_is_a_value_error(tmp_path, monkeypatch):
     monkeypatch.setattr(json, "loads", full)
     with pytest.raises(ValueError, match="memory"):
         json_content(tmp_path / "a.json")
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=6,
+)
+
+
+@pytest.fixture
+def narrow(monkeypatch):
+    """A reader that sees few characters at a time."""
+    monkeypatch.setattr(json_text, "_CHUNK", 400)
+    monkeypatch.setattr(json_text, "MOST_CHARACTERS", 400)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(VALUES, max_size=30), st.sampled_from([None, 0, 2]), st.booleans())
+def test_a_list_is_read_value_by_value_as_it_is_read_whole(tmp_path, narrow, values, indent, plain):
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(values, indent=indent, ensure_ascii=plain) + "\n", encoding="utf-8")
+    assert [*listed_values(path)] == values
+
+
+WRONG = {
+    "": "no list",
+    "{}": "no list",
+    "[": "Expecting value",
+    "[1": "neither a comma nor the end",
+    "[1,": "Expecting value",
+    "[1,]": "Expecting value",
+    "[1 2]": "neither a comma nor the end",
+    "[1]]": "text after the end",
+    "[] 1": "text after the end",
+    '[{"a": 1': "delimiter",
+    f"[{DEEP[100_000]}]": "deep",
+}
+
+
+@pytest.mark.parametrize("text", WRONG, ids=range(len(WRONG)))
+def test_what_is_no_list_is_a_value_error(tmp_path, text):
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=WRONG[text]):
+        [*listed_values(path)]
+
+
+def test_values_come_before_the_end_of_the_file_is_read(tmp_path, narrow):
+    path = tmp_path / "a.json"
+    path.write_text("[" + "1," * 10_000 + "!")
+    assert next(listed_values(path)) == 1

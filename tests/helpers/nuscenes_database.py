@@ -57,6 +57,10 @@ ATTRIBUTES = (
 LEVELS = {"1": "v0-40", "2": "v40-60", "3": "v60-80", "4": "v80-100"}
 
 
+START_US = 1_532_402_927_000_000
+"""Of the first sample, microseconds."""
+
+
 def annotated(
     category,
     place,
@@ -183,7 +187,7 @@ def add_scene(tables, root, name, samples):
         tables["sample"].append(
             {
                 "token": tokens[n],
-                "timestamp": 1_532_402_927_000_000 + n * 500_000,
+                "timestamp": START_US + n * 500_000,
                 "scene_token": f"scene-{name}",
             }
             | links

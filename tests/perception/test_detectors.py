@@ -3,6 +3,7 @@ test writes.
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -210,6 +211,27 @@ def test_a_torchscript_file_detects(tmp_path):
     near = np.abs(POINTS - found.boxes[0, :3]) <= 2.0
     assert found.returns.tolist() == [np.count_nonzero(near.all(axis=1))]
     assert len(detector.detect(CLOUD.take(np.zeros(len(CLOUD), bool)), CAR)[0]) == 0
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit.*:DeprecationWarning")
+def test_a_torchscript_file_is_given_times_if_it_is_told_to(tmp_path):
+    """It reports the time of the first point as its score."""
+    torch = pytest.importorskip("torch")
+
+    class Clock(torch.nn.Module):
+        def forward(self, points: torch.Tensor, sensor_height_m: float):
+            boxes = torch.cat([points[:1, :3], torch.ones(1, 4)], dim=1)
+            return torch.tensor([4]), boxes, -points[:1, 3]
+
+    torch.jit.script(Clock()).save(str(tmp_path / "clock.pt"))
+    detector = make_detector("torchscript", HEIGHT, file=tmp_path / "clock.pt", times=True)
+    earlier = replace(CLOUD, times=np.full(len(CLOUD), -0.25))
+    assert [detector.detect(cloud, CAR)[0].scores.tolist() for cloud in (CLOUD, earlier)] == [
+        [0.0],
+        [0.25],
+    ]
+    with pytest.raises(InvalidInput, match="times must be"):
+        make_detector("torchscript", HEIGHT, file=tmp_path / "clock.pt", times=2)
 
 
 def test_a_file_that_is_none_is_named(tmp_path):

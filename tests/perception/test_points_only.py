@@ -1,5 +1,7 @@
 """The interface: what reaches a real detector, and what it may return. The proxy over films."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,16 @@ def test_a_real_detector_is_handed_points_and_a_height_and_no_more():
     points, height = real.given
     assert np.array_equal(points, SCENE.points)
     assert height == HEIGHT
+
+
+def test_one_that_wants_times_gets_them_as_the_last_column():
+    real = Says(detections())
+    real.wants_times = True
+    times = np.linspace(-0.45, 0.0, len(SCENE))
+    for shown, wanted in ((SCENE, np.zeros(len(SCENE))), (replace(SCENE, times=times), times)):
+        PointsOnly("mine", real, HEIGHT).detect(shown, OBJECTS)
+        points, _ = real.given
+        assert np.array_equal(points, np.column_stack([SCENE.points, wanted]))
 
 
 def test_its_points_are_its_own_to_change_and_lead_nowhere():

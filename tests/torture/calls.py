@@ -152,6 +152,7 @@ def replay(case):
             "split",
             "version",
             "camera_detections",
+            "sweeps",
             "detector",
             "budget",
             "unknown",

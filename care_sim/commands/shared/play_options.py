@@ -31,6 +31,10 @@ class SourceOptions:
     """For streets: LiDAR and cameras, a name of `care-sim sensors` or a .toml file of a set-up."""
     camera_detections: Path | None = None
     """For nuScenes: a file with a camera detector's boxes, in nuScenes or COCO results form."""
+    sweeps: int | None = None
+    """For nuScenes: sweeps that a detector gets at a keyframe, 1 unless given: its own, and the
+    last before it, fired by the mask of the keyframe before.
+    """
 
     def source_named(self, text: str) -> Source:
         """The source that a text and the options name. Raises InvalidInput where there is none."""
@@ -40,6 +44,7 @@ class SourceOptions:
             version=self.version,
             sensor=self.sensor,
             camera_detections=self.camera_detections,
+            sweeps=self.sweeps,
         )
 
 

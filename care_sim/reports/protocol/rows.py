@@ -173,10 +173,11 @@ def plays_by_setting(rows: Sequence[Row]) -> list[SettingPlays]:
 
 def _check_films(rows: Sequence[Row]) -> None:
     """The data of a source may have changed between two runs into one folder."""
-    films: dict[tuple[str, ...], str] = {}
+    films: dict[tuple[object, ...], str] = {}
     for row in rows:
-        # Camera detections from a file make another film of the same scene.
-        scene = (row["source"], row["scene"], row.get("camera_detections") or "")
+        # Camera detections from a file and sweeps between keyframes make another film of the scene.
+        made_with = (row.get("camera_detections"), row.get("sweeps"))
+        scene = (row["source"], row["scene"], *made_with)
         if len(row["ttfds"]) != row["events"]:
             raise InvalidInput(
                 f"a play of scene {row['scene']} has {len(row['ttfds'])} TTFD of {row['events']:g} "

@@ -10,7 +10,6 @@ the way that the car drives meanwhile is neglected.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
@@ -22,26 +21,21 @@ from care_sim.sensors.annotated import Annotations, IdentifiedDetections
 from care_sim.sources.car_motion import motions
 from care_sim.sources.nuscenes.cameras import (
     CAMERA_CHANNELS,
-    PICTURE,
     VISIBLE_SHARES,
     RecordedCamera,
     projected_detections,
-    recorded_camera,
 )
 from care_sim.sources.nuscenes.categories import UnknownCategory, class_of
 from care_sim.sources.nuscenes.detections import DetectionFile
+from care_sim.sources.nuscenes.earlier_sweeps import with_earlier_sweeps
+from care_sim.sources.nuscenes.mounts import camera_of, frame_of, lidar_mount
 from care_sim.sources.nuscenes.sweeps import read_points, recorded_cloud
 from care_sim.sources.nuscenes.table_files import JsonRow
-from care_sim.sources.nuscenes.tables import Database
-from care_sim.sources.plausible import AWAY_M, MAP_M, MOUNT_M, SIZES_M, quaternion_fault
+from care_sim.sources.nuscenes.tables import LIDAR, Database
+from care_sim.sources.plausible import AWAY_M, SIZES_M
 
 NUSCENES_KEYFRAME_S = 0.5
 """nuScenes annotates its keyframes at 2 Hz."""
-LIDAR = "LIDAR_TOP"
-FOCALS = (10.0, 1e5)
-"""Pixels: of a picture 1600 wide, views of 179 degrees and of one."""
-_FORWARD_FROM_RIGHT = Rotation.from_euler("z", np.pi / 2)
-"""In LIDAR_TOP's own frame x points right and y forward."""
 
 
 def nuscenes_film(
@@ -49,12 +43,15 @@ def nuscenes_film(
     scene: JsonRow,
     grid: AngularGrid | None = None,
     detections: DetectionFile | None = None,
+    sweeps: int = 1,
 ) -> Film:
     """The film of a scene, in the cells of `grid` (the paper's, unless given). The cameras' boxes
-    come from `detections`, else from projected annotations.
+    come from `detections`, else from projected annotations. With more `sweeps` than one, keyframes
+    have that many: their own, and the last before it.
 
     Raises InvalidInput for a token that points nowhere, a missing recording, a missing or truncated
-    sweep, a detection on what is no picture of a keyframe.
+    sweep, a detection on what is no picture of a keyframe, and for a scene without sweeps between
+    its keyframes where some are asked for.
     """
     if detections is not None:
         detections.check(database)
@@ -63,7 +60,7 @@ def nuscenes_film(
     grid = grid or AngularGrid()
     setup = _scene_setup(database, samples, data[0], grid, detections)
     cars = [
-        _frame(database, "ego_pose", recordings[LIDAR]["ego_pose_token"]) for recordings in data
+        frame_of(database, "ego_pose", database.pose_of(recordings[LIDAR])) for recordings in data
     ]
     # Timestamps are microseconds. The motion is that of the poses at which the sweeps were taken.
     times = np.array([sample["timestamp"] - samples[0]["timestamp"] for sample in samples]) * 1e-6
@@ -72,6 +69,8 @@ def nuscenes_film(
         setup.shot(*moment)
         for moment in zip(samples, data, times.tolist(), cars, egos, strict=True)
     )
+    if sweeps > 1:
+        shots = with_earlier_sweeps(database, samples, shots, setup.lidar, grid, sweeps - 1)
     cameras = tuple(camera.pinhole for camera in setup.cameras)
     hidden = setup.hidden(samples[0], cars[0])
     return Film(
@@ -123,7 +122,7 @@ class _SceneSetup:
         return [
             box
             for box in boxes
-            if _has_points(box) == seen and _class_name(self.database, box) is not None
+            if box["has_points"] == seen and _class_name(self.database, box) is not None
         ]
 
     def _seen(
@@ -143,8 +142,8 @@ def _scene_setup(
     grid: AngularGrid,
     detections: DetectionFile | None,
 ) -> _SceneSetup:
-    lidar = _lidar_mount(database, recordings[LIDAR])
-    cameras = tuple(_camera(database, recordings[channel], lidar) for channel in CAMERA_CHANNELS)
+    lidar = lidar_mount(database, recordings[LIDAR])
+    cameras = tuple(camera_of(database, recordings[channel], lidar) for channel in CAMERA_CHANNELS)
     return _SceneSetup(
         database, lidar, cameras, _object_numbers(database, samples), grid, detections
     )
@@ -160,56 +159,12 @@ def _recordings(database: Database, sample: JsonRow) -> dict[str, JsonRow]:
     return found
 
 
-def _frame(database: Database, table: str, token: str) -> Frame:
-    # The tables write w first, SciPy writes it last.
-    w, x, y, z = database.numbers(table, token, "rotation", 4).tolist()
-    mounted = table == "calibrated_sensor"
-    fault = quaternion_fault(np.array([[x, y, z, w]]), has_heading=not mounted)
-    if fault is not None:
-        raise InvalidInput(f"{database.path(table)}: rotation of {token!r}: {fault[1]}")
-    origin = database.numbers(table, token, "translation", 3, within=MOUNT_M if mounted else MAP_M)
-    return Frame.turned_by(Rotation.from_quat([x, y, z, w]), origin)
-
-
-def _lidar_mount(database: Database, data: JsonRow) -> Frame:
-    """The sensor frame in the car's: x forward where LIDAR_TOP has y forward."""
-    token = data["calibrated_sensor_token"]
-    own = _frame(database, "calibrated_sensor", token)
-    # The car's frame stands on the road.
-    if own.z < 0:
-        path = database.path("calibrated_sensor")
-        raise InvalidInput(f"{path}: {token!r} lies below the road, at {own.z:g} m")
-    return Frame.turned_by(own.rotation * _FORWARD_FROM_RIGHT, own.origin)
-
-
-def _camera(database: Database, data: JsonRow, lidar: Frame) -> RecordedCamera:
-    token = data["calibrated_sensor_token"]
-    intrinsic = database.numbers("calibrated_sensor", token, "camera_intrinsic", 3, 3)
-    if not FOCALS[0] <= intrinsic[0, 0] <= FOCALS[1]:
-        raise InvalidInput(
-            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose focal "
-            "length is not within "
-            f"{FOCALS[0]:g} and {FOCALS[1]:g} pixels"
-        )
-    if not all(0 <= middle <= size for middle, size in zip(intrinsic[:2, 2], PICTURE, strict=True)):
-        raise InvalidInput(
-            f"{database.path('calibrated_sensor')}: {token!r} has a camera_intrinsic whose "
-            "principal point lies "
-            f"outside the picture of {PICTURE[0]} x {PICTURE[1]}"
-        )
-    return recorded_camera(_frame(database, "calibrated_sensor", token), intrinsic, lidar)
-
-
 def _class_name(database: Database, box: JsonRow) -> str | None:
     token = database.row("instance", box["instance_token"])["category_token"]
     try:
         return class_of(database.row("category", token)["name"])
     except UnknownCategory as error:
         raise InvalidInput(f"{database.path('category')}: {token!r}: {error}") from None
-
-
-def _has_points(box: JsonRow) -> bool:
-    return bool(box["num_lidar_pts"] + box["num_radar_pts"] > 0)
 
 
 def _object_numbers(database: Database, samples: list[JsonRow]) -> dict[str, int]:
@@ -242,9 +197,9 @@ def _annotations(
 
 def _world_box(database: Database, box: JsonRow) -> tuple[float, ...]:
     """Centre, length, width, height and heading; the table has width, length, height."""
-    frame = _frame(database, "sample_annotation", box["token"])
+    frame = frame_of(database, "sample_annotation", box)
     width, length, height = database.numbers(
-        "sample_annotation", box["token"], "size", 3, within=SIZES_M
+        "sample_annotation", box, "size", 3, within=SIZES_M
     ).tolist()
     return (*frame.origin.tolist(), length, width, height, frame.yaw)
 

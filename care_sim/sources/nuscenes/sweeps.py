@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame, turned
-from care_sim.core.grid import AngularGrid
+from care_sim.core.grid import AngularGrid, Cells
 from care_sim.sensors.annotated import NO_OBJECT, Annotations, Cloud
 
 VALUES_PER_POINT = 5
@@ -58,12 +58,20 @@ def recorded_cloud(
     """The points (n, 3) that a ray of `grid` could have returned, each with the annotated box that
     it lies in.
     """
+    cells, kept = points_of_grid(points, grid)
+    return Cloud(cells, kept, owners(kept, annotations, sensor))
+
+
+def points_of_grid(points: Floats, grid: AngularGrid) -> tuple[Cells, Floats]:
+    """Those of points (n, 3) that a ray of `grid` could have returned, in the order of their cells,
+    and the cells first.
+    """
     ranges = np.linalg.norm(points, axis=1)
     cells = grid.cells_of(points)
     (kept,) = np.nonzero((cells >= 0) & (ranges > OWN_CAR_M) & (ranges <= grid.range_m))
-    # A cloud comes in the order of its cells; of several points in a cell all stay.
+    # Of several points in a cell all stay.
     order = kept[np.argsort(cells[kept], kind="stable")]
-    return Cloud(cells[order], points[order], owners(points[order], annotations, sensor))
+    return cells[order], points[order]
 
 
 def owners(points: Floats, annotations: Annotations, sensor: Frame) -> Integers:

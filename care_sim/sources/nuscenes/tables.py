@@ -1,53 +1,28 @@
 """The JSON tables of a nuScenes v1.0 database. Errors name the file and the token."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from care_sim.base.checks import check_whole
 from care_sim.base.errors import InvalidInput
 from care_sim.core.arrays import Floats
-from care_sim.sources.nuscenes.table_files import DROPPED, JsonRow, indexed_rows, read_json
+from care_sim.sources.nuscenes.by_sample import FORM, boxes_by_sample, recordings_by_sample
+from care_sim.sources.nuscenes.cache import cached_table
+from care_sim.sources.nuscenes.table_files import (
+    JsonRow,
+    check_tokens,
+    finite_numbers,
+    table_rows,
+)
 from care_sim.sources.plausible import STAMPS_NS, ValueRange, check_span
 
+LIDAR = "LIDAR_TOP"
 UNBOUNDED: ValueRange = (float("-inf"), float("inf"))
-
-FIELDS: dict[str, dict[str, type]] = {
-    "scene": {"name": str, "first_sample_token": str, "last_sample_token": str},
-    "sample": {"timestamp": int, "next": str},
-    "sample_data": {
-        "sample_token": str,
-        "ego_pose_token": str,
-        "calibrated_sensor_token": str,
-        "filename": str,
-        "is_key_frame": bool,
-    },
-    "calibrated_sensor": {
-        "sensor_token": str,
-        "translation": list,
-        "rotation": list,
-        "camera_intrinsic": list,
-    },
-    "sensor": {"channel": str},
-    "ego_pose": {"translation": list, "rotation": list},
-    "sample_annotation": {
-        "sample_token": str,
-        "instance_token": str,
-        "visibility_token": str,
-        "translation": list,
-        "size": list,
-        "rotation": list,
-        "num_lidar_pts": int,
-        "num_radar_pts": int,
-    },
-    "instance": {"category_token": str},
-    "category": {"name": str},
-    "visibility": {"level": str},
-}
-"""What is read of each table, beside its token."""
 
 
 class Database:
@@ -68,11 +43,13 @@ class Database:
         return self.folder / f"{table}.json"
 
     def rows(self, table: str) -> dict[str, JsonRow]:
-        """The rows of a table by token. Of recordings and car poses only those of keyframes are
-        kept, about one in six.
+        """The rows of a short table by token. What was recorded and annotated is asked for by its
+        sample.
         """
         if table not in self._tables:
-            self._tables[table] = self._read(table)
+            rows = list(table_rows(self.path(table)))
+            check_tokens(self.path(table), [row["token"] for row in rows])
+            self._tables[table] = {row["token"]: row for row in rows}
         return self._tables[table]
 
     def row(self, table: str, token: str) -> JsonRow:
@@ -83,15 +60,12 @@ class Database:
         return rows[token]
 
     def numbers(
-        self, table: str, token: str, field: str, *shape: int, within: ValueRange = UNBOUNDED
+        self, table: str, row: JsonRow, field: str, *shape: int, within: ValueRange = UNBOUNDED
     ) -> Floats:
-        """A field of finite numbers as an array of `shape`, all in the range `within`."""
-        found = self.row(table, token)[field]
-        try:
-            values = np.array(found)
-        except ValueError:
-            values = np.empty(0)
-        if values.shape != shape or values.dtype.kind not in "if" or not np.isfinite(values).all():
+        """A field of a row as an array of `shape`, finite numbers in the range `within`."""
+        token = row["token"]
+        values = finite_numbers(row[field], *shape)
+        if values is None:
             wanted = " x ".join(map(str, shape))
             raise InvalidInput(
                 f"{self.path(table)}: {token!r} has no {field} of {wanted} finite numbers"
@@ -101,11 +75,19 @@ class Database:
         if beyond.size:
             place = f"must lie in [{least:g}, {most:g}], got {beyond[0]:g}"
             raise InvalidInput(f"{self.path(table)}: {field} of {token!r} {place}")
-        return values.astype(float)
+        return values
 
     def keyframe_data(self, sample: str) -> dict[str, JsonRow]:
         """The keyframe recordings of a sample by channel."""
-        return {self.sensor_of(row)["channel"]: row for row in self._data_of_samples[sample]}
+        return {
+            self.sensor_of(row)["channel"]: row
+            for row in self.recordings(sample)
+            if row["is_key_frame"]
+        }
+
+    def recordings(self, sample: str) -> list[JsonRow]:
+        """The recordings of the keyframe of a sample, and all of its LiDAR."""
+        return self._of_sample(self._recordings, sample)
 
     def sensor_of(self, data: JsonRow) -> JsonRow:
         """The sensor that made a recording."""
@@ -113,9 +95,16 @@ class Database:
             "sensor", self.row("calibrated_sensor", data["calibrated_sensor_token"])["sensor_token"]
         )
 
+    def pose_of(self, data: JsonRow) -> JsonRow:
+        """The pose of the car at a recording of the LiDAR."""
+        token = data["ego_pose_token"]
+        if data["pose"] is None:
+            raise InvalidInput(f"{self.path('ego_pose')}: no row with the token {token!r}")
+        return {"token": token, **data["pose"]}
+
     def annotations(self, sample: str) -> Sequence[JsonRow]:
         """The annotated boxes of a sample, one per instance."""
-        boxes = self._boxes_of_samples[sample]
+        boxes = self._of_sample(self._boxes, sample)
         for token, count in Counter(box["instance_token"] for box in boxes).items():
             if count > 1:
                 table = self.path("sample_annotation")
@@ -148,58 +137,52 @@ class Database:
         check_span(self.path("sample"), (found[-1]["timestamp"] - found[0]["timestamp"]) * 1e-6)
         return found
 
-    def _read(self, table: str) -> dict[str, JsonRow]:
-        """The rows and fields that are needed. Whatever else a table holds is dropped while it is
-        parsed, to save memory.
-        """
-        kinds = {"token": str, **FIELDS[table]}
-
-        def taken(row: JsonRow) -> object:
-            return (
-                {name: row[name] for name in kinds if name in row}
-                if self._is_needed(table, row)
-                else DROPPED
-            )
-
-        return indexed_rows(self.path(table), read_json(self.path(table), taken), kinds)
-
-    def _is_needed(self, table: str, row: JsonRow) -> bool:
-        """Whether a row is kept. A row that lacks the field that decides stays, to be refused with
-        its name.
-        """
-        if table == "sample_data":
-            return row.get("is_key_frame") is not False
-        if table == "ego_pose" and "token" in row:
-            # Poses are recorded for every sweep and picture, and only those of keyframes are
-            # needed. The first pose therefore has `sample_data` read, if it was not yet.
-            return str(row["token"]) in self._poses_of_keyframes
-        return True
-
-    @cached_property
-    def _poses_of_keyframes(self) -> frozenset[str]:
-        """The pose tokens of the recordings of keyframes."""
-        return frozenset(row["ego_pose_token"] for row in self.rows("sample_data").values())
-
     @cached_property
     def pictures(self) -> frozenset[str]:
         """The tokens and the file names of all recordings of keyframes."""
-        return frozenset(
-            name
-            for token, row in self.rows("sample_data").items()
-            for name in (token, row["filename"])
+        recordings = pc.list_flatten(self._recordings["rows"])
+        keyframes = recordings.filter(pc.struct_field(recordings, "is_key_frame"))
+        names = (pc.struct_field(keyframes, field) for field in ("token", "filename"))
+        return frozenset(name for column in names for name in column.to_pylist())
+
+    def _of_sample(self, table: pa.Table, sample: str) -> list[JsonRow]:
+        rows: list[JsonRow] = table["rows"][self._numbers_of_samples[sample]].as_py()
+        return rows
+
+    @cached_property
+    def _boxes(self) -> pa.Table:
+        tables = ("sample", "sample_annotation")
+        return self._cached("boxes", tables, lambda: boxes_by_sample(self.path, self._samples))
+
+    @cached_property
+    def _recordings(self) -> pa.Table:
+        tables = ("sample", "sample_data", "ego_pose", "calibrated_sensor", "sensor")
+        return self._cached(
+            "recordings",
+            tables,
+            lambda: recordings_by_sample(self.path, self._samples, self._lidars()),
         )
 
-    @cached_property
-    def _data_of_samples(self) -> dict[str, list[JsonRow]]:
-        return _grouped(self.rows("sample_data").values())
+    def _cached(self, name: str, tables: tuple[str, ...], make: Callable[[], pa.Table]) -> pa.Table:
+        file = self.folder / f"care-sim-{name}.arrow"
+        return cached_table(file, FORM, map(self.path, tables), make)
+
+    def _lidars(self) -> list[str]:
+        """The tokens under which the LiDAR was calibrated."""
+        sensors = self.rows("sensor")
+        return [
+            token
+            for token, row in self.rows("calibrated_sensor").items()
+            if sensors.get(row["sensor_token"], {}).get("channel") == LIDAR
+        ]
+
+    @property
+    def _samples(self) -> list[str]:
+        return list(self.rows("sample"))
 
     @cached_property
-    def _boxes_of_samples(self) -> dict[str, list[JsonRow]]:
-        boxes = self.rows("sample_annotation").values()
-        # A box of a sample that there is not would be missed in silence.
-        for box in boxes:
-            self.row("sample", box["sample_token"])
-        return _grouped(boxes)
+    def _numbers_of_samples(self) -> dict[str, int]:
+        return {token: number for number, token in enumerate(self._samples)}
 
 
 def _check_stamp(path: Path, sample: JsonRow) -> None:
@@ -215,10 +198,3 @@ def _only_version(root: Path) -> Path:
             f"{root}: must hold one folder v1.0-*, or the version must be named; found: {found}"
         )
     return versions[0]
-
-
-def _grouped(rows: Iterable[JsonRow]) -> dict[str, list[JsonRow]]:
-    groups: dict[str, list[JsonRow]] = defaultdict(list)
-    for row in rows:
-        groups[row["sample_token"]].append(row)
-    return groups

@@ -22,6 +22,7 @@ _AXES = ("scenario", "policy", "budget", "seed")
 _USUAL_EPISODE = {field.name: field.default for field in fields(EpisodeConfig)}
 _USUAL_PLAY = {name: DEFAULTS[name] for name in OF_BOTH_LOOPS if name != "floor_seed"} | {
     "camera_detections": None,
+    "sweeps": 1,
     "presence": ANNOTATED,
 }
 

@@ -51,6 +51,7 @@ LEFT_OUT = {
     "camera_detections": "a file of the user's",
     "camera_latency_s": "begins with the next list: one more choice changes every episode of this",
     "camera_profile": "begins with the next list, too",
+    "sweeps": "of nuScenes",
 }
 """Arguments that the list does not hold, and why."""
 

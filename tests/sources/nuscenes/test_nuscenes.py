@@ -77,9 +77,7 @@ def test_recordings_between_keyframes_are_no_keyframes(tmp_path):
     change(root, "ego_pose", lambda rows: rows.append(rows[0] | {"token": "between"}))
     assert len(first(root).shots[0].cloud) == 4
     tables = Database(root)
-    assert "between" not in {*tables.rows("sample_data"), *tables.rows("ego_pose")}, (
-        "they would fill the memory"
-    )
+    assert not any("gone" in name for name in tables.pictures), "they would fill the memory"
 
 
 def test_a_keyframe_without_annotations_plays(tmp_path):

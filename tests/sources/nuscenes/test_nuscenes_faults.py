@@ -31,7 +31,7 @@ BREAKS = {
     ),
     "no list": (
         lambda root: (root / "v1.0-trainval" / "sensor.json").write_text("{}"),
-        "sensor.json: must hold a list",
+        "sensor.json: no readable JSON file .it holds no list",
     ),
     "no field": (
         lambda root: change(root, "instance", lambda rows: rows[0].pop("category_token")),

@@ -1,0 +1,44 @@
+"""What a detector gets where a film serves the sweeps between its keyframes: the mask of a keyframe
+is held over them, up to the next one (paper, Sec. 3).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from care_sim.core.grid import Cells
+from care_sim.loops.film import Shot
+from care_sim.sensors.annotated import Cloud
+from care_sim.sensors.recorded_lidar import RecordedLidar
+
+
+def with_sweeps(returned: Cloud, lidar: RecordedLidar, held: Cells, shot: Shot) -> Cloud:
+    """The returns of a keyframe, and those of the sweeps before it, which fired the cells `held` by
+    the mask of the keyframe before.
+
+    All are in the sensor frame of the keyframe: the motion of the car is compensated, that of
+    others is not. Each has its time, seconds from the keyframe, 0 or less. Without sweeps the
+    returns of the keyframe are as they were.
+    """
+    if not shot.sweeps:
+        return returned
+    clouds = [replace(returned, times=np.zeros(len(returned)))]
+    for sweep in shot.sweeps:
+        # Cells are those of the sensor as it stood then; faults are drawn for every sweep.
+        own = lidar.fire(held, sweep.cloud)
+        points = shot.sensor.points_of(sweep.sensor, own.points)
+        times = np.full(len(own), sweep.time_s - shot.time_s)
+        clouds.append(replace(own, points=points, times=times))
+    return _joined(clouds)
+
+
+def _joined(clouds: list[Cloud]) -> Cloud:
+    cells = np.concatenate([cloud.cells for cloud in clouds])
+    # A cloud comes in the order of its cells.
+    order = np.argsort(cells, kind="stable")
+    return Cloud(
+        cells[order],
+        np.concatenate([cloud.points for cloud in clouds])[order],
+        np.concatenate([cloud.objects for cloud in clouds])[order],
+        np.concatenate([cloud.times for cloud in clouds if cloud.times is not None])[order],
+    )

@@ -1,0 +1,52 @@
+"""Tables as long as all of nuScenes load in a minute and a gigabyte."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from care_sim.sources.recordings import NuScenes
+from tests.helpers.nuscenes_tables_of_size import BOXES, SAMPLES, TRAINVAL_SCENES, write_tables
+from tests.helpers.places import ROOT
+
+MOST_S = 60
+MOST_MB = 1000
+LOAD = """
+import json, sys
+from pathlib import Path
+from time import perf_counter, process_time
+from care_sim.sources.recordings import NuScenes
+from care_sim.study.episode_play import peak_rss_mb
+
+start, busy = perf_counter(), process_time()
+source = NuScenes(Path(sys.argv[1]), split="all")
+film = source.film(source.scenes()[0])
+times = {"seconds": perf_counter() - start, "busy_s": process_time() - busy}
+print(json.dumps(times | {"peak_mb": peak_rss_mb(), "keyframes": len(film.shots)}))
+"""
+
+
+def test_the_first_scene_plays_of_tables_of_any_length(tmp_path):
+    source = NuScenes(write_tables(tmp_path, 1), split="all")
+    shots = source.film("scene-0001").shots
+    assert [len(shot.annotations) for shot in shots] == [BOXES] * SAMPLES
+    assert [len(shot.cloud) for shot in shots] == [1] * SAMPLES
+
+
+@pytest.mark.speed
+def test_all_of_trainval_loads_in_a_minute_and_a_gigabyte(tmp_path):
+    root = write_tables(tmp_path, TRAINVAL_SCENES)
+    for process in ("first", "later"):
+        loaded = in_a_process(root)
+        print(process, loaded)
+        assert loaded["keyframes"] == SAMPLES
+        assert loaded["seconds"] < MOST_S
+        assert loaded["peak_mb"] < MOST_MB
+
+
+def in_a_process(root):
+    """How long a process of its own takes to its first film, and its most memory."""
+    command = [sys.executable, "-c", LOAD, str(root)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
