@@ -56,7 +56,9 @@ def _rounded(numbers: NDArray[np.floating]) -> NDArray[np.int64]:
     """The step that each number lies in."""
     # Compiled for the two kinds of floats that arrays come in; any other is taken as the wider one.
     is_single = numbers.dtype == np.float32
-    table = np.ascontiguousarray(numbers, np.float32 if is_single else np.float64)
+    table: NDArray[np.floating] = np.ascontiguousarray(
+        numbers, np.float32 if is_single else np.float64
+    )
     return np.asarray(_steps(table.reshape(-1)).reshape(numbers.shape))
 
 

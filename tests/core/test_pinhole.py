@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from care_sim.core.boxes import box_corners
 from care_sim.core.frames import Frame
 from care_sim.core.pinhole import NEAR_M, PinholeCamera, camera_models
-from care_sim.core.pinhole_kernels import box_rays
+from care_sim.core.pinhole_kernels import box_rays, window_around
 from care_sim.sensors.surround import SURROUND_CAMERAS
 
 cameras = st.builds(
@@ -111,6 +111,26 @@ def test_a_projected_box_is_the_tightest_around_what_lies_ahead_of_the_near_plan
     if ahead.all():
         found = np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
         assert found == pytest.approx(rectangle, rel=1e-6, abs=1e-4)
+
+
+@given(cameras, st.lists(boxes, max_size=6))
+def test_a_window_holds_what_boxes_span_those_beside_the_picture_left_out(camera, several):
+    table = np.array(several).reshape(-1, 7)
+    spans = camera.project_boxes(table)
+    assert camera.window_on(table) == window_around(spans, camera.width, camera.height)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_tip_of_a_rod_beside_the_picture_is_in_the_window(side):
+    """The rod ends two columns inside the edge of a picture 90 degrees wide, at a right angle to
+    the plane through that edge, so that the ball about it ends there, too.
+    """
+    tip = 20.0 * np.array([160.0, side * 158.0]) / np.hypot(160.0, 158.0)
+    heading = side * 0.75 * np.pi
+    middle = tip + 5.0 * np.array([np.cos(heading), np.sin(heading)])
+    rod = np.array([[*middle, 0.0, 10.0, 0.01, 0.01, heading]])
+    left, _, right, _ = PinholeCamera().window_on(rod)
+    assert (left, right) == ((0, 4) if side > 0 else (316, 320))
 
 
 def test_a_box_behind_the_camera_has_no_rectangle():

@@ -150,6 +150,15 @@ def test_nothing_beyond_the_reach(bullet):
     assert ahead(bullet, SENSOR) == (np.inf, NO_BODY)
 
 
+def test_a_part_far_off_its_body_is_met_up_to_the_reach(bullet):
+    """A post 10 m behind the middle of its body, with its near side 49.9 and then 50.1 m away."""
+    post = Part("box", (1.0, 1.0, 4.0), (-10.0, 0.0, 2.0), GREY)
+    body = bullet.add(BodyKind("trailing post", None, (21.0, 1.0, 4.0), (post,)), (60.4, 0.0, 0.0))
+    assert ahead(bullet, SENSOR) == (pytest.approx(49.9), body)
+    bullet.move(body, (60.6, 0.0, 0.0))
+    assert ahead(bullet, SENSOR) == (np.inf, NO_BODY)
+
+
 def test_the_road_is_met_only_where_there_is_one(bullet):
     sensor = Frame(3.0, -2.0, 1.84, 0.6, roll=0.03, pitch=-0.02)
     fall = -sensor.vectors_to_world(COARSE.directions)[:, 2]
