@@ -119,7 +119,9 @@ class CameraDetector:
         self._delay = Delay(self.timing, sensing.camera_jitter, keyframe_s, delay)
         self.mounted = tuple(mounted(camera, sensing, mount) for camera in cameras)
         """The cameras as they really stand."""
-        self._profiled = self._made(keyframe_s, pool, (errors, jitter, confusion, ghosts))
+        self._profiled = self._profiled_detector(
+            keyframe_s, pool, (errors, jitter, confusion, ghosts)
+        )
 
     def detect(
         self, seen: IdentifiedDetections, heading: float, boxes: Floats, time_s: float
@@ -148,8 +150,7 @@ class CameraDetector:
         if self._profiled is not None:
             ghosts = self._profiled.ghosts(np.concatenate([rows, false]), time_s)
             false = np.concatenate([false, ghosts])
-            places = self._places(objects)
-            rows, objects = self._profiled.report(seen, places, boxes[places])
+            rows, objects = self._profiled.report(seen, boxes)
         if missed.any():
             left = ~np.isin(objects, self._objects[missed])
             rows = rows[left]
@@ -172,19 +173,14 @@ class CameraDetector:
         """
         return self._delay.newest(heading)
 
-    def _made(
+    def _profiled_detector(
         self, keyframe_s: float, pool: BoxPool, seeds: Sequence[np.random.SeedSequence]
     ) -> ProfiledDetector | None:
         """The detector of the profile, None of the ideal camera."""
         profile = PROFILES[self._sensing.camera_profile]
         if profile is None:
             return None
-        return ProfiledDetector(profile, len(self._objects), self.mounted, keyframe_s, pool, seeds)
-
-    def _places(self, objects: Integers) -> Integers:
-        """(n,) the places of `objects` (n,) among all."""
-        order = np.argsort(self._objects)
-        return order[np.searchsorted(self._objects, objects, sorter=order)]
+        return ProfiledDetector(profile, self._objects, self.mounted, keyframe_s, pool, seeds)
 
 
 def _with_false_boxes(rows: Floats, objects: Integers, false: Floats) -> tuple[Floats, Integers]:

@@ -23,14 +23,14 @@ _JITTERED = 4
 class ProfiledDetector:
     """Makes of faultless detections what a detector of a profile reports.
 
-    `objects` is how many there are in all, `cameras` are those that take the pictures. Ghosts are
+    `objects` (n,) are all that it may ever find, `cameras` those that take the pictures. Ghosts are
     made from `pool`. Every kind of error has a random stream of its own.
     """
 
     def __init__(
         self,
         profile: CameraProfile,
-        objects: int,
+        objects: Integers,
         cameras: Sequence[PinholeCamera],
         keyframe_s: float,
         pool: BoxPool,
@@ -38,16 +38,18 @@ class ProfiledDetector:
     ):
         misses, jitter, confusion, ghosts = (np.random.default_rng(seed) for seed in seeds)
         self._profile = profile
+        self._objects = objects
+        self._order = np.argsort(objects)
         self._cameras = cameras
         self._matrix = profile.confusion_matrix()
         self._spreads = np.array([group.jitter for group in profile.groups])
         # A number for every group: no class need be known of an object before it is seen.
         times_s = [group.miss_time_s for group in profile.groups]
-        self._misses = PersistentDraws(objects, times_s, keyframe_s, misses)
+        self._misses = PersistentDraws(len(objects), times_s, keyframe_s, misses)
         jitter_times_s = [profile.jitter_time_s] * _JITTERED
-        self._jitter = PersistentDraws(objects, jitter_times_s, keyframe_s, jitter)
+        self._jitter = PersistentDraws(len(objects), jitter_times_s, keyframe_s, jitter)
         self._confusion = PersistentDraws(
-            objects, [profile.confusion_time_s], keyframe_s, confusion
+            len(objects), [profile.confusion_time_s], keyframe_s, confusion
         )
         self._ghosts = Ghosts(
             pool,
@@ -58,15 +60,14 @@ class ProfiledDetector:
             ghosts,
         )
 
-    def report(
-        self, seen: IdentifiedDetections, places: Integers, boxes: Floats
-    ) -> tuple[Floats, Integers]:
-        """What is reported of the faultless detections `seen` (n,): rows (k, 9) as
+    def report(self, seen: IdentifiedDetections, boxes: Floats) -> tuple[Floats, Integers]:
+        """What is reported of the faultless detections `seen` (m,): rows (k, 9) as
         `ImageDetections.rows`, and (k,) the object behind each.
 
-        `places` (n,) are those of the detections' objects among all, `boxes` (n, 7) their 3D boxes
-        in the sensor frame.
+        `boxes` (n, 7) are the 3D boxes of all objects in the sensor frame.
         """
+        # Where the detections' objects stand among all.
+        places = self._order[np.searchsorted(self._objects, seen.objects, sorter=self._order)]
         # All numbers are drawn at every keyframe, whatever is there.
         misses, jitter, confusion = (
             draws.next()[places] for draws in (self._misses, self._jitter, self._confusion)
@@ -74,7 +75,7 @@ class ProfiledDetector:
         classes = seen.detections.classes
         groups = self._profile.groups_of(classes)
         own_misses = misses[np.arange(len(seen)), groups]
-        (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes))
+        (found,) = np.nonzero(own_misses < self._recalls(seen, groups, boxes[places]))
 
         rows = seen.detections.rows()[found]
         rows[:, ImageDetections.CLASS] = confused(classes[found], confusion[found, 0], self._matrix)
@@ -92,7 +93,7 @@ class ProfiledDetector:
         return self._ghosts.draw(shown, time_s)
 
     def _recalls(self, seen: IdentifiedDetections, groups: Integers, boxes: Floats) -> Floats:
-        """(n,) the chances to find the objects `seen` (n,), of the `groups` (n,)."""
+        """(m,) the chances to find the objects `seen` (m,) of `groups` (m,) with `boxes` (m, 7)."""
         heights, shares = seen_as(seen, boxes, self._cameras, self._profile.focal_px)
         recalls = np.empty(len(seen))
         for number, group in enumerate(self._profile.groups):

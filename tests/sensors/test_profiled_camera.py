@@ -11,6 +11,7 @@ from care_sim.core.types import CLASSES, ImageDetections
 from care_sim.envs.open_loop import FilmEnv
 from care_sim.loops.film import Film
 from care_sim.sensors.annotated import NO_OBJECT, IdentifiedDetections
+from care_sim.sensors.box_pool import BoxPool
 from care_sim.sensors.camera import FRONT_CAMERA, CameraDetector
 from care_sim.sensors.camera_profiles import YOLOX
 from care_sim.sensors.detector_recall import UNHIDDEN, whole_boxes
@@ -78,6 +79,31 @@ def test_boxes_lie_around_the_object_with_the_spread_of_the_profile():
     width = np.exp(np.median(widths))
     assert np.std(middles) / width == pytest.approx(0.029, rel=0.2)
     assert np.std(widths) == pytest.approx(0.056, rel=0.2)
+
+
+@pytest.mark.parametrize(("aside", "expected"), [(0.0, 0.0), (60.0, 0.28)])
+def test_ghosts_come_as_often_as_stated_and_never_where_an_object_is(aside, expected):
+    """All of the pool is one box, that of the car or one beside it."""
+    box = np.array([[15.0, 0.0, -1.0, 1.8, 1.8, 1.6, 0.0]])
+    (edges,) = whole_boxes(FRONT_CAMERA, box)
+    times_s = 0.1 * np.arange(400)
+
+    def seen(shift):
+        row = [CAR, 0.9, *([*edges, shift, 0.0, shift, 0.0]), 0, 0.0, 0.0]
+        rows = np.array([row], float)
+        return IdentifiedDetections(ImageDetections.from_rows(rows), np.array([0]))
+
+    pool = BoxPool.of([seen(aside)] * len(times_s), times_s.tolist(), [FRONT_CAMERA])
+    sensing = Sensing(camera_profile="yolox")
+    counts = []
+    for seed in range(30):
+        camera = CameraDetector(
+            [0], sensing, 0.1, np.random.SeedSequence(seed), [FRONT_CAMERA], pool
+        )
+        found = [camera.detect(seen(0.0), 0.0, box, 0.1 * k) for k in range(40)]
+        counts += [np.sum(one.objects == NO_OBJECT) for one in found]
+    # A second ghost at the same place is never shown beside the first.
+    assert np.mean(np.array(counts) > 0) == pytest.approx(1 - np.exp(-expected), abs=0.05)
 
 
 def observations(policy, keyframes=12, **conditions):

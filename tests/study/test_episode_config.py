@@ -57,12 +57,13 @@ def test_bad_input_names_the_thing_and_what_is_allowed(change, names):
     assert "\n" not in str(error.value)
 
 
-def test_driver_and_hardware_are_columns_only_where_they_are_not_the_default():
+def test_driver_hardware_and_camera_are_columns_only_where_they_are_not_the_default():
     """So that rows and digests of before there was a choice stay as they were."""
     assert not {*COLUMNS_WHERE_CHANGED} & {*GOOD.row()}
     assert replace(GOOD, firing="cells") == GOOD
-    other = replace(GOOD, driver="careful-human", comfort_mps2=2.0, firing="tiles")
-    added = {"driver": "careful-human", "comfort_mps2": 2.0, "firing": "tiles:4x8"}
+    camera = {"camera_profile": "yolox", "camera_latency_s": 0.1}
+    other = replace(GOOD, driver="careful-human", comfort_mps2=2.0, firing="tiles", **camera)
+    added = {"driver": "careful-human", "comfort_mps2": 2.0, "firing": "tiles:4x8", **camera}
     assert other.row() == GOOD.row() | added
     assert other.digest() != GOOD.digest()
 

@@ -112,6 +112,8 @@ def test_boxes_come_from_visibility_where_no_detector_was_run(tmp_path):
     assert shot.seen.objects.tolist() == [0, 1, 3]
     surest = shot.seen.detections.confidences
     assert surest[1] < surest[0] < surest[2]
+    # The middles of the levels' bins; without a level an object counts as wholly visible.
+    assert shot.seen.visible.tolist() == [0.9, 0.5, 1.0]
     assert set(shot.seen.detections.cameras.tolist()) == {0}
 
 

@@ -45,7 +45,9 @@ def test_detections_come_from_a_file_in_either_form(tmp_path, form):
     box, shot = whole_box(root)
     path = tmp_path / "found.json"
     path.write_text(json.dumps(forms(box)[form]))
-    (detected,) = first(root, detections=DetectionFile(path)).shots
+    film = first(root, detections=DetectionFile(path))
+    (detected,) = film.shots
+    assert film.detected
     found = detected.seen.detections
     assert found.confidences.tolist() == [0.6]
     assert found.boxes[0] == pytest.approx(shot.seen.detections.boxes[0])
