@@ -255,6 +255,10 @@ class Scan:
     """(n,) the fired ones, ascending."""
     ranges: Floats
     """(n,) in metres, inf without a return."""
+    intensities: Floats | None = None
+    """(n,) calibrated, 0 to 1 and 0 without a return (`care_sim.sensors.signal`); None of a LiDAR
+    whose pulses have no strength.
+    """
 
 
 @dataclass(frozen=True)

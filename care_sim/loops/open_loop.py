@@ -18,6 +18,7 @@ from care_sim.driving.odometry import Odometry
 from care_sim.loops.false_box_pools import pool_of_film
 from care_sim.loops.film import Film, Shot
 from care_sim.loops.seeds import SensorSeeds
+from care_sim.loops.told import Told, told_by
 from care_sim.loops.truth import TrackObjects
 from care_sim.perception.base import Detector
 from care_sim.perception.tracker import TrackMemory
@@ -53,6 +54,8 @@ class OpenLoop:
     """The number of the coming keyframe, from 0."""
     belief: Belief
     """All that a policy may know when it chooses the cells."""
+    told: Told
+    """What the returns of the last keyframe told besides their ranges."""
 
     def __init__(
         self,
@@ -80,6 +83,7 @@ class OpenLoop:
         self._memory = TrackMemory(film.keyframe_s)
         self._track_objects = TrackObjects()
         self.index = 0
+        self.told = {}
         self._look(np.zeros(rig.grid.shape, np.float32))
 
     @property
@@ -99,6 +103,7 @@ class OpenLoop:
 
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
+        self.told = told_by(fired, cloud.cells, intensities=cloud.intensities)
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
         self._track_objects.note(tracks, objects)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_sim.core.arrays import Floats, Integers, Mask
-from care_sim.core.grid import Cells
-from care_sim.core.types import ImageDetections
+from care_sim.core.grid import AngularGrid, Cells
+from care_sim.core.types import ImageDetections, Scan
 
 NO_OBJECT = -1
 """The object behind a return or a camera box that lies on no annotated object."""
@@ -37,12 +37,14 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 @dataclass(frozen=True)
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
-    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT.
+    (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
+    and `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`).
     """
 
     cells: Cells
     points: Floats
     objects: Integers
+    intensities: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -50,7 +52,18 @@ class Cloud:
     def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
         rows = np.flatnonzero(kept)
-        return Cloud(self.cells[rows], self.points.take(rows, axis=0), self.objects[rows])
+        strengths = None if self.intensities is None else self.intensities[rows]
+        points = self.points.take(rows, axis=0)
+        return Cloud(self.cells[rows], points, self.objects[rows], strengths)
+
+
+def cloud_of(scan: Scan, objects: Integers, grid: AngularGrid) -> Cloud:
+    """The returns of a scan of a grid; `objects` (n,) are those behind its rows."""
+    (returned,) = np.nonzero(np.isfinite(scan.ranges))
+    cells = scan.cells[returned]
+    points = grid.directions[cells] * scan.ranges[returned, None]
+    strengths = None if scan.intensities is None else scan.intensities[returned]
+    return Cloud(cells, points, objects[returned], strengths)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """A LiDAR that fires chosen cells, and nothing else."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from care_sim.core.arrays import Integers
@@ -7,13 +9,16 @@ from care_sim.core.conditions import LidarFaults
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import Scan
+from care_sim.sensors.beams import Beams
 from care_sim.sensors.engines import RayEngine
 from care_sim.sensors.lidar_faults import CellFaults
 from care_sim.world.bullet import NO_BODY
 
 
 class Lidar:
-    """Casts the fired cells through an engine; `CellFaults` are applied to what comes back."""
+    """Casts the fired cells through an engine, or as `beams` where pulses have more to them than a
+    ray; `CellFaults` are applied to what comes back.
+    """
 
     def __init__(
         self,
@@ -21,20 +26,21 @@ class Lidar:
         engine: RayEngine,
         faults: LidarFaults,
         seed: np.random.SeedSequence,
+        beams: Beams | None = None,
     ):
         self.grid = grid
         self._engine = engine
+        self._beams = beams
         self._faults = CellFaults(grid, faults, seed)
 
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
-        cells = np.arange(self.grid.size)
-        ranges, _ = self._engine.cast(sensor, cells)
-        return Scan(cells, np.where(self._faults.dead, np.inf, ranges))
+        scan, _ = self._cast(np.arange(self.grid.size), sensor)
+        return replace(scan, ranges=np.where(self._faults.dead, np.inf, scan.ranges))
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
         """How many of `cells` would hit a body, before noise and dropout, which stay undrawn."""
-        _, bodies = self._engine.cast(sensor, cells)
+        _, bodies = self._cast(cells, sensor)
         return int(np.count_nonzero((bodies == body) & ~self._faults.dead[cells]))
 
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
@@ -42,8 +48,20 @@ class Lidar:
 
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
-        ranges, ids = self._engine.cast(sensor, cells)
+        scan, ids = self._cast(cells, sensor)
+        ranges = scan.ranges
         if self._faults.is_noisy:
             ranges = self._faults.draw_noisy(ranges, cells)
         lost = self._faults.draw_lost(cells)
-        return Scan(cells, np.where(lost, np.inf, ranges)), np.where(lost, NO_BODY, ids)
+        intensities = scan.intensities
+        if intensities is not None:
+            intensities = np.where(lost, 0.0, intensities)
+        fired = Scan(cells, np.where(lost, np.inf, ranges), intensities)
+        return fired, np.where(lost, NO_BODY, ids)
+
+    def _cast(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
+        """What the cells meet, and the bodies behind it."""
+        if self._beams is not None:
+            return self._beams.cast(sensor, cells)
+        ranges, ids = self._engine.cast(sensor, cells)
+        return Scan(cells, ranges), ids

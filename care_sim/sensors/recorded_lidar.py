@@ -1,5 +1,7 @@
 """A LiDAR whose full scan was recorded: fired cells return their part of it, after the faults."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from care_sim.core.arrays import Floats
@@ -40,4 +42,4 @@ class RecordedLidar:
         # Noise is along the ray: a point moves with its range, and stays in its cell.
         ranges = np.linalg.norm(cloud.points, axis=1)
         moved = self._faults.draw_noisy(ranges, cloud.cells) / ranges
-        return Cloud(cloud.cells, cloud.points * moved[:, None], cloud.objects)
+        return replace(cloud, points=cloud.points * moved[:, None])

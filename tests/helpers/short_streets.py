@@ -44,8 +44,8 @@ def _short_street(seed):
     return part_of(make_street(seed % len(LAYOUTS)), slice(KEYFRAMES))
 
 
-def _filmed(street, setup):
-    key = street.name, setup
+def _filmed(street, *taken):
+    key = street.name, *taken
     if key not in _films:
-        _films[key] = record(street, setup)
+        _films[key] = record(street, *taken)
     return _films[key]

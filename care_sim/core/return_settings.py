@@ -1,0 +1,64 @@
+"""What becomes of a LiDAR's pulses on their way there and back, one switch for each effect.
+
+Every switch is off by default: then each fired cell returns what its ray meets within reach. The
+formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` shows them together.
+"""
+
+from dataclasses import dataclass, fields
+
+from care_sim.base.bounds import bounded
+from care_sim.base.errors import InvalidInput
+
+_NEEDS = {
+    "lidar_stated_reflectance": "lidar_stated_range_m",
+    "visibility_m": "lidar_stated_range_m",
+    "rain_mm_h": "lidar_stated_range_m",
+}
+"""Settings that say nothing unless another one is switched on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReturnSettings:
+    """Which pulses come back, and what they tell."""
+
+    lidar_stated_range_m: float = bounded(0.0, 0, 10_000)
+    """From here a target of `lidar_stated_reflectance` that faces the LiDAR returns just enough, in
+    clear air, metres: a line of every data sheet. A return is then as strong as its surface and
+    its distance make it (`care_sim.sensors.signal`), and weaker ones are lost. At 0 none is.
+    """
+    lidar_stated_reflectance: float = bounded(0.1, 0.001, 1)
+    """Reflectance of the target at `lidar_stated_range_m`, 0 to 1; most data sheets take 0.1."""
+    visibility_m: float = bounded(0.0, 0, 1_000_000)
+    """Meteorological visibility in fog, metres (`care_sim.sensors.weather`); 0 is clear air. The
+    cameras see on as before.
+    """
+    rain_mm_h: float = bounded(0.0, 0, 1000)
+    """Rain, millimetres per hour (`care_sim.sensors.weather`). The cameras see on as before."""
+
+    @property
+    def shapes_beams(self) -> bool:
+        """Whether a ray alone does not tell what a cell returns."""
+        return bool(self.lidar_stated_range_m)
+
+    @property
+    def filmed(self) -> "ReturnSettings":
+        """These settings alone, as a film is made with them."""
+        return ReturnSettings(**{name: getattr(self, name) for name in RETURN_SETTINGS})
+
+    def check_returns(self) -> None:
+        """Raise InvalidInput for a setting that has no meaning without another one."""
+        changed = changed_settings(self, RAYS)
+        for name in changed:
+            if (needed := _NEEDS.get(name, name)) not in changed:
+                raise InvalidInput(f"{name} has no meaning without {needed}")
+
+
+RETURN_SETTINGS = {field.name: field.default for field in fields(ReturnSettings)}
+"""Their names and defaults."""
+RAYS = ReturnSettings()
+"""All switches off."""
+
+
+def changed_settings(settings: ReturnSettings, usual: ReturnSettings) -> list[str]:
+    """The names of those in which two differ."""
+    return [name for name in RETURN_SETTINGS if getattr(settings, name) != getattr(usual, name)]
