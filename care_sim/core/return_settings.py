@@ -13,6 +13,7 @@ _NEEDS = {
     "lidar_stated_reflectance": "lidar_stated_range_m",
     "visibility_m": "lidar_stated_range_m",
     "rain_mm_h": "lidar_stated_range_m",
+    "lidar_compensated": "lidar_sweep_s",
 }
 """Settings that say nothing unless another one is switched on."""
 
@@ -34,11 +35,17 @@ class ReturnSettings:
     """
     rain_mm_h: float = bounded(0.0, 0, 1000)
     """Rain, millimetres per hour (`care_sim.sensors.weather`). The cameras see on as before."""
+    lidar_sweep_s: float = bounded(0.0, 0, 1)
+    """How long a sweep takes, seconds: columns fire one after another, the last at the keyframe
+    (`care_sim.sensors.sweep`). At 0 all fire at once.
+    """
+    lidar_compensated: bool = False
+    """Whether points of a sweep are moved by how the ego moved since. Ranges stay as measured."""
 
     @property
     def shapes_beams(self) -> bool:
         """Whether a ray alone does not tell what a cell returns."""
-        return bool(self.lidar_stated_range_m)
+        return bool(self.lidar_stated_range_m or self.lidar_sweep_s)
 
     @property
     def filmed(self) -> "ReturnSettings":

@@ -259,6 +259,14 @@ class Scan:
     """(n,) calibrated, 0 to 1 and 0 without a return (`care_sim.sensors.signal`); None of a LiDAR
     whose pulses have no strength.
     """
+    times: Floats | None = None
+    """(n,) seconds from the keyframe, below 0 (`care_sim.sensors.sweep`); None where all cells fire
+    at once.
+    """
+    points: Floats | None = None
+    """(n, 3) where the returns lie, the motion of the ego compensated; None where they lie along
+    the directions of their cells.
+    """
 
 
 @dataclass(frozen=True)

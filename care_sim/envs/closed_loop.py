@@ -76,6 +76,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     |---|---|---|
     | `fired` | the cells of this keyframe (1) | the car's own |
     | `intensities` | of each, where pulses have strength, 0 without a return (1) | the car's own |
+    | `times_s` | of each, where columns fire one by one, s from the keyframe (1) | the car's own |
     | `braking` | whether the brake is on | the car's own |
     | `time_s` | time of the keyframe, seconds from the start | the car's own |
     | `detected` | whether this keyframe detected the first-sighting actor (2) | scoring alone |
@@ -148,6 +149,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_stated_reflectance` | returns | reflectance at which it is stated |
     | `visibility_m` | returns | meteorological visibility in fog, m |
     | `rain_mm_h` | returns | rain, mm/h |
+    | `lidar_sweep_s` | returns | how long a sweep takes, whose columns fire one by one, s |
+    | `lidar_compensated` | returns | whether its points are freed of the ego's motion |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
     | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |
     | `brake_mps2` | fixed driver | its deceleration, m/s^2 |

@@ -61,6 +61,7 @@ class OpenLoopEnv(SensingEnv[OpenLoop]):
     |---|---|---|
     | `fired` | the cells of this keyframe | the car's own |
     | `intensities` | of each, where pulses have strength, 0 without a return | the car's own |
+    | `times_s` | of each, where columns fire one by one, s from the keyframe | the car's own |
     | `time_s` | time of the keyframe, seconds from the start | the car's own |
     | `objects` | how many annotated objects are within 50 m | scoring alone |
     | `found` | how many of them were found at this keyframe | scoring alone |

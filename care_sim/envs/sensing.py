@@ -67,6 +67,11 @@ class SensingEnv(gymnasium.Env[Observed, Action], Generic[AnyLoop]):
             )
         check_dead_rows(grid, conditions.lidar_dead_rows)
         check_camera_profile(conditions.camera_profile)
+        if conditions.lidar_sweep_s > keyframe_s:
+            raise InvalidInput(
+                f"lidar_sweep_s must be at most the {keyframe_s:g} s between keyframes, got "
+                f"{conditions.lidar_sweep_s:g}"
+            )
         self.conditions = conditions
         self.scoring_info = scoring_info
         self._secret = secret if isinstance(secret, str) else ""

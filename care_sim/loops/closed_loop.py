@@ -80,7 +80,7 @@ class ClosedLoop:
         self._reported = np.array(list(labels), np.int64)
         self._engine = ENGINES[conditions.engine](world.bullet, rig.grid)
         beams = (
-            Beams(world.bullet, rig.grid, conditions, conditions.engine)
+            Beams(world.bullet, rig.grid, conditions, conditions.engine, world.linear_motion)
             if conditions.shapes_beams
             else None
         )
@@ -135,7 +135,7 @@ class ClosedLoop:
 
         # The scan, the detector and the tracker see the world as it was when the cells were chosen.
         scan, bodies = self._lidar.fire(fired, sensor)
-        self.told = told_by(fired, scan.cells, intensities=scan.intensities)
+        self.told = told_by(fired, scan.cells, intensities=scan.intensities, times_s=scan.times)
         detections, behind, found = self._detection.detect(scan, bodies, self._local_boxes)
         tracks = self._memory.update(detections, sensor)
         self._track_objects.note(tracks, behind)

@@ -103,7 +103,7 @@ class OpenLoop:
 
         # In the order of the closed loop, but for the car: a film moves on by itself.
         cloud = self._lidar.fire(fired, shot.cloud)
-        self.told = told_by(fired, cloud.cells, intensities=cloud.intensities)
+        self.told = told_by(fired, cloud.cells, intensities=cloud.intensities, times_s=cloud.times)
         detections, objects = self._detector.detect(cloud, shot.annotations)
         tracks = self._memory.update(detections, shot.sensor)
         self._track_objects.note(tracks, objects)

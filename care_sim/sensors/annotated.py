@@ -38,13 +38,15 @@ NO_ANNOTATIONS = Annotations(np.empty(0, np.int64), np.empty(0, np.int64), np.em
 class Cloud:
     """Returns: `cells` (P,) ascending (several returns of a recorded sweep may share one), `points`
     (P, 3) in the sensor frame, `objects` (P,) the annotated object that each lies on or NO_OBJECT,
-    and `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`).
+    `intensities` (P,), 0 to 1, where pulses have strength (`care_sim.sensors.signal`), and `times`
+    (P,), seconds from the keyframe, where they have their own (`care_sim.sensors.sweep`).
     """
 
     cells: Cells
     points: Floats
     objects: Integers
     intensities: Floats | None = None
+    times: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -52,18 +54,22 @@ class Cloud:
     def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
         rows = np.flatnonzero(kept)
-        strengths = None if self.intensities is None else self.intensities[rows]
-        points = self.points.take(rows, axis=0)
-        return Cloud(self.cells[rows], points, self.objects[rows], strengths)
+        return Cloud(
+            self.cells[rows],
+            self.points.take(rows, axis=0),
+            self.objects[rows],
+            None if self.intensities is None else self.intensities[rows],
+            None if self.times is None else self.times[rows],
+        )
 
 
 def cloud_of(scan: Scan, objects: Integers, grid: AngularGrid) -> Cloud:
     """The returns of a scan of a grid; `objects` (n,) are those behind its rows."""
-    (returned,) = np.nonzero(np.isfinite(scan.ranges))
-    cells = scan.cells[returned]
-    points = grid.directions[cells] * scan.ranges[returned, None]
-    strengths = None if scan.intensities is None else scan.intensities[returned]
-    return Cloud(cells, points, objects[returned], strengths)
+    returned = np.isfinite(scan.ranges)
+    points = scan.points
+    if points is None:
+        points = grid.directions[scan.cells] * np.where(returned, scan.ranges, 0.0)[:, None]
+    return Cloud(scan.cells, points, objects, scan.intensities, scan.times).take(returned)
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,9 @@ class Lidar:
         intensities = scan.intensities
         if intensities is not None:
             intensities = np.where(lost, 0.0, intensities)
-        fired = Scan(cells, np.where(lost, np.inf, ranges), intensities)
+        fired = Scan(cells, np.where(lost, np.inf, ranges), intensities, scan.times)
+        if self._beams is not None:
+            fired = self._beams.compensated(fired, sensor)
         return fired, np.where(lost, NO_BODY, ids)
 
     def _cast(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:

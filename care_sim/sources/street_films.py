@@ -5,7 +5,7 @@ rendered.
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from care_sim.streets.draft import STREET_KEYFRAME_S
 from care_sim.streets.street import Street, make_street
 from care_sim.world.bodies import CATALOGUE
 from care_sim.world.bullet import BulletWorld
+from care_sim.world.linear_motion import LinearMotion, rates_between
 
 SIGHT_M = 60.0
 """Bodies whose hull is further than this from the sensor are left out, unless its LiDAR reaches
@@ -83,7 +84,7 @@ class _StreetBodies:
     def __init__(
         self, street: Street, world: BulletWorld, setup: SensorSetup, returns: ReturnSettings
     ):
-        self._beams = Beams(world, setup.grid, returns, _ENGINE) if returns.shapes_beams else None
+        self._returns = returns
         self._street = street
         self._world = world
         self._setup = setup
@@ -115,8 +116,8 @@ class _StreetBodies:
         cloud = Cloud(swept.cells, swept.points, numbers_of(swept.objects, numbers))
         # Seen by the full sweep or by a camera, whatever a policy will fire later.
         shown = np.isin(labelled, np.concatenate([cloud.objects, identified.objects]))
-        if self._beams is not None:
-            cloud = self._returned(self._beams, sensor, numbers)
+        if self._returns.shapes_beams:
+            cloud = self._returned(keyframe, sensor, numbers)
         annotations, hidden = (
             Annotations(labelled[kept], self._classes[labelled[kept]], boxes[kept])
             for kept in (shown, ~shown)
@@ -127,11 +128,23 @@ class _StreetBodies:
             keyframe * STREET_KEYFRAME_S, token, sensor, motion, annotations, identified, cloud
         ), hidden
 
-    def _returned(self, beams: Beams, sensor: Frame, numbers: Mapping[int, int]) -> Cloud:
+    def _returned(self, keyframe: int, sensor: Frame, numbers: Mapping[int, int]) -> Cloud:
         """The returns of every cell; `numbers` are those of the bodies that are reported."""
         grid = self._setup.grid
+        beams = Beams(self._world, grid, self._returns, _ENGINE, partial(self._motion, keyframe))
         scan, bodies = beams.cast(sensor, np.arange(grid.size))
-        return cloud_of(scan, numbers_of(bodies, numbers), grid)
+        return cloud_of(beams.compensated(scan, sensor), numbers_of(bodies, numbers), grid)
+
+    def _motion(self, keyframe: int) -> LinearMotion:
+        """How everything moved since the keyframe before; at the first, until the next."""
+        street = self._street
+        last, coming = max(keyframe, 1) - 1, max(keyframe, 1)
+        ways = rates_between(street.poses[last], street.poses[coming], STREET_KEYFRAME_S)
+        own = rates_between(street.ego[[last]], street.ego[[coming]], STREET_KEYFRAME_S)
+        rates = np.zeros((len(self._world.primitives.poses), 3))
+        rates[[*self._bodies.values()]] = ways[[*self._bodies]]
+        x, y, yaw = street.ego[keyframe].tolist()
+        return LinearMotion((x, y, yaw), own[0], rates)
 
     def _set_up(self, keyframe: int, sensor: Frame) -> Integers:
         """Put every body that is near where it is now. Returns their numbers, ascending."""

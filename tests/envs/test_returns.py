@@ -11,6 +11,7 @@ from care_sim.base.errors import InvalidInput
 from care_sim.core.return_settings import RETURN_SETTINGS
 from care_sim.envs import CLOSED_LOOP
 from tests.envs.test_causality import BEHIND, observe
+from tests.helpers.short_streets import few_and_short
 
 STATED = {"lidar_stated_range_m": 40.0}
 SWITCHES = {
@@ -21,14 +22,20 @@ SWITCHES = {
         "visibility_m": 60.0,
         "rain_mm_h": 20.0,
     },
+    "rolling": {"lidar_sweep_s": 0.1},
+    "compensated": {"lidar_sweep_s": 0.1, "lidar_compensated": True},
 }
 LOOPS = ("CARE-Dense-v0", "CARE-Street-v0")
 every_switch = pytest.mark.parametrize("switch", SWITCHES)
 
 
+ALL = {name: value for settings in SWITCHES.values() for name, value in settings.items()}
+
+
 @pytest.fixture(scope="module", params=LOOPS)
-def loop(request, short_streets):
-    return request.param
+def loop(request):
+    with few_and_short(keyframes=4):
+        yield request.param
 
 
 def masks(seed=0, share=0.05):
@@ -45,7 +52,7 @@ def seen(loop, actions, **settings):
 
 
 def test_every_setting_is_switched_on_here():
-    assert {name for settings in SWITCHES.values() for name in settings} == {*RETURN_SETTINGS}
+    assert {*ALL} == {*RETURN_SETTINGS}
 
 
 @every_switch
@@ -87,10 +94,9 @@ def test_cells_tell_intensities_beside_what_fired(loop, switch):
     assert "intensities" not in seen(loop, masks()[:1])[0][1]
 
 
-@every_switch
 @pytest.mark.parametrize("name", CLOSED_LOOP)
-def test_a_switch_plays_in_every_scenario(name, switch):
-    with gymnasium.make(name, budget=0.03, disable_env_checker=True, **SWITCHES[switch]) as env:
+def test_all_together_play_in_every_scenario(name):
+    with gymnasium.make(name, budget=0.03, disable_env_checker=True, **ALL) as env:
         policy = care_sim.make_policy("care", env)
         observation, _ = env.reset(seed=0)
         for _ in range(2):
