@@ -41,6 +41,10 @@ class ReturnSettings:
     """
     lidar_compensated: bool = False
     """Whether points of a sweep are moved by how the ego moved since. Ranges stay as measured."""
+    lidar_crosstalk: float = bounded(0.0, 0, 1)
+    """Share of the cells that take the pulse of another LiDAR for their return, 0 to 1
+    (`care_sim.sensors.crosstalk`).
+    """
 
     @property
     def shapes_beams(self) -> bool:
@@ -49,8 +53,11 @@ class ReturnSettings:
 
     @property
     def filmed(self) -> "ReturnSettings":
-        """These settings alone, as a film is made with them."""
-        return ReturnSettings(**{name: getattr(self, name) for name in RETURN_SETTINGS})
+        """These settings alone, as a film is made with them; crosstalk is drawn when it is
+        played.
+        """
+        told = {name: getattr(self, name) for name in RETURN_SETTINGS}
+        return ReturnSettings(**(told | {"lidar_crosstalk": RETURN_SETTINGS["lidar_crosstalk"]}))
 
     def check_returns(self) -> None:
         """Raise InvalidInput for a setting that has no meaning without another one."""

@@ -150,6 +150,7 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `visibility_m` | returns | meteorological visibility in fog, m |
     | `rain_mm_h` | returns | rain, mm/h |
     | `lidar_sweep_s` | returns | how long a sweep takes, whose columns fire one by one, s |
+    | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
     | `lidar_compensated` | returns | whether its points are freed of the ego's motion |
     | `ego_speed_sigma` | odometry | noise on the car's own speed, m/s |
     | `driver` | driver | who brakes, "fixed" or "careful-human" (4) |

@@ -53,7 +53,10 @@ class Cloud:
 
     def take(self, kept: Mask) -> "Cloud":
         """Some of the returns, by mask (P,)."""
-        rows = np.flatnonzero(kept)
+        return self.ordered(np.flatnonzero(kept))
+
+    def ordered(self, rows: Integers) -> "Cloud":
+        """The returns in these rows, in this order."""
         return Cloud(
             self.cells[rows],
             self.points.take(rows, axis=0),
@@ -61,6 +64,22 @@ class Cloud:
             None if self.intensities is None else self.intensities[rows],
             None if self.times is None else self.times[rows],
         )
+
+
+def joined(one: Cloud, other: Cloud) -> Cloud:
+    """The returns of two clouds with the same columns."""
+    both = Cloud(
+        np.concatenate([one.cells, other.cells]),
+        np.concatenate([one.points, other.points]),
+        np.concatenate([one.objects, other.objects]),
+        _both(one.intensities, other.intensities),
+        _both(one.times, other.times),
+    )
+    return both.ordered(np.argsort(both.cells, kind="stable"))
+
+
+def _both(one: Floats | None, other: Floats | None) -> Floats | None:
+    return None if one is None or other is None else np.concatenate([one, other])
 
 
 def cloud_of(scan: Scan, objects: Integers, grid: AngularGrid) -> Cloud:

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from care_sim.core.arrays import Integers
-from care_sim.core.conditions import LidarFaults
+from care_sim.core.arrays import Integers, Mask
+from care_sim.core.conditions import Sensing
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.types import Scan
 from care_sim.sensors.beams import Beams
+from care_sim.sensors.crosstalk import crosstalk_of
 from care_sim.sensors.engines import RayEngine
 from care_sim.sensors.lidar_faults import CellFaults
 from care_sim.world.bullet import NO_BODY
@@ -17,26 +18,27 @@ from care_sim.world.bullet import NO_BODY
 
 class Lidar:
     """Casts the fired cells through an engine, or as `beams` where pulses have more to them than a
-    ray; `CellFaults` are applied to what comes back.
+    ray; `CellFaults` and `Crosstalk` are applied to what comes back.
     """
 
     def __init__(
         self,
         grid: AngularGrid,
         engine: RayEngine,
-        faults: LidarFaults,
+        sensing: Sensing,
         seed: np.random.SeedSequence,
         beams: Beams | None = None,
     ):
         self.grid = grid
         self._engine = engine
         self._beams = beams
-        self._faults = CellFaults(grid, faults, seed)
+        self._faults = CellFaults(grid, sensing, seed)
+        self._crosstalk = crosstalk_of(grid, sensing, seed)
 
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
         scan, _ = self._cast(np.arange(self.grid.size), sensor)
-        return replace(scan, ranges=np.where(self._faults.dead, np.inf, scan.ranges))
+        return _without(scan, self._faults.dead)
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
         """How many of `cells` would hit a body, before noise and dropout, which stay undrawn."""
@@ -49,17 +51,15 @@ class Lidar:
         Returns the scan, and the body id behind every return for the proxy detector alone.
         """
         scan, ids = self._cast(cells, sensor)
-        ranges = scan.ranges
         if self._faults.is_noisy:
-            ranges = self._faults.draw_noisy(ranges, cells)
-        lost = self._faults.draw_lost(cells)
-        intensities = scan.intensities
-        if intensities is not None:
-            intensities = np.where(lost, 0.0, intensities)
-        fired = Scan(cells, np.where(lost, np.inf, ranges), intensities, scan.times)
+            scan = replace(scan, ranges=self._faults.draw_noisy(scan.ranges, scan.cells))
+        if self._crosstalk is not None:
+            scan, ids = self._crosstalk.over_scan(scan, ids)
+        lost = self._faults.draw_lost(scan.cells)
+        scan = _without(scan, lost)
         if self._beams is not None:
-            fired = self._beams.compensated(fired, sensor)
-        return fired, np.where(lost, NO_BODY, ids)
+            scan = self._beams.compensated(scan, sensor)
+        return scan, np.where(lost, NO_BODY, ids)
 
     def _cast(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """What the cells meet, and the bodies behind it."""
@@ -67,3 +67,11 @@ class Lidar:
             return self._beams.cast(sensor, cells)
         ranges, ids = self._engine.cast(sensor, cells)
         return Scan(cells, ranges), ids
+
+
+def _without(scan: Scan, lost: Mask) -> Scan:
+    """The scan whose `lost` (n,) cells return nothing."""
+    strengths = scan.intensities
+    if strengths is not None:
+        strengths = np.where(lost, 0.0, strengths)
+    return Scan(scan.cells, np.where(lost, np.inf, scan.ranges), strengths, scan.times)

@@ -23,10 +23,12 @@ SWITCHES = {
         "rain_mm_h": 20.0,
     },
     "rolling": {"lidar_sweep_s": 0.1},
+    "crosstalk": {"lidar_crosstalk": 0.2},
     "compensated": {"lidar_sweep_s": 0.1, "lidar_compensated": True},
 }
 LOOPS = ("CARE-Dense-v0", "CARE-Street-v0")
 every_switch = pytest.mark.parametrize("switch", SWITCHES)
+every_filmed_switch = pytest.mark.parametrize("switch", [n for n in SWITCHES if n != "crosstalk"])
 
 
 ALL = {name: value for settings in SWITCHES.values() for name, value in settings.items()}
@@ -83,7 +85,7 @@ def test_a_cell_returns_the_same_whichever_others_fire(loop, switch):
     assert np.array_equal(one[fired], other[fired])
 
 
-@every_switch
+@every_filmed_switch
 def test_cells_tell_intensities_beside_what_fired(loop, switch):
     for ranges, info in seen(loop, masks(), **SWITCHES[switch]):
         returned = ranges.ravel()[info["fired"]] < 50
@@ -135,7 +137,17 @@ def test_vectors_stack_what_returns_tell():
         assert info["intensities"].shape == info["fired"].shape == (2, 164)
 
 
-@every_switch
+def test_recordings_take_crosstalk(drive):
+    """A ghost needs no surface."""
+    source = f"argoverse2:{drive.parent}"
+    plain, haunted = (
+        seen("CARE-Replay-v0", masks(), source=source, **given)
+        for given in ({}, SWITCHES["crosstalk"])
+    )
+    assert all((a != b).any() for (a, _), (b, _) in zip(plain, haunted, strict=True))
+
+
+@every_filmed_switch
 def test_recordings_refuse_what_they_do_not_hold(drive, switch):
     name = next(name for name in RETURN_SETTINGS if name in SWITCHES[switch])
     told = f"{name} cannot be changed of the film .*, which was made with {RETURN_SETTINGS[name]}"
