@@ -7,12 +7,17 @@ formulas lie in `care_sim.sensors`, each with its source; `docs/returns.md` show
 from dataclasses import dataclass, fields
 
 from care_sim.base.bounds import bounded
+from care_sim.base.checks import check_known
 from care_sim.base.errors import InvalidInput
 
+STRONGEST, LAST, BOTH = "strongest", "last", "both"
+RETURNS_KEPT = (STRONGEST, LAST, BOTH)
+"""Which echoes of a beam a sensor reports."""
 _NEEDS = {
     "lidar_stated_reflectance": "lidar_stated_range_m",
     "visibility_m": "lidar_stated_range_m",
     "rain_mm_h": "lidar_stated_range_m",
+    "lidar_returns": "lidar_divergence_mrad",
     "lidar_compensated": "lidar_sweep_s",
 }
 """Settings that say nothing unless another one is switched on."""
@@ -35,6 +40,14 @@ class ReturnSettings:
     """
     rain_mm_h: float = bounded(0.0, 0, 1000)
     """Rain, millimetres per hour (`care_sim.sensors.weather`). The cameras see on as before."""
+    lidar_divergence_mrad: float = bounded(0.0, 0, 100)
+    """Angle between opposite edges of a beam, milliradians (`care_sim.sensors.bundle`). A beam may
+    then meet several bodies. At 0 it is one ray.
+    """
+    lidar_returns: str = STRONGEST
+    """Which echo a beam returns that has several: `strongest`, `last` or `both`
+    (`care_sim.sensors.echoes`).
+    """
     lidar_sweep_s: float = bounded(0.0, 0, 1)
     """How long a sweep takes, seconds: columns fire one after another, the last at the keyframe
     (`care_sim.sensors.sweep`). At 0 all fire at once.
@@ -49,7 +62,7 @@ class ReturnSettings:
     @property
     def shapes_beams(self) -> bool:
         """Whether a ray alone does not tell what a cell returns."""
-        return bool(self.lidar_stated_range_m or self.lidar_sweep_s)
+        return bool(self.lidar_stated_range_m or self.lidar_divergence_mrad or self.lidar_sweep_s)
 
     @property
     def filmed(self) -> "ReturnSettings":
@@ -60,7 +73,10 @@ class ReturnSettings:
         return ReturnSettings(**(told | {"lidar_crosstalk": RETURN_SETTINGS["lidar_crosstalk"]}))
 
     def check_returns(self) -> None:
-        """Raise InvalidInput for a setting that has no meaning without another one."""
+        """Raise InvalidInput for a setting that has no meaning without another one, and for returns
+        that there are not.
+        """
+        check_known("lidar_returns", self.lidar_returns, RETURNS_KEPT)
         changed = changed_settings(self, RAYS)
         for name in changed:
             if (needed := _NEEDS.get(name, name)) not in changed:

@@ -252,7 +252,7 @@ class Scan:
     """What came back from the fired cells."""
 
     cells: Cells
-    """(n,) the fired ones, ascending."""
+    """(n,) the fired ones, ascending; one that has two returns comes twice, the nearer first."""
     ranges: Floats
     """(n,) in metres, inf without a return."""
     intensities: Floats | None = None
@@ -267,6 +267,15 @@ class Scan:
     """(n, 3) where the returns lie, the motion of the ego compensated; None where they lie along
     the directions of their cells.
     """
+
+    def take(self, kept: Mask) -> "Scan":
+        """Some of the rows, by mask (n,)."""
+        optional = (self.intensities, self.times, self.points)
+        return Scan(
+            self.cells[kept],
+            self.ranges[kept],
+            *(None if column is None else column[kept] for column in optional),
+        )
 
 
 @dataclass(frozen=True)

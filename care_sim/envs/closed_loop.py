@@ -149,6 +149,8 @@ class ClosedLoopEnv(SensingEnv[ClosedLoop]):
     | `lidar_stated_reflectance` | returns | reflectance at which it is stated |
     | `visibility_m` | returns | meteorological visibility in fog, m |
     | `rain_mm_h` | returns | rain, mm/h |
+    | `lidar_divergence_mrad` | returns | angle between opposite edges of a beam, mrad |
+    | `lidar_returns` | returns | which echo of a beam, "strongest", "last" or "both" |
     | `lidar_sweep_s` | returns | how long a sweep takes, whose columns fire one by one, s |
     | `lidar_crosstalk` | returns | share of the cells with the pulse of another LiDAR |
     | `lidar_compensated` | returns | whether its points are freed of the ego's motion |

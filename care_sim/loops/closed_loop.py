@@ -278,7 +278,8 @@ class ClosedLoop:
     def _range_image(self, scan: Scan) -> NDArray[np.float32]:
         # 0 means not fired, the reach no return: a scan says inf, which no observation holds.
         ranges = np.zeros(self.rig.grid.size, np.float32)
-        ranges[scan.cells] = np.minimum(scan.ranges, self.rig.grid.range_m)
+        # From behind, so that of two returns of a cell the nearer one is written last.
+        ranges[scan.cells[::-1]] = np.minimum(scan.ranges[::-1], self.rig.grid.range_m)
         return ranges.reshape(self.rig.grid.shape)
 
     def _local_boxes(self, bodies: Integers) -> Floats:

@@ -1,5 +1,5 @@
-"""What fired cells return where pulses have strength and time: the bodies met, and the returns that
-are strong enough to be noticed.
+"""What fired cells return where beams have strength, width and time: the bodies met, and the
+returns that are strong enough to be noticed.
 """
 
 from collections.abc import Callable
@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from care_sim.core.arrays import Integers
+from care_sim.core.arrays import Floats, Integers
 from care_sim.core.frames import Frame
 from care_sim.core.grid import AngularGrid, Cells
 from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
-from care_sim.sensors.engines import ENGINES
+from care_sim.sensors.bundle import bundle
+from care_sim.sensors.echoes import Echoes, echoes_of, reported
+from care_sim.sensors.engines import ENGINES, Engine
 from care_sim.sensors.signal import Signal
 from care_sim.sensors.surfaces import brightness
 from care_sim.sensors.sweep import RollingSweep
@@ -35,7 +37,11 @@ class Beams:
     ):
         self._world = world
         self._grid = grid
-        self._engine = ENGINES[engine](world, grid)
+        divergence = settings.lidar_divergence_mrad
+        # The rays of each beam: a grid and an engine for the first, the second, ...
+        grids = bundle(grid, divergence) if divergence else [grid]
+        self._rays = [(one, ENGINES[engine](world, one)) for one in grids]
+        self._kept = settings.lidar_returns
         self._signal = Signal(settings)
         rolling = settings.lidar_sweep_s > 0
         self._sweep = RollingSweep(grid, settings.lidar_sweep_s) if rolling else None
@@ -47,16 +53,15 @@ class Beams:
         body behind each, NO_BODY where nothing returned.
         """
         if self._sweep is None:
-            return self._cast_at_once(sensor, cells)
+            return self._scan(cells, self._cast_at_once(sensor, cells))
         motion = self._motion()
         now = self._world.primitives.poses
-        ranges, intensities = np.empty(len(cells)), np.empty(len(cells))
-        bodies = np.empty(len(cells), np.int64)
-        for seconds, part in self._sweep.instants(cells):
+        parts = []
+        for seconds, places in self._sweep.instants(cells):
             with self._world.placed(motion.poses(now, seconds)):
-                scan, met = self._cast_at_once(motion.sensor(sensor, seconds), cells[part])
-            ranges[part], intensities[part], bodies[part] = scan.ranges, scan.intensities, met
-        return Scan(cells, ranges, intensities, self._sweep.seconds(cells)), bodies
+                echoes = self._cast_at_once(motion.sensor(sensor, seconds), cells[places])
+            parts.append(echoes._replace(beams=places[echoes.beams]))
+        return self._scan(cells, Echoes(*map(np.concatenate, zip(*parts, strict=True))))
 
     def compensated(self, scan: Scan, sensor: Frame) -> Scan:
         """The scan with the points of its returns as if the car had stood where it is in the frame
@@ -68,12 +73,34 @@ class Beams:
         points = self._grid.directions[scan.cells] * ranges[:, None]
         return replace(scan, points=self._motion().compensated(points, sensor, scan.times))
 
-    def _cast_at_once(self, sensor: Frame, cells: Cells) -> tuple[Scan, Integers]:
-        """The returns of cells that fire at one instant, at which the sensor is in this frame."""
-        ranges, bodies = self._engine.cast(sensor, cells)
-        rays = sensor.vectors_to_world(self._grid.directions[cells])
+    def _cast_at_once(self, sensor: Frame, cells: Cells) -> Echoes:
+        """What is noticed of cells that fire at one instant, at which the sensor is in this frame;
+        `Echoes.beams` are places in `cells`.
+        """
+        met = [self._meet(sensor, cells, *ray) for ray in self._rays]
+        if len(met) > 1:
+            echoes = echoes_of(*map(np.stack, zip(*met, strict=True)))
+        else:
+            echoes = Echoes(np.arange(len(cells)), *met[0])
+        noticed = self._signal.suffices(echoes.intensities, echoes.ranges)
+        echoes = echoes.take(np.flatnonzero(noticed))
+        return reported(echoes, self._kept) if len(met) > 1 else echoes
+
+    def _meet(
+        self, sensor: Frame, cells: Cells, grid: AngularGrid, engine: Engine
+    ) -> tuple[Floats, Floats, Integers]:
+        """Ranges (n,), intensities (n,) and bodies (n,) of one ray of every cell."""
+        ranges, bodies = engine.cast(sensor, cells)
+        rays = sensor.vectors_to_world(grid.directions[cells])
         bright = brightness(self._world.primitives, sensor.origin, rays, ranges, bodies)
-        intensities = self._signal.intensities(bright, ranges)
-        noticed = self._signal.suffices(intensities, ranges)
-        scan = Scan(cells, np.where(noticed, ranges, np.inf), np.where(noticed, intensities, 0.0))
-        return scan, np.where(noticed, bodies, NO_BODY)
+        return ranges, self._signal.intensities(bright, ranges), bodies
+
+    def _scan(self, cells: Cells, echoes: Echoes) -> tuple[Scan, Integers]:
+        """The echoes as a scan, with a row for each cell that has none."""
+        silent = np.setdiff1d(np.arange(len(cells)), echoes.beams)
+        nothing = np.full(len(silent), np.inf), np.zeros(len(silent)), np.full(len(silent), NO_BODY)
+        rows = Echoes(*map(np.concatenate, zip(echoes, (silent, *nothing), strict=True)))
+        rows = rows.take(np.argsort(rows.beams, kind="stable"))
+        fired = cells[rows.beams]
+        times = None if self._sweep is None else self._sweep.seconds(fired)
+        return Scan(fired, rows.ranges, rows.intensities, times), rows.bodies

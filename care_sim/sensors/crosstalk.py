@@ -44,7 +44,9 @@ class Crosstalk:
             strengths = np.where(jammed, FULL_INTENSITY, strengths)
         feigned = np.where(jammed, ranges[scan.cells], scan.ranges)
         haunted = replace(scan, ranges=feigned, intensities=strengths)
-        return haunted, np.where(jammed, NO_BODY, bodies)
+        # A ghost is one return, also where there were two.
+        twice = jammed & (np.diff(scan.cells, prepend=-1) == 0)
+        return haunted.take(~twice), np.where(jammed, NO_BODY, bodies)[~twice]
 
     def over_cloud(self, cloud: Cloud, answering: Mask) -> Cloud:
         """A cloud with the ghosts of this keyframe in those cells that are `answering` (N,)."""

@@ -38,12 +38,15 @@ class Lidar:
     def peek(self, sensor: Frame) -> Scan:
         """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
         scan, _ = self._cast(np.arange(self.grid.size), sensor)
+        if len(scan.cells) > self.grid.size:
+            # Of a cell with two returns the nearer one, which comes first.
+            scan = scan.take(np.diff(scan.cells, prepend=-1) > 0)
         return _without(scan, self._faults.dead)
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
         """How many of `cells` would hit a body, before noise and dropout, which stay undrawn."""
-        _, bodies = self._cast(cells, sensor)
-        return int(np.count_nonzero((bodies == body) & ~self._faults.dead[cells]))
+        scan, bodies = self._cast(cells, sensor)
+        return int(np.count_nonzero((bodies == body) & ~self._faults.dead[scan.cells]))
 
     def fire(self, cells: Cells, sensor: Frame) -> tuple[Scan, Integers]:
         """Fire `cells` from the frame `sensor`.

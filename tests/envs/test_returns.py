@@ -22,9 +22,9 @@ SWITCHES = {
         "visibility_m": 60.0,
         "rain_mm_h": 20.0,
     },
-    "rolling": {"lidar_sweep_s": 0.1},
+    "rolling": {"lidar_sweep_s": 0.1, "lidar_compensated": True},
+    "wide": {"lidar_divergence_mrad": 6.0, "lidar_returns": "both"},
     "crosstalk": {"lidar_crosstalk": 0.2},
-    "compensated": {"lidar_sweep_s": 0.1, "lidar_compensated": True},
 }
 LOOPS = ("CARE-Dense-v0", "CARE-Street-v0")
 every_switch = pytest.mark.parametrize("switch", SWITCHES)
