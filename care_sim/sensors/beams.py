@@ -56,12 +56,12 @@ class Beams:
             return self._scan(cells, self._cast_at_once(sensor, cells))
         motion = self._motion()
         now = self._world.primitives.poses
-        parts = []
+        parts = [Echoes.none()]
         for seconds, places in self._sweep.instants(cells):
             with self._world.placed(motion.poses(now, seconds)):
                 echoes = self._cast_at_once(motion.sensor(sensor, seconds), cells[places])
             parts.append(echoes._replace(beams=places[echoes.beams]))
-        return self._scan(cells, Echoes(*map(np.concatenate, zip(*parts, strict=True))))
+        return self._scan(cells, Echoes.joined(parts))
 
     def compensated(self, scan: Scan, sensor: Frame) -> Scan:
         """The scan with the points of its returns as if the car had stood where it is in the frame
@@ -79,7 +79,8 @@ class Beams:
         """
         met = [self._meet(sensor, cells, *ray) for ray in self._rays]
         if len(met) > 1:
-            echoes = echoes_of(*map(np.stack, zip(*met, strict=True)))
+            ranges, intensities, bodies = map(np.stack, zip(*met, strict=True))
+            echoes = echoes_of(ranges, intensities, bodies)
         else:
             echoes = Echoes(np.arange(len(cells)), *met[0])
         noticed = self._signal.suffices(echoes.intensities, echoes.ranges)
@@ -98,8 +99,9 @@ class Beams:
     def _scan(self, cells: Cells, echoes: Echoes) -> tuple[Scan, Integers]:
         """The echoes as a scan, with a row for each cell that has none."""
         silent = np.setdiff1d(np.arange(len(cells)), echoes.beams)
-        nothing = np.full(len(silent), np.inf), np.zeros(len(silent)), np.full(len(silent), NO_BODY)
-        rows = Echoes(*map(np.concatenate, zip(echoes, (silent, *nothing), strict=True)))
+        count = len(silent)
+        nothing = Echoes(silent, np.full(count, np.inf), np.zeros(count), np.full(count, NO_BODY))
+        rows = Echoes.joined([echoes, nothing])
         rows = rows.take(np.argsort(rows.beams, kind="stable"))
         fired = cells[rows.beams]
         times = None if self._sweep is None else self._sweep.seconds(fired)

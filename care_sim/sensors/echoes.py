@@ -5,6 +5,7 @@ edges of bodies. Those farther apart give echoes of their own (Velodyne's manual
 HDL-32E describe the modes strongest, last, and both).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,21 @@ class Echoes(NamedTuple):
     ranges: Floats
     intensities: Floats
     bodies: Integers
+
+    @classmethod
+    def none(cls) -> "Echoes":
+        """No echo."""
+        return cls(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int64))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Echoes"]) -> "Echoes":
+        """All echoes of some parts, one after the other."""
+        return cls(
+            np.concatenate([part.beams for part in parts]),
+            np.concatenate([part.ranges for part in parts]),
+            np.concatenate([part.intensities for part in parts]),
+            np.concatenate([part.bodies for part in parts]),
+        )
 
     def take(self, rows: Integers) -> "Echoes":
         """Some of the echoes, by index."""

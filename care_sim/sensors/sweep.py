@@ -33,10 +33,8 @@ class RollingSweep:
         and the places among `cells` of those that do.
         """
         groups = self._group_of[cells % self._columns]
-        order = np.argsort(groups, kind="stable")
-        found, starts = np.unique(groups[order], return_index=True)
-        parts = np.split(order, starts[1:])
-        return [(float(self._seconds[one]), part) for one, part in zip(found, parts, strict=True)]
+        found = np.unique(groups).tolist()
+        return [(float(self._seconds[one]), np.flatnonzero(groups == one)) for one in found]
 
     def seconds(self, cells: Cells) -> Floats:
         """(n,) when each of `cells` fires, seconds from the keyframe."""

@@ -129,6 +129,27 @@ def test_both_engines_return_alike(switch):
         assert (np.abs(a - b) > 0.01).mean() < 1e-3
 
 
+@every_switch
+def test_firing_nothing_returns_nothing(switch):
+    ((ranges, info),) = seen("CARE-Dense-v0", [np.zeros((32, 512))], **SWITCHES[switch])
+    assert not ranges.any()
+    assert info["fired"] == []
+
+
+def test_vectors_give_the_same_episodes():
+    """With every switch on, in this process and in others."""
+    with gymnasium.make("CARE-Dense-v0", disable_env_checker=True, **ALL) as env:
+        observations = [env.reset(seed=3)[0], *(env.step(mask)[0] for mask in masks())]
+    for mode in ("sync", "async"):
+        arguments = {"num_envs": 2, "vectorization_mode": mode} | ALL
+        with closing(gymnasium.make_vec("CARE-Dense-v0", **arguments)) as envs:
+            stacked = [envs.reset(seed=[3, 4])[0]]
+            stacked += [envs.step(np.stack([mask, mask]))[0] for mask in masks()]
+            for one, many in zip(observations, stacked, strict=True):
+                for key in one:
+                    assert np.array_equal(one[key], many[key][0])
+
+
 def test_vectors_stack_what_returns_tell():
     arguments = {"num_envs": 2, "vectorization_mode": "sync", "budget": 0.01}
     with closing(gymnasium.make_vec("CARE-Dense-v0", **arguments, **STATED)) as envs:
