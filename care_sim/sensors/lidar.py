@@ -36,7 +36,9 @@ class Lidar:
         self._crosstalk = crosstalk_of(grid, sensing, seed)
 
     def peek(self, sensor: Frame) -> Scan:
-        """What a scan of every cell would return, before noise and dropout, which stay undrawn."""
+        """What a scan of every cell would return, before noise, crosstalk and dropout, which stay
+        undrawn.
+        """
         scan, _ = self._cast(np.arange(self.grid.size), sensor)
         if len(scan.cells) > self.grid.size:
             # Of a cell with two returns the nearer one, which comes first.
@@ -44,7 +46,9 @@ class Lidar:
         return _without(scan, self._faults.dead)
 
     def hits(self, body: int, cells: Cells, sensor: Frame) -> int:
-        """How many of `cells` would hit a body, before noise and dropout, which stay undrawn."""
+        """How many of `cells` would hit a body, before noise, crosstalk and dropout, which stay
+        undrawn.
+        """
         scan, bodies = self._cast(cells, sensor)
         return int(np.count_nonzero((bodies == body) & ~self._faults.dead[scan.cells]))
 

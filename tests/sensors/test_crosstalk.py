@@ -6,9 +6,10 @@ from care_sim.core.frames import Frame
 from care_sim.core.return_settings import ReturnSettings
 from care_sim.core.types import Scan
 from care_sim.sensors.annotated import NO_OBJECT, Cloud
-from care_sim.sensors.crosstalk import Crosstalk
+from care_sim.sensors.crosstalk import Crosstalk, crosstalk_of
 from care_sim.sensors.engines import ENGINES
 from care_sim.sensors.lidar import Lidar
+from care_sim.sensors.lidar_faults import CellFaults
 from care_sim.sensors.recorded_lidar import RecordedLidar
 from care_sim.world.bodies import CATALOGUE
 
@@ -91,6 +92,20 @@ def test_crosstalk_leaves_noise_and_dropout_as_they_are(grid, bullet):
     assert 0.1 < (~same).mean() < 0.2
     assert np.array_equal(found[same], bodies[same])
     assert not np.isfinite(haunted.ranges[np.isin(cells // grid.columns, (9, 20))]).any()
+
+
+def test_ghosts_have_a_stream_of_their_own(grid):
+    """Neither that of the noise nor, drawn at the same rate, that of the dropout."""
+    sensing = Sensing(lidar_crosstalk=0.3, lidar_dropout=0.3)
+    nothing = silent(np.arange(grid.size))
+    seed = np.random.SeedSequence(4)
+    noise = Crosstalk(grid, sensing, np.random.SeedSequence(4)).over_scan(*nothing)[0]
+    dropout = Crosstalk(grid, sensing, np.random.SeedSequence(4).spawn(1)[0]).over_scan(*nothing)[0]
+    CellFaults(grid, sensing, seed)
+    own = crosstalk_of(grid, sensing, seed).over_scan(*nothing)[0]
+    for other in (noise, dropout):
+        both = np.isfinite(own.ranges) & np.isfinite(other.ranges)
+        assert both.mean() == pytest.approx(0.09, abs=0.01)
 
 
 def test_a_recorded_lidar_draws_ghosts_in_cells_that_fire(grid):
