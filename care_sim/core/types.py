@@ -260,8 +260,8 @@ class Scan:
     whose pulses have no strength.
     """
     times: Floats | None = None
-    """(n,) seconds from the keyframe, below 0 (`care_sim.sensors.sweep`); None where all cells fire
-    at once.
+    """(n,) seconds from the keyframe, below 0, and 0 without a return (`care_sim.sensors.sweep`);
+    None where all cells fire at once.
     """
     points: Floats | None = None
     """(n, 3) where the returns lie, the motion of the ego compensated; None where they lie along

@@ -78,7 +78,10 @@ class Lidar:
 
 def _without(scan: Scan, lost: Mask) -> Scan:
     """The scan whose `lost` (n,) cells return nothing."""
-    strengths = scan.intensities
+    ranges = np.where(lost, np.inf, scan.ranges)
+    strengths, times = scan.intensities, scan.times
     if strengths is not None:
         strengths = np.where(lost, 0.0, strengths)
-    return Scan(scan.cells, np.where(lost, np.inf, scan.ranges), strengths, scan.times)
+    if times is not None:
+        times = np.where(np.isfinite(ranges), times, 0.0)
+    return Scan(scan.cells, ranges, strengths, times)

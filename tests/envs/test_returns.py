@@ -93,7 +93,10 @@ def test_cells_tell_intensities_beside_what_fired(loop, switch):
         assert 0 < returned.sum() < len(returned)
         assert np.array_equal(told > 0, returned)
         assert told.max() <= 1
-    assert "intensities" not in seen(loop, masks()[:1])[0][1]
+        if "times_s" in info:
+            assert np.array_equal(np.array(info["times_s"]) < 0, returned)
+        assert ("times_s" in info) == (switch == "rolling")
+    assert not {"intensities", "times_s"} & {*seen(loop, masks()[:1])[0][1]}
 
 
 @pytest.mark.parametrize("name", CLOSED_LOOP)
